@@ -1,0 +1,1 @@
+"""What every room stands on: names and units, errors, checks, the grid, transforms, files."""

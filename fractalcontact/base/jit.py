@@ -1,0 +1,43 @@
+"""The only place that decorates with Numba, and so the only place that decides how.
+
+Kernels are plain loops over arrays. They are compiled on first call, kept on disk, and follow IEEE rules
+(no fast-math: NaN and the order of sums mean what they say; a division by zero gives infinity or NaN,
+with the compiler as without it). Sums that must not depend on the number of threads are done per row by
+the kernel and added up serially, by the kernel or by its caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+from fractalcontact.base.threads import thread_count
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+prange = numba.prange
+
+
+def kernel(function: F) -> F:
+    """Compile a serial loop; it holds no Python lock while it runs."""
+    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return compiled
+
+
+def parallel_kernel(function: F) -> F:
+    """Compile a loop whose `prange` runs on the threads of `base.threads`.
+
+    The same source runs serially when one thread is asked for, and in plain Python when the compiler is
+    switched off; the iterations of its `prange` must not share a sum.
+    """
+    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy", parallel=True)(function)
+    return compiled
+
+
+def use_threads() -> int:
+    """Give Numba's parallel loops the number of threads of `base.threads`; return it."""
+    threads = max(1, min(thread_count(), int(numba.config.NUMBA_NUM_THREADS)))
+    numba.set_num_threads(threads)
+    return threads

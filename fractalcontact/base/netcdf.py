@@ -1,0 +1,131 @@
+"""Results to NetCDF-4 and back.
+
+A file is written under a temporary name in its own folder and renamed when it is complete, so that a run
+killed at any moment leaves no half file under the final name; the next save in the folder removes what a
+killed one left.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.schema import CONVENTIONS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PARTIAL = ".partial"
+_KIND = "fractalcontact_kind"
+_GLOBAL = ("Conventions", "title", "institution", "source", "history", "references", "comment", "provenance")
+
+
+def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
+    """Write a result as NetCDF-4 and return the path.
+
+    Parameters
+    ----------
+    result : DataArray, Dataset or DataTree
+        As given by any public function. A DataTree becomes a file with groups.
+    path : path-like
+        Ends in `.nc`; its folder is made if need be; an existing file is replaced only when the new one
+        is complete.
+
+    Raises
+    ------
+    InvalidInput
+        `result` is not labelled data, the name does not end in `.nc`, or the folder cannot be written.
+    """
+    import xarray as xr
+
+    target = Path(path)
+    where = "fractalcontact.save"
+    if target.suffix != ".nc":
+        raise InvalidInput(where, [f"path: expected a name that ends in '.nc', got {target.name!r}"])
+    if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
+        expected = "a DataArray, Dataset or DataTree"
+        raise InvalidInput(where, [f"result: expected {expected}, got {type(result).__name__}"])
+    temporary = target.with_name(f".{target.name}.{os.getpid()}{PARTIAL}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        clear_partial(target.parent)
+        _as_file(result).to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        temporary.replace(target)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidInput(where, [f"path: {target.name!r} cannot be written here: {reason}"]) from error
+    finally:
+        temporary.unlink(missing_ok=True) if target.parent.is_dir() else None
+    return target
+
+
+def open(path: str | os.PathLike[str]) -> Any:  # noqa: A001
+    """Read a NetCDF file that `save` wrote, whole, and close it.
+
+    Returns
+    -------
+    DataArray, Dataset or DataTree
+        What was saved; for a file of another origin a DataTree if it has groups, else a Dataset.
+
+    Raises
+    ------
+    UnreadableFile
+        The file does not exist, is truncated, or is not NetCDF.
+    """
+    import xarray as xr
+
+    source = Path(path)
+    where = "fractalcontact.open"
+    if not source.is_file():
+        raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    try:
+        with xr.open_datatree(source, engine="netcdf4") as tree:
+            tree.load()
+    except Exception as error:
+        raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+    kind = tree.attrs.get(_KIND, "DataTree" if tree.children else "Dataset")
+    if kind == "DataTree":
+        return tree
+    dataset = tree.to_dataset()
+    dataset.attrs.pop(_KIND, None)
+    if kind == "Dataset":
+        return dataset
+    array = dataset[kind]
+    array.attrs.update({key: dataset.attrs[key] for key in _GLOBAL if key in dataset.attrs})
+    return array
+
+
+def clear_partial(folder: Path) -> None:
+    """Remove the temporary files of runs that are no longer alive."""
+    for leftover in folder.glob(f".*{PARTIAL}"):
+        number = leftover.name.removesuffix(PARTIAL).rpartition(".")[2]
+        if number.isdigit() and int(number) != os.getpid() and not _alive(int(number)):
+            leftover.unlink(missing_ok=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OSError):
+        return True
+    return True
+
+
+def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> xr.Dataset | xr.DataTree:
+    """Return what is written: global attributes lifted out of a DataArray, Conventions always there."""
+    import xarray as xr
+
+    if isinstance(result, xr.DataArray):
+        name = str(result.name or "values")
+        dataset = result.rename(name).to_dataset()
+        dataset[name].attrs = {key: value for key, value in result.attrs.items() if key not in _GLOBAL}
+        dataset[name].encoding = dict(result.encoding)
+        dataset.attrs = {key: result.attrs[key] for key in _GLOBAL if key in result.attrs} | {_KIND: name}
+    else:
+        dataset = result.copy(deep=False)
+    dataset.attrs = {"Conventions": CONVENTIONS} | dataset.attrs
+    return dataset

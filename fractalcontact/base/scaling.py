@@ -1,0 +1,71 @@
+"""From a curve over scales to a slope: local slopes, weighted fits, the window of a fit.
+
+Curves are measured elsewhere; here they are only fitted. A slope is d ln value / d ln scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line through ln value against ln scale.
+
+    `standard_error` is that of ordinary least squares with independent errors; the points of a scaling
+    curve are not independent, so no confidence interval may be made from it alone.
+    """
+
+    slope: float
+    intercept: float
+    standard_error: float
+    points: int
+
+
+def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
+    """Fit ln value = intercept + slope * ln scale over the finite, positive points.
+
+    Parameters
+    ----------
+    scale, value : ndarray, shape (n,)
+    weights : ndarray, shape (n,), optional
+        Inverse variances of ln value, up to a factor.
+
+    Returns
+    -------
+    Line
+        NaN where fewer than two points are left.
+    """
+    scale, value = np.asarray(scale, float), np.asarray(value, float)
+    weights = np.ones(scale.shape) if weights is None else np.asarray(weights, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.log(scale), np.log(value)
+    good = np.isfinite(x) & np.isfinite(y) & (weights > 0)
+    x, y, w = x[good], y[good], weights[good]
+    if x.size < 2 or np.ptp(x) == 0:
+        return Line(np.nan, np.nan, np.nan, int(x.size))
+    w = w / w.sum()
+    x_mean, y_mean = float(w @ x), float(w @ y)
+    spread = float(w @ (x - x_mean) ** 2)
+    slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
+    residual = y - y_mean - slope * (x - x_mean)
+    error = np.sqrt(float(w @ residual**2) / spread / (x.size - 2)) if x.size > 2 else np.nan
+    return Line(slope, y_mean - slope * x_mean, float(error), int(x.size))
+
+
+def local_slope(scale: Array, value: Array) -> Array:
+    """Return d ln value / d ln scale at every point (centred; one-sided at the ends).
+
+    `value` has the scale on its last axis; leading axes are free. NaN where the value is not positive.
+    """
+    scale, value = np.asarray(scale, float), np.asarray(value, float)
+    if scale.size < 2:
+        return np.full(value.shape, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        y = np.where(value > 0, np.log(value), np.nan)
+    return np.asarray(np.gradient(y, np.log(scale), axis=-1))

@@ -1,0 +1,241 @@
+"""Every name that a result may carry, with its unit, its meaning and its form on disk.
+
+Labels are outputs: a public function builds its Dataset and passes it through `label`, which sets
+`units`, `long_name` and the NetCDF encoding of every variable and coordinate from the table below and
+drops whatever was inherited. A name that is not in the table is an error. Units are UDUNITS in SI; angles
+are degrees and counts are "1". Nothing is named `load`, which is a method of xarray.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CONVENTIONS = "CF-1.11"
+CORE_DIMS = ("y", "x")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Unit (UDUNITS) and meaning of one name; `attributes` are written as they stand."""
+
+    units: str | None
+    long_name: str
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+OPEN, CONTACT, YIELDED = 0, 1, 2
+_STATE = {
+    "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
+    "flag_meanings": "open contact yielded",
+}
+_LINEAGE = {"flag_values": np.array([1, 2, 3, 4, 5], dtype=np.int8), "flag_meanings": "birth death merge split same"}
+
+QUANTITIES: dict[str, Quantity] = {
+    # coordinates of the plane and of the paths through it
+    "x": Quantity("m", "position along x", {"standard_name": "projection_x_coordinate", "axis": "X"}),
+    "y": Quantity("m", "position along y", {"standard_name": "projection_y_coordinate", "axis": "Y"}),
+    "step": Quantity("1", "step of the load path"),
+    "shear": Quantity("m", "shear displacement of the block"),
+    "direction": Quantity(None, "direction in which the block slides (E is +x, N is +y)"),
+    "azimuth": Quantity("degree", "azimuth of sliding (E = 0, anticlockwise)"),
+    "member": Quantity("1", "member of an ensemble"),
+    "axis": Quantity(None, "axis of the plane"),
+    # surfaces
+    "height": Quantity("m", "surface height"),
+    "valid": Quantity("1", "cell was observed"),
+    "filled_points": Quantity("1", "number of missing points that were filled"),
+    "missing_points": Quantity("1", "number of missing points"),
+    "mean_height": Quantity("m", "mean height"),
+    "rms_height": Quantity("m", "root mean square height about the mean"),
+    "peak_to_valley": Quantity("m", "greatest less smallest height"),
+    "skewness": Quantity("1", "skewness of the heights"),
+    "kurtosis": Quantity("1", "kurtosis of the heights (3 for a Gaussian surface)"),
+    "rms_slope": Quantity("1", "root mean square of the surface gradient (both components)"),
+    "rms_slope_x": Quantity("1", "root mean square slope along x"),
+    "rms_slope_y": Quantity("1", "root mean square slope along y"),
+    "mean_slope_x": Quantity("1", "slope of the mean plane along x"),
+    "mean_slope_y": Quantity("1", "slope of the mean plane along y"),
+    "rms_curvature": Quantity("m-1", "root mean square of the mean curvature"),
+    "nayak_parameter": Quantity("1", "bandwidth parameter of Nayak, m0 m4 / m2^2"),
+    "developed_area_ratio": Quantity("1", "area of the surface over the area of its plane"),
+    # dimensions
+    "method": Quantity(None, "estimator"),
+    "hurst": Quantity("1", "Hurst exponent"),
+    "fractal_dimension": Quantity("1", "fractal dimension"),
+    "standard_error": Quantity("1", "standard error of the Hurst exponent"),
+    "ci_low": Quantity("1", "lower end of the 95 % confidence interval"),
+    "ci_high": Quantity("1", "upper end of the 95 % confidence interval"),
+    "scale_min": Quantity("m", "smallest scale of the fit"),
+    "scale_max": Quantity("m", "largest scale of the fit"),
+    "scale_count": Quantity("1", "number of scales in the fit"),
+    "rms_increment": Quantity("m", "root mean square height increment over one lag"),
+    "increment_lag": Quantity("m", "lag of the height increment"),
+    "noise_height": Quantity("m", "root mean square height of white measurement noise"),
+    "topothesy": Quantity("m", "topothesy: lag at which the rms increment equals the lag"),
+    "run_time": Quantity("s", "run time"),
+    "wavenumber": Quantity("rad m-1", "wavenumber"),
+    "wavelength": Quantity("m", "wavelength"),
+    "power_spectral_density": Quantity("m4", "power spectral density of the surface"),
+    "profile_power_spectral_density": Quantity("m3", "power spectral density of the profile"),
+    "mode_count": Quantity("1", "number of modes in the bin"),
+    "lag": Quantity("m", "lag"),
+    "pair_count": Quantity("1", "number of pairs of points"),
+    "variogram": Quantity("m2", "half the mean square height increment"),
+    "second_variogram": Quantity("m2", "mean square second difference of the heights"),
+    "madogram": Quantity("m", "half the mean absolute height increment"),
+    "cube_size": Quantity("m", "edge of the cubes along the surface"),
+    "cube_count": Quantity("1", "number of cubes that meet the surface"),
+    "window_size": Quantity("m", "edge of the window"),
+    "roughness": Quantity("m", "mean root mean square height inside the windows"),
+    "covering_area": Quantity("m2", "area of the triangulated surface"),
+    "variation": Quantity("m2", "volume of the height variation over the scale, per length"),
+    "local_slope": Quantity("1", "local slope in log-log scale"),
+    # contact
+    "closure": Quantity("m", "closure from first touch"),
+    "normal_force": Quantity("N", "normal force"),
+    "nominal_pressure": Quantity("Pa", "normal force over the nominal area"),
+    "nominal_area": Quantity("m2", "nominal contact area"),
+    "contact_area": Quantity("m2", "real contact area (cells in contact)"),
+    "contact_fraction": Quantity("1", "real over nominal contact area (cells in contact)"),
+    "corrected_contact_fraction": Quantity("1", "real over nominal contact area, corrected for the perimeter"),
+    "mean_gap": Quantity("m", "mean gap"),
+    "elastic_energy": Quantity("J", "elastic energy"),
+    "iterations": Quantity("1", "number of iterations"),
+    "transforms": Quantity("1", "number of pairs of Fourier transforms"),
+    "residual": Quantity("1", "optimality error reached"),
+    "converged": Quantity("1", "the tolerance was met"),
+    "stop_reason": Quantity(None, "why the solver stopped"),
+    "state": Quantity("1", "contact state", _STATE),
+    "pressure": Quantity("Pa", "contact pressure"),
+    "gap": Quantity("m", "gap between the bodies"),
+    "displacement": Quantity("m", "elastic displacement of the surface"),
+    "residual_height": Quantity("m", "surface height after unloading"),
+    "disc_radius": Quantity("m", "radius of the rigid circular plate"),
+    "contact_modulus": Quantity("Pa", "contact modulus E* of the pair"),
+    # joints
+    "bulk_closure": Quantity("m", "closure of the flat block under the same force"),
+    "interface_closure": Quantity("m", "closure less that of the flat block"),
+    "rigid_dilatancy": Quantity("m", "rigid dilatancy relative to zero shear"),
+    "initial_offset": Quantity("m", "rigid separation at zero shear"),
+    "dilatancy": Quantity("m", "dilatancy under constant normal force"),
+    "mean_slope": Quantity("1", "slope of the mean plane towards the direction of sliding"),
+    "plateau_dilatancy": Quantity("m", "rigid dilatancy less that of the mean plane"),
+    "basic_friction_angle": Quantity("degree", "basic friction angle"),
+    "dilatancy_angle": Quantity("degree", "dilatancy angle"),
+    "friction_angle": Quantity("degree", "friction angle: basic angle plus dilatancy angle"),
+    "shear_strength": Quantity("Pa", "shear strength"),
+    "smoothing": Quantity("m", "length of shear over which the dilatancy was smoothed"),
+    "stiffness": Quantity("Pa m-1", "normal stiffness per nominal area"),
+    "aperture": Quantity("m", "mechanical aperture"),
+    "correlation": Quantity("1", "correlation of the facing heights"),
+    "structure_function": Quantity("m2", "mean square difference of the facing heights"),
+    "decorrelation_length": Quantity("m", "shear at which the faces have forgotten each other"),
+    "shift_x": Quantity("m", "shift of the upper face along x"),
+    "shift_y": Quantity("m", "shift of the upper face along y"),
+    "rotation": Quantity("degree", "rotation of the upper face in its plane"),
+    "mismatch": Quantity("m", "root mean square mismatch of the faces in mated position"),
+    "hydraulic_aperture": Quantity("m", "hydraulic aperture (cubic law)"),
+    "transmissivity": Quantity("m3", "transmissivity: hydraulic aperture cubed over 12"),
+    "percolates": Quantity("1", "an open path crosses the joint along the axis"),
+    "open_fraction": Quantity("1", "open over nominal area"),
+    # domains
+    "box_size": Quantity("1", "edge of the box in cells"),
+    "box_length": Quantity("m", "edge of the box"),
+    "box_count": Quantity("1", "number of boxes that meet the set"),
+    "box_dimension": Quantity("1", "box dimension of the set"),
+    "dust_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
+    "dust_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
+    "dust_count": Quantity("1", "number of boxes that meet a random dust of equal coverage"),
+    "differs_from_dust": Quantity("1", "the set differs from a random dust of equal coverage"),
+    "coverage": Quantity("1", "fraction of the observed cells in the set"),
+    "lacunarity": Quantity("1", "gliding-box lacunarity"),
+    "dust_lacunarity": Quantity("1", "gliding-box lacunarity of a random dust of equal coverage"),
+    "boundary_dimension": Quantity("1", "dimension of the boundary of the set"),
+    "moment_order": Quantity("1", "order q of the moment"),
+    "generalised_dimension": Quantity("1", "generalised dimension D_q"),
+    "mass_exponent": Quantity("1", "mass exponent tau(q)"),
+    "island": Quantity("1", "island"),
+    "n_islands": Quantity("1", "number of islands"),
+    "label": Quantity("1", "number of the island, 0 outside"),
+    "area": Quantity("m2", "area of the island"),
+    "cells": Quantity("1", "number of cells of the island"),
+    "perimeter": Quantity("m", "perimeter of the island"),
+    "centroid_x": Quantity("m", "centroid along x"),
+    "centroid_y": Quantity("m", "centroid along y"),
+    "largest_island": Quantity("m2", "area of the largest island"),
+    "mean_island_area": Quantity("m2", "mean area of the islands"),
+    "euler_number": Quantity("1", "Euler number: islands less holes"),
+    "births": Quantity("1", "islands that meet no island of the step before"),
+    "deaths": Quantity("1", "islands of the step before that meet no island"),
+    "merges": Quantity("1", "islands that meet several of the step before"),
+    "splits": Quantity("1", "islands of the step before that meet several"),
+    "overlap": Quantity("1", "common over united area of successive sets"),
+    "hausdorff_distance": Quantity("m", "Hausdorff distance between successive sets"),
+    # accuracy
+    "error": Quantity("1", "true error"),
+    "memory": Quantity("byte", "peak memory"),
+    "part": Quantity(None, "part of the package"),
+    "knob": Quantity("1", "setting that trades error for time"),
+}
+
+T = TypeVar("T", "xr.Dataset", "xr.DataArray")
+
+
+def label(data: T) -> T:
+    """Return `data` with the labels of this table; nothing else is kept but the period of an axis.
+
+    Parameters
+    ----------
+    data : Dataset or DataArray
+        Every variable and coordinate is known to the table; a DataArray by its `name`.
+
+    Returns
+    -------
+    Dataset or DataArray
+        A shallow copy. Attributes of a Dataset itself are kept: they are set by `base.provenance`.
+
+    Raises
+    ------
+    KeyError
+        A name is not in the table.
+    """
+    data = data.copy(deep=False)
+    for name, coordinate in data.coords.items():
+        _label_variable(str(name), coordinate.variable, is_coordinate=True)
+    if hasattr(data, "data_vars"):
+        for name, variable in data.data_vars.items():
+            _label_variable(str(name), variable.variable, is_coordinate=False)
+    else:
+        _label_variable(str(data.name), data.variable, is_coordinate=False)
+    return data
+
+
+def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) -> None:
+    quantity = QUANTITIES[name]
+    attributes: dict[str, Any] = {"long_name": quantity.long_name}
+    if quantity.units is not None:
+        attributes["units"] = quantity.units
+    attributes.update(quantity.attributes)
+    if name in CORE_DIMS and "period" in variable.attrs:
+        attributes["period"] = float(variable.attrs["period"])
+    variable.attrs = attributes
+    variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
+
+
+def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:
+    if variable.dtype.kind in "US" or variable.dtype == object:
+        return {"dtype": "S1"}
+    encoding: dict[str, Any] = {}
+    if is_coordinate or variable.dtype.kind != "f":
+        encoding["_FillValue"] = None
+    if variable.ndim and not is_coordinate:
+        encoding.update(zlib=True, complevel=4, shuffle=True)
+        if variable.dims[-2:] == CORE_DIMS:
+            encoding["chunksizes"] = (1,) * (variable.ndim - 2) + variable.shape[-2:]
+    return encoding
