@@ -25,7 +25,9 @@ class InvalidInput(FractalContactError, ValueError):
 
     def __str__(self) -> str:
         """Put each problem on a line of its own."""
-        return "\n".join([f"{self.where}: {_count(len(self.problems))}", *(f"  - {p}" for p in self.problems)])
+        return "\n".join(
+            [f"{self.where}: {_count(len(self.problems))}", *(f"  - {p}" for p in self.problems)]
+        )
 
 
 class UnreadableFile(InvalidInput):

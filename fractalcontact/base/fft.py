@@ -35,7 +35,9 @@ def rfft2(plane: Array, out: Array | None = None) -> Array:
     return _forward(plane, (-2, -1), out)
 
 
-def irfft2(modes: Array, shape: tuple[int, int], out: Array | None = None, *, overwrite: bool = False) -> Array:
+def irfft2(
+    modes: Array, shape: tuple[int, int], out: Array | None = None, *, overwrite: bool = False
+) -> Array:
     """Undo `rfft2`; `shape` is (ny, nx) of the real plane. `overwrite` lets the input be destroyed."""
     return _backward(modes, (-2, -1), shape, out, overwrite)
 

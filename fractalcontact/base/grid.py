@@ -51,7 +51,9 @@ class Grid:
         return float(np.prod(self.extent))
 
 
-def grid_of(array: xr.DataArray, problems: Problems, argument: str, *, dims: Sequence[str] = ("y", "x")) -> Grid:
+def grid_of(
+    array: xr.DataArray, problems: Problems, argument: str, *, dims: Sequence[str] = ("y", "x")
+) -> Grid:
     """Read the grid from the coordinates of `dims`, which must be the last dims; note what is wrong."""
     shape = tuple(int(array.sizes[dim]) for dim in dims if dim in array.dims)
     if tuple(array.dims[-len(dims) :]) != tuple(dims):
@@ -69,7 +71,9 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
     """Return spacing and periodicity of one axis."""
     name = f"{argument}.{dim}"
     if dim not in array.coords:
-        problems.add(name, "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)", "none")
+        problems.add(
+            name, "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)", "none"
+        )
         return 1.0, False
     coordinate = array.coords[dim]
     units = coordinate.attrs.get("units", "m")
@@ -89,7 +93,9 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
     departure = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
     allowed = UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max())
     if not departure <= allowed:
-        problems.add(name, "uniform spacing", f"centres up to {departure / spacing:.3g} spacings off their place")
+        problems.add(
+            name, "uniform spacing", f"centres up to {departure / spacing:.3g} spacings off their place"
+        )
     wraps = period is not None and abs(float(period) - n * spacing) <= UNIFORM * float(period)
     return spacing, wraps
 
@@ -112,7 +118,10 @@ def resolve_periodic(
         return grid.periodic
     if given and grid.known:
         problems.require(
-            all(grid.periodic), argument, "periodic axes (attribute `period` of x and y equal to n * spacing)", given
+            all(grid.periodic),
+            argument,
+            "periodic axes (attribute `period` of x and y equal to n * spacing)",
+            given,
         )
     return (bool(given),) * len(grid.shape)
 

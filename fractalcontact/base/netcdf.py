@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-from fractalcontact.base.schema import CONVENTIONS
+from fractalcontact.base.schema import CONVENTIONS, encoded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +61,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     return target
 
 
-def open(path: str | os.PathLike[str]) -> Any:  # noqa: A001
+def open(path: str | os.PathLike[str]) -> Any:
     """Read a NetCDF file that `save` wrote, whole, and close it.
 
     Returns
@@ -85,6 +85,8 @@ def open(path: str | os.PathLike[str]) -> Any:  # noqa: A001
             tree.load()
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+    for node in tree.subtree:
+        node.dataset = encoded(node.to_dataset(inherit=False))
     kind = tree.attrs.get(_KIND, "DataTree" if tree.children else "Dataset")
     if kind == "DataTree":
         return tree
@@ -119,13 +121,15 @@ def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> xr.Dataset | xr
     """Return what is written: global attributes lifted out of a DataArray, Conventions always there."""
     import xarray as xr
 
-    if isinstance(result, xr.DataArray):
-        name = str(result.name or "values")
-        dataset = result.rename(name).to_dataset()
-        dataset[name].attrs = {key: value for key, value in result.attrs.items() if key not in _GLOBAL}
-        dataset[name].encoding = dict(result.encoding)
-        dataset.attrs = {key: result.attrs[key] for key in _GLOBAL if key in result.attrs} | {_KIND: name}
-    else:
-        dataset = result.copy(deep=False)
-    dataset.attrs = {"Conventions": CONVENTIONS} | dataset.attrs
+    data = _as_dataset(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)
+    data.attrs = {"Conventions": CONVENTIONS} | data.attrs
+    return data
+
+
+def _as_dataset(array: xr.DataArray) -> xr.Dataset:
+    name = "values" if array.name is None else str(array.name)
+    dataset = array.rename(name).to_dataset()
+    dataset[name].attrs = {key: value for key, value in array.attrs.items() if key not in _GLOBAL}
+    dataset[name].encoding = dict(array.encoding)
+    dataset.attrs = {key: array.attrs[key] for key in _GLOBAL if key in array.attrs} | {_KIND: name}
     return dataset

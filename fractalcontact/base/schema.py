@@ -34,7 +34,10 @@ _STATE = {
     "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
     "flag_meanings": "open contact yielded",
 }
-_LINEAGE = {"flag_values": np.array([1, 2, 3, 4, 5], dtype=np.int8), "flag_meanings": "birth death merge split same"}
+_LINEAGE = {
+    "flag_values": np.array([1, 2, 3, 4, 5], dtype=np.int8),
+    "flag_meanings": "birth death merge split same",
+}
 
 QUANTITIES: dict[str, Quantity] = {
     # coordinates of the plane and of the paths through it
@@ -103,7 +106,9 @@ QUANTITIES: dict[str, Quantity] = {
     "nominal_area": Quantity("m2", "nominal contact area"),
     "contact_area": Quantity("m2", "real contact area (cells in contact)"),
     "contact_fraction": Quantity("1", "real over nominal contact area (cells in contact)"),
-    "corrected_contact_fraction": Quantity("1", "real over nominal contact area, corrected for the perimeter"),
+    "corrected_contact_fraction": Quantity(
+        "1", "real over nominal contact area, corrected for the perimeter"
+    ),
     "mean_gap": Quantity("m", "mean gap"),
     "elastic_energy": Quantity("J", "elastic energy"),
     "iterations": Quantity("1", "number of iterations"),
@@ -214,6 +219,17 @@ def label(data: T) -> T:
     else:
         _label_variable(str(data.name), data.variable, is_coordinate=False)
     return data
+
+
+def encoded(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a shallow copy whose variables carry the encoding of this table and no other.
+
+    What a file or an operation left in `encoding` would otherwise decide how the data are written again.
+    """
+    dataset = dataset.copy(deep=False)
+    for name, variable in dataset.variables.items():
+        variable.encoding = _encoding(variable, is_coordinate=name in dataset.coords)
+    return dataset
 
 
 def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) -> None:

@@ -1,0 +1,131 @@
+"""The command `fractalcontact`: run a scene, list the methods, tell what a file holds.
+
+Exit codes: 0 done, 2 the input is wrong (nothing was written), 130 stopped (finished stages are kept).
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fractalcontact.base.errors import FractalContactError, InvalidInput
+
+WRONG_INPUT, STOPPED = 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    options = _parser().parse_args(arguments)
+    warnings.showwarning = _say_warning
+    _stop_on_termination()
+    try:
+        code: int = options.action(options)
+    except FractalContactError as error:
+        print(error, file=sys.stderr)
+        return WRONG_INPUT
+    except KeyboardInterrupt:
+        print("stopped; finished stages are kept, and the same command goes on from them", file=sys.stderr)
+        return STOPPED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    from fractalcontact import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="fractalcontact", description="Rough surfaces in contact: a study declared in one file, run."
+    )
+    parser.add_argument("--version", action="version", version=f"fractalcontact {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="command")
+
+    run = commands.add_parser("run", help="run a scene: one NetCDF, the figures, a summary")
+    run.add_argument("scene", help="a scene file (TOML), or the name of a shipped one")
+    run.add_argument("-o", "--out", help="folder for result.nc and the figures")
+    run.add_argument("--plan", action="store_true", help="print the stages that would run, and why; run none")
+    run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    run.set_defaults(action=_run)
+
+    methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
+    methods.set_defaults(action=_methods)
+
+    info = commands.add_parser("info", help="tell what a result file holds, its errors and its run times")
+    info.add_argument("file", help="a NetCDF file that this package wrote")
+    info.set_defaults(action=_info)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = _checked_scene(options.scene)
+    if options.plan:
+        from fractalcontact.scenes.planning import plan
+
+        print(plan(scene))
+        return 0
+    if options.out is None:
+        raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
+    from fractalcontact.scenes.reporting import summary
+    from fractalcontact.scenes.running import RESULT, run
+
+    tree = run(scene, out=options.out, progress=not options.quiet)
+    if not options.quiet:
+        print(summary(tree))
+        figures = sorted(path.name for path in Path(options.out).glob("*.png"))
+        print(f"\nwritten to {options.out}: {RESULT}" + (f" and {len(figures)} figures" if figures else ""))
+    return 0
+
+
+def _checked_scene(path: str) -> Any:
+    """Return the scene, or raise everything that is wrong with it and with its faces at once."""
+    from fractalcontact.scenes.reading import parse
+    from fractalcontact.scenes.stages import preflight
+
+    scene, problems = parse(path)
+    if problems:
+        try:
+            preflight(scene)
+        except InvalidInput as error:
+            problems += [line for line in error.problems if line not in problems]
+        raise InvalidInput(f"scene {scene.name}", problems)
+    return scene
+
+
+def _methods(options: argparse.Namespace) -> int:
+    del options
+    from fractalcontact import dimensions
+
+    for name, line in dimensions.methods().items():
+        print(f"{name:<20} {line}")
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    from fractalcontact.base.netcdf import open as open_result
+    from fractalcontact.scenes.reporting import contents
+
+    print(contents(open_result(options.file)))
+    return 0
+
+
+def _say_warning(message: Any, category: Any, *_: Any, **__: Any) -> None:
+    print(f"{getattr(category, '__name__', 'warning')}: {message}", file=sys.stderr)
+
+
+def _stop_on_termination() -> None:
+    """Let a polite kill unwind like an interrupt, so that temporary files go."""
+
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,238 @@
+"""A scene file in, a checked `Scene` out."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.scenes import grammar
+
+Table = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A study: what is given, and what is wanted.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the scene file.
+    tables : mapping
+        The file as parsed; ranges are spelled out as lists.
+    folder : Path
+        Where relative paths of the scene start.
+    """
+
+    name: str
+    tables: Table
+    folder: Path
+
+    def table(self, name: str) -> Table:
+        """Return one table, empty if it is not given."""
+        return self.tables.get(name) or {}
+
+    def wanted(self, room: str) -> tuple[str, ...]:
+        """Return the words that `[want]` gives for a room."""
+        words = self.table("want").get(room, ())
+        return (words,) if isinstance(words, str) else tuple(words)
+
+    @property
+    def figures(self) -> bool:
+        """Whether figures are wanted."""
+        return bool(self.table("want").get("figures", False))
+
+    def options(self, table: str, stage: str, keys: Iterable[str]) -> dict[str, Any]:
+        """Return the values of `keys` from a table, those of its sub-table `stage` first."""
+        common = self.table(table)
+        own = common.get(stage, {})
+        return {key: own.get(key, common.get(key)) for key in keys if key in own or key in common}
+
+
+def load(path: str | os.PathLike[str]) -> Scene:
+    """Read a scene and check all that can be told without its surface.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file; where no such file exists, the name of a shipped scene ("concrete_crack").
+
+    Raises
+    ------
+    InvalidInput
+        Lists every unknown key, missing table and impossible value.
+    UnreadableFile
+        There is no such file, or it is not TOML.
+    """
+    scene, problems = parse(path)
+    if problems:
+        raise InvalidInput(f"scene {scene.name}", problems)
+    return scene
+
+
+def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
+    """Read a scene; return it with the list of what is wrong in it."""
+    source = _find(Path(path))
+    try:
+        tables = tomllib.loads(source.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
+    problems = Problems(f"scene {source.stem}")
+    tables = {key: _spelled_out(value, key, problems) for key, value in tables.items()}
+    scene = Scene(source.stem, tables, source.resolve().parent)
+    _check(scene, problems)
+    return scene, problems.found
+
+
+def datasets_folder() -> Path:
+    """Return the folder of the shipped scenes and surfaces."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "datasets"
+    return installed if installed.is_dir() else package.parent / "datasets"
+
+
+def _find(path: Path) -> Path:
+    if path.is_file():
+        return path
+    shipped = datasets_folder() / f"{path.name.removesuffix('.toml')}.toml"
+    if path.parent.name in ("", "datasets") and shipped.is_file():
+        return shipped
+    names = sorted(p.stem for p in datasets_folder().glob("*.toml"))
+    raise UnreadableFile(
+        "scene",
+        [f"path: expected a scene file or one of {', '.join(names)}, got {path.name!r}: no such file"],
+    )
+
+
+def _spelled_out(value: Any, key: str, problems: Problems) -> Any:
+    """Turn ranges {start, stop, step} or {first, last, count} (log-spaced) into lists."""
+    if not isinstance(value, dict):
+        return value
+    if set(value) == {"start", "stop", "step"}:
+        start, stop, step = (value[word] for word in ("start", "stop", "step"))
+        if not (step > 0 and stop >= start):
+            problems.add(key, "a range with step > 0 and stop >= start", value)
+            return []
+        return (start + step * np.arange(round((stop - start) / step) + 1)).tolist()
+    if set(value) == {"first", "last", "count"}:
+        if not (value["first"] > 0 and value["last"] > 0 and value["count"] >= 1):
+            problems.add(key, "a logarithmic range with first, last > 0 and count >= 1", value)
+            return []
+        return np.geomspace(value["first"], value["last"], int(value["count"])).tolist()
+    return {word: _spelled_out(item, f"{key}.{word}", problems) for word, item in value.items()}
+
+
+def _check(scene: Scene, problems: Problems) -> None:
+    _known_keys(scene.tables, grammar.TABLES, "", problems)
+    for name in grammar.TABLES[1:]:
+        if not isinstance(scene.tables.get(name, {}), dict):
+            problems.add(name, "a table", scene.tables[name])
+            return
+    _check_surface(scene.table("surface"), "surface", problems)
+    if "upper" in scene.tables:
+        _check_surface(scene.table("upper"), "upper", problems)
+    _known_keys(scene.table("material"), grammar.MATERIAL, "material", problems)
+    _known_keys(scene.table("contact"), grammar.CONTACT, "contact", problems)
+    _known_keys(scene.table("dimensions"), grammar.DIMENSION_OPTIONS, "dimensions", problems)
+    _check_stages(scene.table("joint"), "joint", grammar.JOINT, grammar.JOINT_STAGES, problems)
+    _check_stages(scene.table("domains"), "domains", (), grammar.DOMAIN_STAGES, problems)
+    _check_wanted(scene, problems)
+    for name in ("surface", "upper", "material", "contact", "joint"):
+        _check_numbers(scene.table(name), name, problems)
+
+
+def _check_surface(table: Table, name: str, problems: Problems) -> None:
+    ways = [way for way in ("read", "sample", "generate") if way in table]
+    if len(ways) != 1:
+        problems.add(name, "one of `read`, `sample` or `generate`", ways or "none")
+        return
+    if ways == ["generate"]:
+        generator = problems.choice(f"{name}.generate", table["generate"], grammar.GENERATORS)
+        keys, required = _arguments(generator)
+        _known_keys(table, (*keys, "generate", "level"), name, problems)
+        for key in sorted(required - set(table)):
+            problems.add(f"{name}.{key}", f"a value for {generator}", "none")
+    else:
+        _known_keys(table, grammar.READING, name, problems)
+        if ways == ["sample"]:
+            problems.choice(f"{name}.sample", table["sample"], grammar.SAMPLES)
+
+
+def _arguments(generator: str) -> tuple[list[str], set[str]]:
+    """Return all arguments of a generator and those without a default."""
+    import inspect
+
+    from fractalcontact import surfaces
+
+    signature = inspect.signature(getattr(surfaces, generator)).parameters
+    return list(signature), {key for key, value in signature.items() if value.default is value.empty}
+
+
+def _check_stages(
+    table: Table,
+    name: str,
+    common: tuple[str, ...],
+    stages: Mapping[str, tuple[str, ...]],
+    problems: Problems,
+) -> None:
+    tables = {key: value for key, value in table.items() if isinstance(value, dict) and key in stages}
+    _known_keys({k: v for k, v in table.items() if k not in tables}, common, name, problems, also=stages)
+    for stage, own in tables.items():
+        _known_keys(own, stages[stage], f"{name}.{stage}", problems)
+        _check_numbers(own, f"{name}.{stage}", problems)
+
+
+def _check_wanted(scene: Scene, problems: Problems) -> None:
+    table = scene.table("want")
+    if not table:
+        problems.add("want", "a table that names at least one result", "none")
+    _known_keys(table, (*grammar.WANTED, "dimensions", "figures"), "want", problems)
+    for room, words in grammar.WANTED.items():
+        problems.choices(f"want.{room}", scene.wanted(room), words)
+    if scene.wanted("dimensions"):
+        from fractalcontact import dimensions
+
+        problems.choices("want.dimensions", scene.wanted("dimensions"), ("default", *dimensions.methods()))
+    if not isinstance(table.get("figures", False), bool):
+        problems.add("want.figures", "true or false", table["figures"])
+    joints = scene.wanted("joints")
+    if joints or (scene.wanted("domains") and not scene.wanted("contact")):
+        for key in ("young", "poisson"):
+            problems.require(key in scene.table("material"), f"material.{key}", "a value", "none")
+    if scene.wanted("contact"):
+        given = scene.table("contact")
+        problems.require(
+            sum(key in given for key in ("closure", "normal_force", "nominal_pressure")) == 1,
+            "contact",
+            "exactly one of closure, normal_force, nominal_pressure",
+            sorted(given) or "none",
+        )
+
+
+def _check_numbers(table: Table, name: str, problems: Problems) -> None:
+    for key, (above, at_least, below) in grammar.BOUNDS.items():
+        if key in table and not isinstance(table[key], dict):
+            problems.numbers(f"{name}.{key}", table[key], above=above, at_least=at_least, below=below)
+    if "direction" in table:
+        problems.choices(f"{name}.direction", table["direction"], ("E", "N", "W", "S"))
+
+
+def _known_keys(
+    table: Table, known: Iterable[str], name: str, problems: Problems, also: Iterable[str] = ()
+) -> None:
+    words = tuple(known)
+    for key in table:
+        if key not in words:
+            near = difflib.get_close_matches(key, (*words, *also), n=1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            place = f"{name}.{key}" if name else key
+            problems.add(place, f"one of the keys {', '.join(words) or 'none'}", f"an unknown key{hint}")

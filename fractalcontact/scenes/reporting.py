@@ -1,0 +1,193 @@
+"""The summary of a study, for the screen: main figures, errors reached, run times."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import xarray as xr
+
+
+def summary(tree: xr.DataTree) -> str:
+    """Return the main figures of a study with the errors reached and the run time of every stage."""
+    parts = [
+        str(tree.attrs.get("title", tree.name or "result")),
+        _dimensions(tree),
+        _closure(tree),
+        _dilatancy(tree),
+        _friction(tree),
+        _domains(tree),
+        stage_table(tree),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def contents(result: xr.DataTree | xr.Dataset | xr.DataArray) -> str:
+    """Return what a file holds: its groups and variables, then the stages with their errors and times."""
+    import xarray as xr
+
+    if isinstance(result, xr.DataTree):
+        groups = {node.path: node.to_dataset(inherit=False) for node in result.subtree}
+    else:
+        groups = {"/": result.to_dataset() if isinstance(result, xr.DataArray) else result}
+    lines = [str(result.attrs.get("title", "untitled")), str(result.attrs.get("source", ""))]
+    for path, dataset in groups.items():
+        if dataset.variables:
+            lines += ["", path, *_variable_lines(dataset)]
+    stages = stage_table(result)
+    return "\n".join(lines) + (f"\n\n{stages}" if stages else "")
+
+
+def stage_table(result: Any) -> str:
+    """Return the stages of a study: seconds, origin, and what each says of its accuracy."""
+    entry = json.loads(result.attrs.get("provenance", "{}"))
+    stages = entry.get("stages", {})
+    if not stages:
+        return _single_entry(entry)
+    rows = [("stage", "seconds", "achieved")]
+    for name, facts in stages.items():
+        told = {key: value for key, value in facts.items() if key not in ("run_time", "origin")}
+        note = "" if facts.get("origin") == "computed" else f" ({facts.get('origin')})"
+        rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_told(told)) + note))
+    rows.append(("total", f"{sum(facts['run_time'] for facts in stages.values()):.2f}", ""))
+    return _table(rows)
+
+
+def _single_entry(entry: dict[str, Any]) -> str:
+    told = {key: entry[key] for key in ("call", "run_time", "residual", "iterations") if key in entry}
+    return ", ".join(f"{key} {value}" for key, value in told.items())
+
+
+def _told(facts: dict[str, Any]) -> Iterable[str]:
+    for key, value in facts.items():
+        word = key.replace("_", " ")
+        if isinstance(value, list):
+            yield f"{word} " + " ".join("-" if v is None or v != v else f"{v:.4f}" for v in value)
+        elif isinstance(value, bool):
+            yield word if value else f"not {word}"
+        else:
+            yield f"{word} {value:.2g}" if isinstance(value, float) else f"{word} {value}"
+
+
+def _variable_lines(dataset: xr.Dataset) -> Iterable[str]:
+    for name, variable in dataset.variables.items():
+        dims = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
+        units = variable.attrs.get("units", "")
+        yield f"  {name!s:<28} ({dims})  {variable.attrs.get('long_name', '')}" + (
+            f" [{units}]" if units else ""
+        )
+
+
+def _group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
+    try:
+        node: Any = tree[path]
+    except KeyError:
+        return None
+    return node.to_dataset() if node.has_data else None  # type: ignore[no-any-return]
+
+
+def _dimensions(tree: xr.DataTree) -> str:
+    found = _group(tree, "dimensions")
+    if found is None or "method" not in found.dims:
+        return ""
+    rows = [("fractal dimension", "D", "95 % interval of D", "scales")]
+    for method in found["method"].values:
+        one = found.sel(method=method)
+        low, high, dimension, hurst = (
+            float(one[k]) for k in ("ci_low", "ci_high", "fractal_dimension", "hurst")
+        )
+        top = dimension + hurst
+        interval = (
+            f"{top - high:.3f} ... {top - low:.3f}"
+            if np.isfinite(low)
+            else "none: see the reason in the file"
+        )
+        scales = f"{float(one['scale_min']):.2g} ... {float(one['scale_max']):.2g} m"
+        rows.append((str(method), f"{dimension:.3f}", interval, scales))
+    return _table(rows)
+
+
+def _closure(tree: xr.DataTree) -> str:
+    found = _group(tree, "joints/closure")
+    if found is None:
+        return ""
+    last = found.isel(step=-1)
+    rows = [("closure at shear", "force", "closure", "of the interface", "area", "corrected")]
+    for shear in np.atleast_1d(last["shear"].values):
+        one = last.sel(shear=shear) if "shear" in last.dims else last
+        rows.append(
+            (
+                f"{shear * 1e3:.3g} mm",
+                f"{float(one['normal_force']) / 1e3:.3g} kN",
+                f"{float(one['closure']) * 1e6:.4g} um",
+                f"{float(one['interface_closure']) * 1e6:.4g} um",
+                f"{float(one['contact_fraction']) * 100:.3g} %",
+                f"{float(one['corrected_contact_fraction']) * 100:.3g} %",
+            )
+        )
+    return _table(rows)
+
+
+def _dilatancy(tree: xr.DataTree) -> str:
+    rigid = _group(tree, "joints/rigid_dilatancy")
+    if rigid is None:
+        return ""
+    rows = [("rigid dilatancy", "at shear", "dilatancy", "mean slope")]
+    last = rigid.isel(shear=-1)
+    for direction in np.atleast_1d(rigid["direction"].values):
+        one = last.sel(direction=direction) if "direction" in last.dims else last
+        rows.append(
+            (
+                str(direction),
+                f"{float(one['shear']) * 1e3:.3g} mm",
+                f"{float(one['rigid_dilatancy']) * 1e3:.3g} mm",
+                f"{float(one['mean_slope']):+.4f}" if "mean_slope" in one else "",
+            )
+        )
+    return _table(rows)
+
+
+def _friction(tree: xr.DataTree) -> str:
+    found = _group(tree, "joints/friction")
+    if found is None or "shear_strength" not in found:
+        return ""
+    strength = found["shear_strength"].max("shear")
+    rows = [("peak shear strength", "nominal pressure", "strength")]
+    for direction in np.atleast_1d(found["direction"].values):
+        one = strength.sel(direction=direction) if "direction" in strength.dims else strength
+        for step in range(one.sizes.get("step", 1)):
+            at = one.isel(step=step) if "step" in one.dims else one
+            force = (
+                found["nominal_pressure"].isel(step=step).values.ravel()[0]
+                if "nominal_pressure" in found
+                else np.nan
+            )
+            rows.append((str(direction), f"{force / 1e6:.3g} MPa", f"{float(at) / 1e6:.4g} MPa"))
+    return _table(rows)
+
+
+def _domains(tree: xr.DataTree) -> str:
+    found = _group(tree, "domains/box_dimension")
+    if found is None:
+        return ""
+    rows = [("contact domain", "box dimension", "of a random dust")]
+    last = found.isel(step=-1) if "step" in found.dims else found
+    for shear in np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]:
+        one = last.sel(shear=shear) if shear is not None and "shear" in last.dims else last
+        place = "last step" if shear is None else f"last step, {float(shear) * 1e3:.3g} mm"
+        rows.append((place, f"{float(one['box_dimension']):.3f}", f"{float(one['dust_dimension']):.3f}"))
+    return _table(rows)
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = [
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    return "\n".join([lines[0], "-" * min(110, sum(widths) + 2 * len(widths) - 2), *lines[1:]])

@@ -1,0 +1,282 @@
+"""What each stage computes, by calling the rooms.
+
+A stage is one call, or several independent ones (its parts: one shear of a closure law, one direction of a
+dilatancy) whose results are joined. Parts may run anywhere and in any order; the joined result is the same.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.scenes.planning import check_loads
+from fractalcontact.scenes.reading import Scene, Table, datasets_folder
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fractalcontact.joints import Crack
+    from fractalcontact.scenes.planning import Stage
+
+    Results = Mapping[str, xr.Dataset]
+
+Part = Callable[[], "xr.Dataset"]
+
+
+@dataclass(frozen=True)
+class Work:
+    """The parts of one stage, and the dim along which their results are joined."""
+
+    parts: tuple[Part, ...]
+    along: str | None = None
+
+    def join(self, results: list[xr.Dataset]) -> xr.Dataset:
+        """Return the result of the stage from those of its parts."""
+        if len(results) == 1:
+            return results[0]
+        import xarray as xr
+
+        joined = xr.concat(
+            results,
+            dim=self.along,
+            data_vars="minimal",
+            coords="minimal",
+            compat="override",
+            join="override",
+            combine_attrs="override",
+        )
+        for name, variable in joined.variables.items():
+            variable.encoding = dict(results[0].variables[name].encoding)
+        return joined
+
+
+def work(stage: Stage, scene: Scene, results: Results) -> Work:
+    """Return what is to be done for a stage, given the results of those it needs."""
+    room, _, name = stage.name.partition("/")
+    if room == "surfaces":
+        return _surface_work(name, scene, results)
+    if room == "dimensions":
+        return _dimension_work(name, scene, results)
+    if room == "contact":
+        return Work((partial(_press, results["surfaces"], dict(scene.table("contact")), stage.keep),))
+    if room == "joints":
+        return _joint_work(name, stage, scene, results)
+    return _domain_work(name, stage, scene, results)
+
+
+def preflight(scene: Scene) -> None:
+    """Find all that is wrong with a scene before anything is computed or written.
+
+    Raises
+    ------
+    InvalidInput
+        Lists the problems of the faces, the block, the material and the loads together.
+    """
+    with Problems(f"scene {scene.name}") as problems:
+        check_loads(scene, problems.found)
+        faces = {}
+        for name in ("surface", "upper"):
+            if name in scene.tables and (name == "surface" or scene.wanted("joints")):
+                with _gather(problems, name):
+                    faces[name] = read_surface(scene.table(name), scene.folder)
+        if (
+            not problems.found
+            and (scene.wanted("joints") or scene.wanted("domains"))
+            and not scene.wanted("contact")
+        ):
+            _preflight_joint(scene, faces, problems)
+
+
+def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:
+    from fractalcontact import joints
+    from fractalcontact.scenes.planning import plan
+
+    crack = None
+    with _gather(problems, "joint"):
+        crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
+    for stage in plan(scene):
+        given = scene.options("joint", stage.name.removeprefix("joints/"), ("shear", "direction"))
+        if crack is not None and stage.name.startswith("joints/") and "shear" in given:
+            with _gather(problems, stage.name):
+                crack.check_shear(given["shear"], given.get("direction", ("E", "N", "W", "S")))
+
+
+class _gather:
+    """Note the problems of an `InvalidInput` raised in the block, and go on."""
+
+    def __init__(self, problems: Problems, place: str) -> None:
+        self.problems, self.place = problems, place
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, value: Any, trace: Any) -> bool:
+        if not isinstance(value, InvalidInput):
+            return False
+        lines = [f"{self.place}: {line}" for line in value.problems]
+        self.problems.found.extend(line for line in lines if line not in self.problems.found)
+        return True
+
+
+def read_surface(table: Table, folder: Path) -> xr.DataArray:
+    """Return the face that a table of the scene describes."""
+    from fractalcontact import surfaces
+
+    options = {key: value for key, value in table.items() if key not in ("level", "fill")}
+    if "generate" in options:
+        face = getattr(surfaces, options.pop("generate"))(**options)
+    elif "sample" in options:
+        face = surfaces.sample(options.pop("sample"))
+    else:
+        face = surfaces.read(locate(options.pop("read"), folder), **options)
+    if table.get("fill"):
+        face = surfaces.fill(face)
+    if "level" in table:
+        face = surfaces.level(face, table["level"])
+    return face
+
+
+def locate(path: str, folder: Path) -> Path:
+    """Return the file that a scene names.
+
+    Variables of the environment are expanded; a relative path starts at the scene or at the shipped data.
+
+    Raises
+    ------
+    InvalidInput
+        A variable is not set, or there is no such file.
+    """
+    expanded = os.path.expandvars(path)
+    if "$" in expanded:
+        raise InvalidInput("surface", [f"read: expected a path whose variables are set, got {path!r}"])
+    for candidate in (folder / expanded, datasets_folder() / expanded):
+        if candidate.is_file():
+            return candidate
+    raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
+
+
+def _surface_work(name: str, scene: Scene, results: Results) -> Work:
+    if name == "description":
+        return Work((partial(_call, "surfaces", "describe", _height(results)),))
+    return Work((partial(_read_face, scene.table("surface"), scene.folder),))
+
+
+def _read_face(table: Table, folder: Path) -> xr.Dataset:
+    face = read_surface(table, folder)
+    dataset = face.rename("height").to_dataset()
+    dataset.attrs = {key: face.attrs[key] for key in face.attrs if key not in ("units", "long_name")}
+    dataset["height"].attrs = {key: face.attrs[key] for key in ("long_name", "units") if key in face.attrs}
+    return dataset
+
+
+def _dimension_work(name: str, scene: Scene, results: Results) -> Work:
+    if name:
+        return Work((partial(_call, "dimensions", name, _height(results)),))
+    options = dict(scene.table("dimensions"))
+    methods = list(scene.wanted("dimensions"))
+    return Work((partial(_call, "dimensions", "estimate", _height(results), methods, **options),))
+
+
+def _press(faces: xr.Dataset, options: dict[str, Any], keep: tuple[str, ...]) -> xr.Dataset:
+    return _call("contact", "press", faces["height"], keep=keep, **options)
+
+
+def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
+    from fractalcontact.scenes.grammar import JOINT_STAGES
+
+    if name == "faces":
+        registers = bool(scene.table("joint").get("register", False))
+        return Work(
+            (partial(_upper_face, scene.table("upper"), scene.folder, results["surfaces"], registers),)
+        )
+    if name == "friction":
+        return Work(
+            (partial(_friction, results[stage.needs[0]], scene.options("joint", name, JOINT_STAGES[name])),)
+        )
+    if name == "transmissivity":
+        gap = results["joints/closure"]["gap"]
+        return Work(
+            (partial(_call, "joints", name, gap, **scene.options("joint", name, JOINT_STAGES[name])),)
+        )
+    crack = _crack(scene, results)
+    options = scene.options("joint", name, JOINT_STAGES[name])
+    if name == "closure":
+        return _closure_work(crack, options, stage.keep)
+    if name == "elastic_dilatancy":
+        directions = options.pop("direction", ("E", "N", "W", "S"))
+        directions = [directions] if isinstance(directions, str) else list(directions)
+        return Work(
+            tuple(
+                partial(_call, "joints", "dilatancy", crack, direction=[word], **options)
+                for word in directions
+            ),
+            along="direction",
+        )
+    function = {"rigid_dilatancy": "dilatancy"}.get(name, name)
+    return Work((partial(_call, "joints", function, crack, **options),))
+
+
+def _closure_work(crack: Crack, options: dict[str, Any], keep: tuple[str, ...]) -> Work:
+    loads = [key for key in ("closure", "normal_force", "nominal_pressure") if key in options]
+    # a load of the stage itself goes before one that the whole joint has
+    chosen = {loads[0]: options[loads[0]]} if loads else {}
+    shears = options["shear"] if isinstance(options["shear"], list) else [options["shear"]]
+    direction = options.get("direction", "E")
+    parts = [
+        partial(_call, "joints", "closure", crack, shear=[v], direction=direction, keep=keep, **chosen)
+        for v in shears
+    ]
+    return Work(tuple(parts), along="shear")
+
+
+def _upper_face(table: Table, folder: Path, lower: xr.Dataset, registers: bool) -> xr.Dataset:
+    face = read_surface(table, folder)
+    if registers:
+        return _call("joints", "register", lower["height"], face)
+    return face.rename("height").to_dataset()
+
+
+def _friction(dilatancy: xr.Dataset, options: dict[str, Any]) -> xr.Dataset:
+    return _call("joints", "friction", dilatancy, **options)
+
+
+def _domain_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
+    from fractalcontact.scenes.grammar import DOMAIN_STAGES
+
+    state = results[stage.needs[0]]["state"]
+    options = scene.options("domains", name, DOMAIN_STAGES[name])
+    return Work((partial(_call, "domains", name, state, **options),))
+
+
+def _crack(scene: Scene, results: Results) -> Crack:
+    from fractalcontact import joints
+
+    upper = results["joints/faces"]["height"] if "joints/faces" in results else None
+    return joints.Crack(results["surfaces"]["height"], upper, **_crack_options(scene))
+
+
+def _crack_options(scene: Scene) -> dict[str, Any]:
+    options = {key: value for key, value in scene.table("material").items() if key != "hardness"}
+    if "block" in scene.table("joint"):
+        options["block"] = scene.table("joint")["block"]
+    return options
+
+
+def _height(results: Results) -> xr.DataArray:
+    return results["surfaces"]["height"]
+
+
+def _call(room: str, function: str, *arguments: Any, **options: Any) -> Any:
+    """Call a public function of a room, by name, so that a part can be sent to another process."""
+    import importlib
+
+    result = getattr(importlib.import_module(f"fractalcontact.{room}"), function)(*arguments, **options)
+    return (
+        result.to_dataset() if hasattr(result, "to_dataset") and not hasattr(result, "data_vars") else result
+    )

@@ -1,0 +1,82 @@
+"""Checks collect every problem and raise once; errors are ValueErrors."""
+
+import numpy as np
+import pytest
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
+
+
+def test_all_problems_are_raised_at_once():
+    with pytest.raises(InvalidInput) as caught, Problems("somewhere") as problems:
+        problems.number("young", -3.0, above=0)
+        problems.choice("method", "quick", ("fast", "elimination"))
+        problems.integer("members", 0, at_least=1)
+        problems.numbers("shear", [0.0, np.nan], at_least=0)
+        problems.exactly_one(closure=None, normal_force=None)
+    text = str(caught.value)
+    assert len(caught.value.problems) == 5
+    assert "somewhere: 5 problems" in text
+    for part in (
+        "young",
+        "> 0",
+        "-3.0",
+        "'quick'",
+        "'elimination'",
+        "members",
+        "shear",
+        "nan",
+        "closure / normal_force",
+    ):
+        assert part in text
+
+
+def test_a_sound_call_leaves_with_its_values():
+    with Problems("somewhere") as problems:
+        assert problems.number("a", 2, above=0, below=3) == 2.0
+        np.testing.assert_array_equal(problems.numbers("b", [1, 2]), [1.0, 2.0])
+        assert problems.choices("c", ["x", "y", "x"], ("x", "y")) == ("x", "y")
+        assert problems.exactly_one(p=None, q=1) == "q"
+
+
+@pytest.mark.parametrize("value", [True, "3", None, [1, 2], 1j, np.nan, np.inf, [], [[1.0]]])
+def test_what_is_not_one_finite_number_is_refused(value):
+    with pytest.raises(InvalidInput), Problems("somewhere") as problems:
+        problems.number("a", value)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "good", "bad"),
+    [
+        ({"above": 0}, 1e-300, 0.0),
+        ({"at_least": 0}, 0.0, -1e-300),
+        ({"below": 1}, 0.999, 1.0),
+        ({"at_most": 1}, 1, 1.1),
+    ],
+)
+def test_bounds_hold_at_their_ends(bounds, good, bad):
+    with Problems("somewhere") as problems:
+        problems.number("a", good, **bounds)
+    with pytest.raises(InvalidInput), Problems("somewhere") as problems:
+        problems.number("a", bad, **bounds)
+
+
+def test_problems_of_an_inner_check_are_kept_with_those_found_before():
+    with pytest.raises(InvalidInput) as caught, Problems("outer") as problems:
+        problems.add("a", "x", "y")
+        raise InvalidInput("inner", ["b: expected c, got d"])
+    assert caught.value.problems == ("a: expected x, got 'y'", "b: expected c, got d")
+
+
+def test_other_exceptions_pass_through_untouched():
+    with pytest.raises(ZeroDivisionError), Problems("outer") as problems:
+        problems.add("a", "x", "y")
+        raise ZeroDivisionError
+
+
+def test_bad_input_errors_are_value_errors_and_a_missing_extra_names_itself():
+    assert issubclass(InvalidInput, ValueError)
+    assert issubclass(UnreadableFile, ValueError)
+    error = MissingExtra("reading instrument files", "SurfaceTopography", "io")
+    assert isinstance(error, ImportError)
+    assert "fractalcontact[io]" in str(error)
