@@ -14,6 +14,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes import grammar
 
 Table = Mapping[str, Any]
@@ -91,13 +92,6 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
     scene = Scene(source.stem, tables, source.resolve().parent)
     _check(scene, problems)
     return scene, problems.found
-
-
-def datasets_folder() -> Path:
-    """Return the folder of the shipped scenes and surfaces."""
-    package = Path(__file__).resolve().parent.parent
-    installed = package / "datasets"
-    return installed if installed.is_dir() else package.parent / "datasets"
 
 
 def _find(path: Path) -> Path:

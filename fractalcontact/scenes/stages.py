@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.planning import check_loads
-from fractalcontact.scenes.reading import Scene, Table, datasets_folder
+from fractalcontact.scenes.reading import Scene, Table
 
 if TYPE_CHECKING:
     import xarray as xr

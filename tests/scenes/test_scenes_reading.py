@@ -1,0 +1,157 @@
+"""Scenes: what is right is read, what is wrong is named, all at once."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
+
+SOUND = """
+title = "a small study"
+[surface]
+generate = "spectral"
+shape = [48, 48]
+spacing = 1e-4
+hurst = 0.8
+rms_height = 2e-5
+rng = 5
+[material]
+young = 30e9
+poisson = 0.2
+[joint]
+block = 2.4e-3
+direction = "W"
+shear = [1e-4, 4e-4]
+normal_force = [1.0, 10.0]
+[want]
+joints = ["closure", "rigid_dilatancy"]
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text, name="study.toml"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+def test_a_sound_scene_is_read_and_planned(write):
+    scene = fc.scenes.load(write(SOUND))
+    assert scene.name == "study"
+    names = [stage.name for stage in fc.scenes.plan(scene)]
+    assert names == ["surfaces", "joints/rigid_dilatancy", "joints/closure"]
+    assert "closure is wanted" in str(fc.scenes.plan(scene))
+
+
+def test_ranges_are_spelled_out(write):
+    text = SOUND.replace("[1e-4, 4e-4]", "{ start = 0.0, stop = 3e-4, step = 1e-4 }")
+    scene = fc.scenes.load(write(text.replace("[1.0, 10.0]", "{ first = 1.0, last = 100.0, count = 3 }")))
+    assert scene.table("joint")["shear"] == pytest.approx([0, 1e-4, 2e-4, 3e-4])
+    assert scene.table("joint")["normal_force"] == pytest.approx([1, 10, 100])
+
+
+def test_everything_wrong_is_listed_at_once(write):
+    text = SOUND.replace("hurst", "hirst").replace("30e9", "-30e9").replace("poisson = 0.2", "poisson = 0.7")
+    text = text.replace('"closure"', '"closing"').replace('"W"', '"NW"').replace("block", "blok")
+    with pytest.raises(InvalidInput) as caught:
+        fc.scenes.load(write(text))
+    message = str(caught.value)
+    for part in (
+        "surface.hirst",
+        "did you mean 'hurst'",
+        "surface.hurst",
+        "material.young",
+        "material.poisson",
+    ):
+        assert part in message
+    for part in ("closing", "joint.direction", "'NW'", "joint.blok", "did you mean 'block'"):
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ('generate = "spectral"', 'generate = "magic"', "magic"),
+        ('generate = "spectral"', 'generate = "spectral"\nread = "x.npy"', "one of `read`"),
+        ("[want]", "[wants]", "did you mean 'want'"),
+        ("[material]", "[material]\nyong = 1.0", "did you mean 'young'"),
+        ("young = 30e9", "", "material.young"),
+        ("shear = [1e-4, 4e-4]", "shear = [-1e-4]", "joint.shear"),
+        ("shear = [1e-4, 4e-4]", "shear = 'far'", "joint.shear"),
+        ("[1e-4, 4e-4]", "{ start = 1.0, stop = 0.0, step = 0.1 }", "stop >= start"),
+        ("[want]", "[want]\nfigures = 'yes'", "want.figures"),
+        ("[want]", "[want]\ndimensions = ['guess']", "guess"),
+        ("[want]", "[want]\ncontact = ['press']", "exactly one of closure"),
+        ('["closure", "rigid_dilatancy"]', '["closure"]\nkeep = ["everything"]', "everything"),
+    ],
+)
+def test_each_fault_is_named(write, old, new, word):
+    assert old in SOUND
+    with pytest.raises(InvalidInput, match=word):
+        fc.scenes.load(write(SOUND.replace(old, new)))
+
+
+def test_what_is_no_scene_says_so(write, tmp_path):
+    with pytest.raises(UnreadableFile, match="not a TOML file"):
+        fc.scenes.load(write("[surface"))
+    with pytest.raises(UnreadableFile, match="concrete_crack"):
+        fc.scenes.load(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "jacksboro_fault", "freiberg_gneiss"])
+def test_the_shipped_scenes_are_found_by_name_and_are_sound(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for way in (name, f"{name}.toml", f"datasets/{name}.toml"):
+        assert len(fc.scenes.plan(fc.scenes.load(way)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("block = 2.4e-3", "block = 1.0", ("block",)),
+        ("shear = [1e-4, 4e-4]", "shear = [1e-4, 1.0]", ("shear",)),
+        ("normal_force = [1.0, 10.0]", "", ("closure, normal_force or nominal_pressure",)),
+        ("young = 30e9", "young = -1.0\nfoo = 2", ("material.young", "material.foo")),
+        ("block = 2.4e-3", "block = 1.0\nblokk = 2", ("joint.blokk", "block: expected")),
+    ],
+)
+def test_the_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, new, words):
+    path = write(SOUND.replace(old, new))
+    done = command("run", path, "-o", tmp_path / "out")
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unset_variable_and_a_missing_file_are_named(write, tmp_path):
+    for name in ("${NO_SUCH_VARIABLE}/a.npy", "nothing.npy"):
+        text = f"[surface]\nread = '{name}'\nspacing = 1e-4\n[want]\nsurfaces = ['describe']\n"
+        done = command("run", write(text), "-o", tmp_path / "out")
+        assert done.returncode == 2
+        assert name in done.stderr
+
+
+def test_the_plan_is_printed_and_nothing_runs(write, tmp_path):
+    done = command("run", "--plan", write(SOUND), "-o", tmp_path / "out")
+    assert done.returncode == 0
+    assert "joints/closure" in done.stdout
+    assert not (tmp_path / "out").exists()
+
+
+def command(*words):
+    environment = {key: value for key, value in os.environ.items() if key != "NO_SUCH_VARIABLE"}
+    return subprocess.run(
+        [sys.executable, "-m", "fractalcontact", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )

@@ -1,0 +1,189 @@
+"""Scenes carried out: only what is asked, one clean file, resumed where it stopped."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_scenes_reading import SOUND, command
+
+import fractalcontact as fc
+from fractalcontact.scenes import running, stages
+
+WHOLE = SOUND.replace(
+    'joints = ["closure", "rigid_dilatancy"]',
+    'surfaces = ["height", "describe"]\n'
+    'dimensions = ["default", "spectrum", "variogram", "cube_counts"]\n'
+    'joints = ["closure", "rigid_dilatancy", "elastic_dilatancy", "friction"]\n'
+    'domains = ["box_dimension", "lacunarity"]\nkeep = ["state"]\nfigures = true\n',
+)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "study.toml").write_text(WHOLE, encoding="utf-8")
+    tree = fc.scenes.run(folder / "study.toml", out=folder / "out", progress=False)
+    return tree, folder / "out"
+
+
+def test_the_groups_are_those_asked_for(study):
+    tree, out = study
+    assert set(tree.children) == {"surfaces", "dimensions", "joints", "domains"}
+    with xr.open_datatree(out / "result.nc") as found:
+        assert set(found.children) == set(tree.children)
+        xr.testing.assert_identical(
+            found["joints/closure"].to_dataset().load(), tree["joints/closure"].to_dataset()
+        )
+    assert (out / "result.nc").is_file()
+    assert not (out / ".stages").exists()
+    assert list(out.glob("*.png"))
+    assert not list(out.glob(".*"))
+
+
+def test_every_group_alone_is_clean(study, compliance, tmp_path):
+    tree, _ = study
+    for number, node in enumerate(tree.subtree):
+        if node.has_data:
+            path = tmp_path / f"{number}.nc"
+            node.to_dataset(inherit=False).to_netcdf(path)
+            assert compliance(path) == [], node.path
+
+
+def test_the_results_are_those_of_the_rooms(study):
+    tree, _ = study
+    face = fc.surfaces.spectral((48, 48), 1e-4, hurst=0.8, rms_height=2e-5, rng=5)
+    np.testing.assert_array_equal(tree["surfaces/height"], face)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
+    closure = fc.joints.closure(
+        crack, shear=[1e-4, 4e-4], direction="W", normal_force=[1.0, 10.0], keep=("state",)
+    )
+    for name in ("closure", "interface_closure", "contact_fraction", "state"):
+        np.testing.assert_array_equal(tree["joints/closure"][name], closure[name])
+
+
+def test_the_record_tells_time_and_error_of_every_stage(study):
+    import json
+
+    record = json.loads(study[0].attrs["provenance"])["stages"]
+    assert {"surfaces", "dimensions", "joints/closure", "domains/box_dimension"} <= set(record)
+    assert all(entry["run_time"] >= 0 for entry in record.values())
+    assert record["joints/closure"]["residual"] <= 1e-8
+
+
+def test_a_map_that_only_the_domains_read_is_not_stored(tmp_path):
+    text = SOUND.replace('["closure", "rigid_dilatancy"]', '["closure"]\ndomains = ["box_dimension"]')
+    (tmp_path / "lean.toml").write_text(text, encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "lean.toml", progress=False)
+    assert "state" not in tree["joints/closure"]
+    assert "box_dimension" in tree["domains/box_dimension"]
+    assert "surfaces" not in tree.children
+
+
+def test_rigid_sliding_runs_no_solver_and_imports_no_compiler(tmp_path):
+    code = (
+        "import sys; from fractalcontact.cli import main\n"
+        "assert main(['run', 'rigid_sliding', '-o', sys.argv[1], '--quiet']) == 0\n"
+        "print([m for m in ('numba', 'matplotlib', 'skimage', 'dask', 'fractalcontact.contact') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_failed_run_goes_on_from_its_kept_stages(tmp_path, monkeypatch):
+    text = SOUND.replace('["closure", "rigid_dilatancy"]', '["closure"]\ndomains = ["lacunarity"]')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    whole = fc.scenes.run(tmp_path / "study.toml", progress=False)
+
+    def broken(*_):
+        raise RuntimeError("the lights went out")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stages, "_domain_work", broken)
+        with pytest.raises(RuntimeError):
+            fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert not (tmp_path / "out" / "result.nc").exists()
+    kept = sorted(path.name for path in (tmp_path / "out" / ".stages").iterdir())
+    assert sum(name.startswith("joints.closure") for name in kept) == 2
+
+    calls = []
+    original = stages._call
+    monkeypatch.setattr(stages, "_call", lambda *a, **k: calls.append(a[1]) or original(*a, **k))
+    resumed = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert calls == ["lacunarity"]
+    for path in ("joints/closure", "domains/lacunarity"):
+        ours, theirs = resumed[path].to_dataset(), whole[path].to_dataset()
+        xr.testing.assert_identical(
+            ours.drop_vars("run_time", errors="ignore").drop_attrs(deep=False),
+            theirs.drop_vars("run_time", errors="ignore").drop_attrs(deep=False),
+        )
+    assert not (tmp_path / "out" / ".stages").exists()
+
+
+def test_a_changed_scene_does_not_take_stages_of_another(tmp_path):
+    first, second = SOUND, SOUND.replace("young = 30e9", "young = 60e9")
+    keys = []
+    for text in (first, second, first):
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+        scene = fc.scenes.load(tmp_path / "study.toml")
+        digests = {}
+        for stage in fc.scenes.plan(scene):
+            digests[stage.name] = running._digest(stage, scene, digests)
+        keys.append(digests)
+    assert keys[0] == keys[2]
+    assert keys[0]["joints/closure"] != keys[1]["joints/closure"]
+    assert keys[0]["surfaces"] == keys[1]["surfaces"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_killed_at_any_moment_there_is_no_half_file(tmp_path, number):
+    text = SOUND.replace("[48, 48]", "[128, 128]").replace("2.4e-3", "6.4e-3")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fractalcontact", "run", tmp_path / "study.toml", "-o", out, "--quiet"],
+        stderr=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60
+    while not list(out.glob(".stages/*.nc")) and time.monotonic() < deadline and process.poll() is None:
+        time.sleep(0.01)
+    os.kill(process.pid, number)
+    process.wait()
+    assert not list(out.glob("*.nc")) or fc.open(out / "result.nc") is not None
+    done = command("run", tmp_path / "study.toml", "-o", out, "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in out.iterdir()] == ["result.nc"]
+
+
+def test_summary_and_info_print_the_main_figures(study, tmp_path):
+    from fractalcontact.scenes.reporting import summary
+
+    tree, out = study
+    text = summary(tree)
+    for word in (
+        "fractal dimension",
+        "closure at shear",
+        "rigid dilatancy",
+        "contact domain",
+        "joints/closure",
+    ):
+        assert word in text
+    done = command("info", out / "result.nc")
+    assert done.returncode == 0
+    for word in ("/joints/closure", "interface_closure", "[m]", "residual", "seconds"):
+        assert word in done.stdout
+    (tmp_path / "broken.nc").write_text("no")
+    assert command("info", tmp_path / "broken.nc").returncode == 2
+
+
+def test_methods_are_listed():
+    done = command("methods")
+    assert done.returncode == 0
+    for name in ("spectrum", "variogram", "cube_counts"):
+        assert name in done.stdout
