@@ -1,0 +1,182 @@
+"""Influence coefficients: the settlement of one node under a unit force on another.
+
+Everything here is for a contact modulus of 1, so a coefficient is in 1/m. Sources: Boussinesq (1885); Love
+(1929, Phil. Trans. A 228:377) for the rectangle; Sneddon (1946) for the plate; the lattice sums are those of
+Epstein (1903), summed after Ewald (1921).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+DISC_RADII = ("second_order", "inscribed", "equal_area")
+GREATEST_RATIO = 2.0  # of the spacings, for which the second-order radius exists
+NEAR = 12  # cells summed one by one before the tail of a lattice sum
+
+
+def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radius: float) -> Array:
+    """Settlement at node (i, j) under a unit force on a rigid circular plate of `radius` at (0, 0).
+
+    1/(2a) at the plate itself and asin(a/r)/(pi a) away from it. Shape (ny, nx), 1/m for a modulus of 1.
+    """
+    distance = np.hypot(np.arange(shape[0])[:, None] * spacing[0], np.arange(shape[1])[None, :] * spacing[1])
+    distance[0, 0] = 1.0
+    table = np.arcsin(np.minimum(radius / distance, 1.0)) / (np.pi * radius)
+    table[0, 0] = 0.5 / radius
+    return np.asarray(table)
+
+
+def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Settlement at node (i, j) under a unit force spread evenly over the cell of (0, 0).
+
+    Shape (ny, nx), 1/m for a modulus of 1. Near cells by the closed form, far ones by Gauss quadrature,
+    because the closed form loses digits with the square of the distance.
+    """
+    from fractalcontact.contact._kernels import love_table
+
+    orders = (3, 4, 6, 10, 16)
+    rules = [np.polynomial.legendre.leggauss(order) for order in orders]
+    nodes = np.zeros((len(orders), max(orders)))
+    weights = np.zeros_like(nodes)
+    for row, (x, w) in enumerate(rules):
+        nodes[row, : x.size], weights[row, : x.size] = x / 2, w / 2
+    table = np.empty(shape)
+    love_table(table, spacing[0], spacing[1], np.array(orders), nodes, weights)
+    return table
+
+
+def spectral_compliance(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Periodic body: amplitude of the settlement over that of the pressure, 2/|q|, zero for the mean.
+
+    Shape (ny, nx//2 + 1), in m for a modulus of 1; the mean settlement is a rigid motion and is left out.
+    """
+    from fractalcontact.base.fft import wavenumbers
+
+    qy = wavenumbers(shape[0], spacing[0])[:, None]
+    qx = wavenumbers(shape[1], spacing[1], real=True)[None, :]
+    q = np.hypot(qy, qx)
+    q[0, 0] = np.inf
+    return np.asarray(2.0 / q)
+
+
+def disc_radius(choice: str | float, spacing: tuple[float, float]) -> float:
+    """Radius of the plate in the unit of `spacing`, by name or as a length."""
+    if not isinstance(choice, str):
+        return float(choice)
+    if choice == "inscribed":
+        return min(spacing) / 2
+    mean = float(np.sqrt(spacing[0]) * np.sqrt(spacing[1]))
+    if choice == "equal_area":
+        return mean / float(np.sqrt(np.pi))
+    return second_order_radius(max(spacing) / min(spacing)) * mean
+
+
+@lru_cache(maxsize=64)
+def second_order_radius(ratio: float) -> float:
+    """Radius, over the square root of the cell area, that makes the plates second-order accurate.
+
+    It is the smaller root of the lattice sum that states: under uniform pressure the plates settle as much
+    as the half-space does. 0.4365941 for equal spacings.
+    """
+    from scipy.optimize import brentq
+
+    smallest = 1.0 / np.sqrt(ratio)
+    # the sum falls from +inf to its least value somewhere below the touching of two plates
+    trial = np.linspace(0.3, 1.0, 141) * smallest
+    excess = np.array([local_excess(float(a), ratio) for a in trial])
+    first = int(np.argmax(excess < 0))
+    if not excess[first] < 0:
+        raise ValueError(f"no second-order radius for a spacing ratio of {ratio:g}")
+    root = brentq(local_excess, trial[first - 1], trial[first], args=(ratio,), xtol=1e-16, rtol=1e-15)
+    return float(root)
+
+
+def local_excess(radius: float, ratio: float) -> float:
+    """Settlement under unit pressure beyond that of the half-space; cell area 1, modulus 1."""
+    distance = _lattice(ratio, NEAR)
+    tail = 0.0
+    coefficient = 1.0  # of x^(2k+1) in asin x
+    for k in range(1, 7):
+        coefficient *= (2 * k - 1) ** 2 / (2.0 * k * (2 * k + 1))
+        far = epstein_zeta(2 * k + 1, ratio) - float(np.sum(distance ** -(2.0 * k + 1)))
+        tail += coefficient * radius ** (2 * k) * far
+    near = float(np.sum(np.arcsin(np.minimum(radius / distance, 1.0)) / radius - 1.0 / distance))
+    return 0.5 / radius + (epstein_zeta(1, ratio) + near + tail) / np.pi
+
+
+@lru_cache(maxsize=512)
+def epstein_zeta(power: int, ratio: float) -> float:
+    """Sum of r^-power over a rectangular lattice of cell area 1 without its origin; odd `power`.
+
+    For power 1 the integral over the plane is taken out of the sum.
+    """
+    from scipy.special import gamma
+
+    x = np.pi * _lattice(ratio, 8) ** 2
+    direct = np.sum(_upper_gamma(power, x) * x ** (-power / 2))
+    dual = np.sum(_upper_gamma(2 - power, x) * x ** (power / 2 - 1))
+    total = direct + dual - 2.0 / power - 2.0 / (2 - power)
+    return float(total * np.pi ** (power / 2) / gamma(power / 2))
+
+
+def least_symbol(radius: float, ratio: float) -> float:
+    """Least value of the plates' symbol over the Brillouin zone, over that of the half-space there.
+
+    Where it is not positive the operator is indefinite, and no contact problem has a unique solution.
+    Sum over the lattice of K(r) exp(i q r), with the slow 1/r part after Ewald.
+    """
+    from scipy.special import erfc
+
+    size = np.array([np.sqrt(ratio), 1.0 / np.sqrt(ratio)])  # spacings of a cell of area 1
+    reach = [int(np.ceil(NEAR * max(1.0, edge, 1.0 / edge))) for edge in size]
+    indices = [np.arange(-cells, cells + 1) for cells in reach]
+    iy, ix = (part.ravel() for part in np.meshgrid(*indices, indexing="ij"))
+    here = (iy == 0) & (ix == 0)
+    distance = np.hypot(iy * size[0], ix * size[1])
+    distance[here] = 1.0
+    plate = np.arcsin(np.minimum(radius / distance, 1.0)) / radius
+    short = plate - erf_part(distance)
+    short[here] = np.pi * 0.5 / radius - 2.0
+    least = np.inf
+    for fy in np.linspace(0.0, 0.5, 6):
+        for fx in np.linspace(0.0, 0.5, 6):
+            if fy == 0 and fx == 0:
+                continue
+            direct = float(np.sum(short * np.cos(2 * np.pi * (iy * fy + ix * fx))))
+            k = np.hypot((iy + fy) / size[0], (ix + fx) / size[1])
+            dual = float(np.sum(erfc(np.sqrt(np.pi) * k) / k))
+            continuum = 1.0 / np.hypot(fy / size[0], fx / size[1])
+            least = min(least, (direct + dual) / continuum)
+    return float(least)
+
+
+def erf_part(distance: Array) -> Array:
+    """Long-range part of 1/r, whose lattice sum is done in the dual lattice."""
+    from scipy.special import erf
+
+    return np.asarray(erf(np.sqrt(np.pi) * distance) / distance)
+
+
+def _lattice(ratio: float, cells: int) -> Array:
+    """Distances of the nodes of a lattice of cell area 1 from the origin, without the origin."""
+    index = np.arange(-cells, cells + 1)
+    distance = np.hypot(index[:, None] * np.sqrt(ratio), index[None, :] / np.sqrt(ratio)).ravel()
+    return np.asarray(distance[distance > 0])
+
+
+def _upper_gamma(twice: int, x: Array) -> Array:
+    """Upper incomplete gamma function of half an odd integer, twice/2, which may be negative."""
+    from scipy.special import erfc
+
+    value, order = np.sqrt(np.pi) * erfc(np.sqrt(x)), 0.5
+    while 2 * order < twice:
+        value, order = order * value + x**order * np.exp(-x), order + 1
+    while 2 * order > twice:
+        order -= 1
+        value = (value - x**order * np.exp(-x)) / order
+    return np.asarray(value)

@@ -1,0 +1,91 @@
+"""The contact problem in scaled form: lengths, heights and pressures near 1, scales powers of two.
+
+Lengths in the plane are measured in `length_unit`, heights and settlements in `height_unit`, both powers of
+two, and pressures in contact modulus times height over length unit. A change of unit by a power of two
+therefore leaves every number of the computation as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.contact import _influence
+from fractalcontact.contact._operator import FreeOperator, Operator, PeriodicOperator
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A pair of half-spaces on a grid: shape (ny, nx), scaled spacing, boundary and influence."""
+
+    shape: tuple[int, int]
+    spacing: tuple[float, float]
+    periodic: bool
+    influence: str
+    radius: float
+
+    @property
+    def cell_area(self) -> float:
+        """Scaled area of a cell."""
+        return self.spacing[0] * self.spacing[1]
+
+    def table(self, shape: tuple[int, int] | None = None) -> Array:
+        """Settlement at offset (i, j) under unit pressure on one cell of a free body."""
+        shape = shape or self.shape
+        if self.influence == "disc":
+            return _influence.disc_coefficients(shape, self.spacing, self.radius) * self.cell_area
+        return _influence.square_coefficients(shape, self.spacing) * self.cell_area
+
+    def operator(self) -> Operator:
+        """Return the settlement under a plane of pressure."""
+        if self.periodic:
+            return PeriodicOperator(_influence.spectral_compliance(self.shape, self.spacing), self.shape)
+        return FreeOperator(self.table())
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A body and the gap above its surface at first touch, scaled."""
+
+    body: Body
+    gap: Array
+    cap: float = np.inf
+
+    @cached_property
+    def mean_gap(self) -> float:
+        """Mean gap at first touch."""
+        return serial_mean(self.gap)
+
+
+@dataclass
+class Solution:
+    """State of one step, scaled."""
+
+    pressure: Array
+    settlement: Array
+    closure: float
+    total: float
+    iterations: int = 0
+    transforms: int = 0
+    residual: float = 0.0
+    reason: str = "converged"
+
+
+def serial_sum(plane: Array) -> float:
+    """Sum by rows, then over the rows: the same bits for any number of threads."""
+    return float(np.sum(np.sum(plane, axis=-1)))
+
+
+def serial_mean(plane: Array) -> float:
+    """Mean by rows, then over the rows."""
+    return serial_sum(plane) / plane.size
+
+
+def power_of_two(value: float) -> float:
+    """Return the power of two next above `value`; 1 for zero."""
+    return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0

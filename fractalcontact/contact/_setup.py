@@ -1,0 +1,98 @@
+"""From checked arguments to a scaled problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.contact import _influence
+from fractalcontact.contact._problem import Body, power_of_two
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+INFLUENCES = ("disc", "square", "spectral")
+
+
+@dataclass(frozen=True)
+class Units:
+    """Scales of a problem: two powers of two, and the modulus."""
+
+    length: float
+    height: float
+    modulus: float
+    cell_area: float
+
+    @property
+    def pressure(self) -> float:
+        """Pressure (Pa) of a scaled pressure of 1."""
+        return self.modulus * (self.height / self.length)
+
+    @property
+    def force(self) -> float:
+        """Force (N) of a scaled sum of pressure of 1."""
+        return self.modulus * self.cell_area * (self.height * self.length)
+
+    @property
+    def energy(self) -> float:
+        """Energy (J) of a scaled sum of pressure times settlement of 1."""
+        return self.force * self.height
+
+
+def length_unit(spacing: tuple[float, float]) -> float:
+    """Power of two in which lengths of the plane are measured."""
+    return power_of_two(max(spacing))
+
+
+def make_body(
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    periodic: bool,
+    influence: str | None,
+    radius: str | float,
+    problems: Problems,
+) -> Body:
+    """Scaled body with its influence chosen; notes what does not go together."""
+    chosen = problems.choice("influence", influence or ("spectral" if periodic else "disc"), INFLUENCES)
+    allowed = ("spectral",) if periodic else ("disc", "square")
+    bodies = "periodic" if periodic else "free"
+    problems.require(chosen in allowed, "influence", f"{' or '.join(allowed)} for {bodies} bodies", chosen)
+    unit = length_unit(spacing)
+    scaled = (spacing[0] / unit, spacing[1] / unit)
+    if chosen != "disc":
+        default = isinstance(radius, str) and radius == "second_order"
+        problems.require(default, "disc_radius", "nothing but with influence='disc'", radius)
+        return Body(shape, scaled, periodic, chosen, 0.0)
+    return Body(shape, scaled, periodic, chosen, _checked_radius(radius, scaled, unit, problems))
+
+
+def _checked_radius(
+    choice: str | float, spacing: tuple[float, float], unit: float, problems: Problems
+) -> float:
+    """Scaled radius of the plate; it must leave the operator positive."""
+    ratio = max(spacing) / min(spacing)
+    if isinstance(choice, str):
+        word = problems.choice("disc_radius", choice, _influence.DISC_RADII)
+        if word == "second_order" and ratio > _influence.GREATEST_RATIO:
+            expected = "spacings in a ratio of at most 2 for the second-order disc (use influence='square')"
+            problems.add("influence", expected, f"'disc' with a ratio of {ratio:.4g}")
+            return 1.0
+        radius = _influence.disc_radius(word, spacing)
+    else:
+        radius = problems.number("disc_radius", choice, above=0) / unit
+    least = _symbol(radius / float(np.sqrt(spacing[0] * spacing[1])), ratio)
+    problems.require(
+        least > 0,
+        "disc_radius",
+        "plates small enough for a positive operator (or influence='square')",
+        f"radius {radius * unit:.4g} m, symbol down to {least:.3g} of the half-space's",
+    )
+    return radius
+
+
+@lru_cache(maxsize=64)
+def _symbol(radius: float, ratio: float) -> float:
+    return _influence.least_symbol(radius, ratio)

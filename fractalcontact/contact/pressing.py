@@ -1,0 +1,198 @@
+"""A rough surface pressed by a flat: the labelled entry to the contact solver."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.grid import Grid, contact_edges
+from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.schema import CONTACT, OPEN, YIELDED, label
+from fractalcontact.contact._path import Step, solve_path
+from fractalcontact.contact._plan import CONTROLS, Plan, make_plan
+from fractalcontact.contact._problem import serial_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.contact.press"
+PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
+
+
+def press(
+    surface: xr.DataArray,
+    *,
+    contact_modulus: float,
+    closure: float | Sequence[float] | None = None,
+    normal_force: float | Sequence[float] | None = None,
+    nominal_pressure: float | Sequence[float] | None = None,
+    boundary: str | None = None,
+    influence: str | None = None,
+    disc_radius: str | float = "second_order",
+    hardness: float | None = None,
+    tolerance: float = 1e-8,
+    method: str = "fast",
+    keep: Sequence[str] = ("state",),
+    progress: bool = False,
+) -> xr.Dataset:
+    """Press a rigid flat down on a rough elastic surface, without friction or adhesion.
+
+    The pair of bodies enters through its contact modulus alone, so the flat may stand for a second elastic
+    body and the surface for the composite of two rough faces. The highest point of the surface touches at
+    closure 0. In the solution gap >= 0, pressure >= 0 and one of them is zero at every node, with
+    gap = (top - height) + settlement - closure.
+
+    Parameters
+    ----------
+    surface : DataArray, dims (y, x)
+        Heights in m, up; no NaN. At least 3 points along each axis; the spacings may differ.
+    contact_modulus : float
+        E* of the pair in Pa, see `effective_modulus`.
+    closure, normal_force, nominal_pressure : float or sequence of float
+        Exactly one of them: approach of the bodies from first touch (m), force (N), or force over the whole
+        extent (Pa). A sequence is a path of load, which may go up and down; each step starts from the
+        solution before it.
+    boundary : {None, "periodic", "free"}
+        None: what the axes of the surface say. A periodic surface may be called free, never the reverse.
+    influence : {None, "disc", "square", "spectral"}
+        Settlement under the force on a node. "disc": a rigid circular plate (Borri-Brunetto et al. 1998),
+        the default for free bodies; "square": uniform pressure on the cell (Love 1929); "spectral":
+        2/(E* |q|), for periodic bodies, which have no other.
+    disc_radius : {"second_order", "inscribed", "equal_area"} or float
+        Radius of the plate, or a length in m. "second_order" makes the error quadratic in the spacing (0.4366
+        of it on a square grid); it exists for spacings in a ratio of up to 2.
+    hardness : float, optional
+        Greatest pressure (Pa): nodes that reach it yield, and the bodies may overlap there. The cap has no
+        memory: unloading from a yielded state is elastic on the original surface.
+    tolerance : float
+        Bound on `residual`, the scale-free optimality error: weighted open gap plus greatest overlap over the
+        mean settlement (see Notes).
+    method : {"fast", "elimination"}
+        "fast": conjugate gradients with Fourier transforms; "elimination": the dense active set of the paper,
+        for small faces.
+    keep : sequence out of "state", "pressure", "gap", "displacement"
+        Maps (step, y, x) to return.
+    progress : bool
+        Show a bar over the steps.
+
+    Returns
+    -------
+    Dataset over `step`
+        Coordinates closure (m), normal_force (N), nominal_pressure (Pa); contact_area (m2, cells in contact),
+        contact_fraction (raw), corrected_contact_fraction (perimeter-corrected), mean_gap (m), elastic_energy
+        (J), iterations, transforms (pairs), residual, converged, stop_reason, run_time (s); and the maps.
+
+    Raises
+    ------
+    InvalidInput
+        Lists everything wrong with the call; also a force above hardness times area, and for a periodic body
+        a closure at or beyond the mean plane, where the force is not determined.
+
+    Warns
+    -----
+    ConvergenceWarning
+        A step stopped before its tolerance was met.
+
+    Notes
+    -----
+    Under force control the closure is the pressure-weighted mean of gap and settlement, whose error is of
+    second order in that of the pressure. For a periodic body the settlement has no mean, and
+    closure = top - mean height - mean gap.
+
+    The residual bounds the energy of the error of the pressure over that of the pressure (`_optimality`).
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3; Polonsky and Keer (1999), Wear 231:206;
+    Stanley and Kato (1997), J. Tribol. 119:481; Bugnicourt et al. (2018), Tribol. Int. 121:69; Yastrebov,
+    Anciaux and Molinari (2017), Tribol. Int. 114:161 (perimeter correction).
+    """
+    call = dict(locals())
+    with Problems(WHERE) as problems:
+        plan = make_plan(call, problems)
+    measures: list[dict[str, Any]] = []
+    maps: dict[str, list[Array]] = {name: [] for name in plan.keep}
+    for step in track(solve_path(plan.path), progress, "press"):
+        measures.append(_measures(step, plan.grid, plan.path.body.periodic))
+        for name in plan.keep:
+            maps[name].append(_state(step) if name == "state" else getattr(step, name))
+    result = _dataset(surface, plan, measures, maps)
+    _warn(result)
+    facts = {
+        "boundary": "periodic" if plan.path.body.periodic else "free",
+        "influence": plan.path.body.influence,
+        "achieved_residual": float(result["residual"].max()),
+        "run_time": float(result["run_time"].sum()),
+    }
+    return stamp(label(result), WHERE, call, title="Elastic contact of a rough surface", **facts)
+
+
+def _state(step: Step) -> Array:
+    """Flags open, contact, yielded."""
+    state = np.where(step.contact, np.int8(CONTACT), np.int8(OPEN))
+    state[step.contact & step.yielded] = YIELDED
+    return state
+
+
+def _measures(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
+    """Scalars of one step."""
+    contact = step.contact
+    cells = int(np.count_nonzero(contact))
+    edges = int(contact_edges(contact, (periodic, periodic)).sum())
+    return {
+        "closure": step.closure,
+        "normal_force": step.force,
+        "nominal_pressure": step.force / grid.nominal_area,
+        "contact_area": cells * grid.cell_area,
+        "contact_fraction": cells / contact.size,
+        "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
+        "mean_gap": serial_mean(step.gap),
+        "elastic_energy": step.elastic_energy,
+        "iterations": step.solution.iterations,
+        "transforms": step.solution.transforms,
+        "residual": step.solution.residual,
+        "converged": step.converged,
+        "stop_reason": step.solution.reason,
+        "run_time": step.run_time,
+    }
+
+
+def _dataset(
+    surface: xr.DataArray, plan: Plan, measures: list[dict[str, Any]], maps: dict[str, list[Array]]
+) -> xr.Dataset:
+    """Put steps side by side."""
+    import xarray as xr
+
+    columns = {name: ("step", np.array([one[name] for one in measures])) for name in measures[0]}
+    coords: dict[str, Any] = {name: columns.pop(name) for name in CONTROLS}
+    coords["step"] = np.arange(len(measures))
+    variables: dict[str, Any] = dict(columns)
+    variables["nominal_area"] = plan.grid.nominal_area
+    variables["contact_modulus"] = plan.path.units.modulus
+    if plan.path.body.influence == "disc":
+        variables["disc_radius"] = plan.path.body.radius * plan.path.units.length
+    if maps:
+        coords |= {dim: surface.coords[dim] for dim in ("y", "x")}
+        variables |= {name: (("step", "y", "x"), np.stack(planes)) for name, planes in maps.items()}
+    return xr.Dataset(variables, coords)
+
+
+def _warn(result: xr.Dataset) -> None:
+    """Say which steps did not converge."""
+    failed = np.flatnonzero(~result["converged"].values)
+    if failed.size:
+        reasons = ", ".join(
+            f"step {i}: residual {result['residual'].values[i]:.2g}, {result['stop_reason'].values[i]}"
+            for i in failed[:5]
+        )
+        more = f" and {failed.size - 5} more" if failed.size > 5 else ""
+        warnings.warn(f"{WHERE}: not converged: {reasons}{more}", ConvergenceWarning, stacklevel=3)
