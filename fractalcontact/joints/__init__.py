@@ -1,0 +1,26 @@
+"""A crack: two rough faces that are sheared, pressed together, and leak.
+
+A study starts with a `Crack`: the two faces, the block that slides, and the material. From it come
+
+delta_surface         what separates the faces after a shear
+closure               how they close under a normal force
+dilatancy             how far they open when they slide, rigid or under a normal force
+friction              the friction angle and the shear strength that follow from the dilatancy
+decorrelation_length  the shear at which the faces have forgotten each other
+transmissivity        how much fluid the open part of the joint lets through
+register              brings two measured faces into mated position first
+
+Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is +x and N is +y.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "crack": ["Crack"],
+        "sliding": ["delta_surface"],
+        "opening": ["dilatancy"],
+        "strength": ["friction"],
+    },
+)

@@ -1,0 +1,76 @@
+"""Checks and coordinates that several functions of this room share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.joints._directions import Direction
+from fractalcontact.joints._sliding import WHOLE, Block
+from fractalcontact.joints.crack import FILL, Crack
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fractalcontact.base.checks import Problems
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def check_crack(crack: Any, problems: Problems) -> None:
+    """Note it if `crack` is not a Crack."""
+    if not isinstance(crack, Crack):
+        problems.add("crack", "a fractalcontact.joints.Crack", type(crack).__name__)
+
+
+def check_shear(shear: Any, crack: Any, directions: Sequence[Direction], problems: Problems) -> Array:
+    """Return the shears (m) as an array; they must keep the block on its face."""
+    shears = problems.numbers("shear", shear, at_least=0)
+    if not isinstance(crack, Crack) or problems.found:
+        return shears
+    longest = float(shears.max())
+    for direction in directions:
+        travel = crack.layout.travel(direction.unit)
+        slack = WHOLE * min(crack.layout.spacing)
+        if longest > travel + slack:
+            expected = (
+                f"at most {travel:g} m towards {direction.name}, where the block meets the edge of the face"
+            )
+            if travel == 0:
+                expected += " (give the Crack a smaller `block`, or periodic faces)"
+            problems.add("shear", expected, longest)
+    return shears
+
+
+def missing(where: str, direction: Direction, shear: float, count: int) -> InvalidInput:
+    """Return the error for heights that are missing in the path of the block."""
+    return InvalidInput(
+        where,
+        [
+            f"crack.lower: expected finite heights under the block ({FILL}), got {count} missing "
+            f"at a shear of {shear:g} m towards {direction.name}"
+        ],
+    )
+
+
+def block_coords(crack: Crack, layout: Block) -> dict[str, xr.DataArray]:
+    """Return the block's own x and y; an axis along which the block is a whole period keeps it."""
+    import xarray as xr
+
+    coords = {}
+    for axis, dim in enumerate(("y", "x")):
+        values = np.asarray(crack.lower[dim].values, dtype=np.float64)[layout.slices[axis]]
+        attributes = {"period": float(layout.edges[axis])} if layout.periodic[axis] else {}
+        coords[dim] = xr.DataArray(values, dims=dim, attrs=attributes)
+    return coords
+
+
+def direction_coords(directions: Sequence[Direction]) -> dict[str, Any]:
+    """Return the coordinates `direction` and `azimuth` over the dim `direction`."""
+    return {
+        "direction": ("direction", np.array([direction.name for direction in directions])),
+        "azimuth": ("direction", np.array([direction.azimuth for direction in directions])),
+    }

@@ -1,0 +1,140 @@
+"""Dilatancy: how far the faces part when they slide, rigid or under a normal force."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.schema import label
+from fractalcontact.joints._checks import check_crack, check_shear, direction_coords, missing
+from fractalcontact.joints._directions import Direction, several_directions
+from fractalcontact.joints._rigid import mean_slopes, separations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fractalcontact.joints.crack import Crack
+
+WHERE = "fractalcontact.joints.dilatancy"
+COMPASS = ("E", "N", "W", "S")
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def dilatancy(
+    crack: Crack,
+    *,
+    shear: float | Sequence[float] | Array,
+    direction: str | float | Sequence[str | float] = COMPASS,
+    normal_force: float | Sequence[float] | None = None,
+    bulk: str = "flat_block",
+    tolerance: float = 1e-8,
+    keep: Sequence[str] = (),
+    progress: bool = False,
+) -> xr.Dataset:
+    """Return the dilatancy of a crack that slides.
+
+    A rigid block is lifted to delta_r(v) = max over the block of (lower(x + v) - upper(x)). Under a normal
+    force F the faces close again by w_int, and delta(F, v) = delta_r(v) - w_int(F, v), w_int = w - w_b.
+    Without a force no contact is solved.
+
+    Parameters
+    ----------
+    crack : Crack
+    shear : float or sequence of float
+        Shear displacements v >= 0, m.
+    direction : str, float, or a sequence of them
+        Directions in which the block slides: compass words, or azimuths in degrees (E = 0, anticlockwise).
+    normal_force : float or sequence of float, optional
+        Normal forces on the block, N; a sequence is a path of load, run anew for every shear.
+    bulk : {"flat_block", "uniform_pressure"}
+        What w_b is: the closure of the flat block under the same influence coefficients, or the mean
+        settlement under uniform pressure.
+    tolerance : float
+        Of the contact solver, see `fractalcontact.contact.press`.
+    keep : sequence of str
+        Maps over (direction, shear, step, y, x) to keep: "state", "pressure", "gap".
+    progress : bool
+        Show a bar over the shears.
+
+    Returns
+    -------
+    Dataset
+        rigid_dilatancy (direction, shear), m, relative to its value at v = 0, which is kept as
+        initial_offset; mean_slope (direction) of the lower face, and plateau_dilatancy (direction, shear),
+        which is rigid_dilatancy less mean_slope times v: what is left when the oblique asymptote is taken
+        away; basic_friction_angle (degree) and nominal_area (m2). With forces also, over (direction, shear,
+        step): dilatancy, interface_closure, closure (m), contact_fraction, corrected_contact_fraction,
+        iterations, residual, converged; and over step: normal_force, nominal_pressure, bulk_closure.
+
+    Raises
+    ------
+    InvalidInput
+        The block would leave its face, heights are missing in its path, or an argument is wrong.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, eq. 2 and figure 5.
+    """
+    with Problems(WHERE) as problems:
+        check_crack(crack, problems)
+        towards = several_directions(direction, problems)
+        shears = check_shear(shear, crack, towards, problems)
+        path = None
+        if normal_force is not None:
+            from fractalcontact.joints._elastic import check_plan
+
+            path = check_plan(problems, {"normal_force": normal_force}, bulk, keep, tolerance)
+        elif len(keep):
+            problems.add("keep", "maps only together with normal_force", keep)
+    start = time.perf_counter()
+    result = _rigid(crack, shears, towards)
+    facts: dict[str, Any] = {}
+    if path is not None:
+        from fractalcontact.joints._elastic import add_elastic
+
+        facts = add_elastic(result, crack, shears, towards, path, progress=progress)
+    result["run_time"] = time.perf_counter() - start
+    parameters = {"crack": crack.summary(), "shear": shears, "direction": [d.name for d in towards]}
+    parameters |= {} if path is None else {"normal_force": path.values, "bulk": bulk, "tolerance": tolerance}
+    return stamp(label(result), WHERE, parameters, title="dilatancy of a crack", **facts)
+
+
+def _rigid(crack: Crack, shears: Array, towards: Sequence[Direction]) -> xr.Dataset:
+    import xarray as xr
+
+    layout = crack.layout
+    lower, upper = crack.faces()
+    initial = separations(lower, upper, layout, np.zeros(1), (0.0, 1.0))[0]
+    lifted = (
+        np.stack([_lifted(lower, upper, layout, shears, towards_one) for towards_one in towards]) - initial
+    )
+    slope_y, slope_x = mean_slopes(lower, layout)
+    slopes = np.array([slope_y * d.unit[0] + slope_x * d.unit[1] for d in towards])
+    plane = ("direction", "shear")
+    return xr.Dataset(
+        {
+            "rigid_dilatancy": (plane, lifted),
+            "plateau_dilatancy": (plane, lifted - slopes[:, None] * shears),
+            "mean_slope": ("direction", slopes),
+            "initial_offset": initial,
+            "basic_friction_angle": crack.basic_friction_angle,
+            "nominal_area": crack.nominal_area,
+        },
+        coords={"shear": ("shear", shears), **direction_coords(towards)},
+    )
+
+
+def _lifted(lower: Array, upper: Array, layout: Any, shears: Array, towards: Direction) -> Array:
+    highest = separations(lower, upper, layout, shears, towards.unit)
+    if not np.isfinite(highest).all():
+        from fractalcontact.joints._sliding import heights_under
+
+        shear = float(shears[~np.isfinite(highest)][0])
+        under = heights_under(lower, layout, layout.shift(shear, towards.unit))
+        raise missing(WHERE, towards, shear, int(np.count_nonzero(~np.isfinite(under))))
+    return highest

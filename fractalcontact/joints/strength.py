@@ -1,0 +1,140 @@
+"""Friction of a joint: the basic angle plus the angle at which the block climbs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.schema import label
+from fractalcontact.joints._slopes import fitted_slopes, neighbour_slopes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WHERE = "fractalcontact.joints.friction"
+REFERENCES = (
+    "Patton, F. D., Multiple modes of shear failure in rock, 1st ISRM Congress, Lisbon (1966); "
+    "Goodman, R. E., Introduction to Rock Mechanics, 2nd ed. (1989)"
+)
+LOCKED = (
+    "NaN where the friction angle reaches 90 degrees: the faces are locked and cannot slide without damage"
+)
+
+
+def friction(
+    dilatancy: xr.Dataset, *, basic_friction_angle: float | None = None, smoothing: float | None = None
+) -> xr.Dataset:
+    """Return friction angle and shear strength from the dilatancy.
+
+    The dilatancy angle is i = atan(d delta/dv), the friction angle phi = phi_basic + i, and the shear
+    strength under the nominal pressure sigma is sigma tan(phi).
+
+    Parameters
+    ----------
+    dilatancy : Dataset
+        As `fractalcontact.joints.dilatancy` gives it, with at least two shears, ascending. The dilatancy
+        under force is used where it is there, else the rigid one.
+    basic_friction_angle : float, optional
+        Degree, 0 to 90; None: the one that `dilatancy` carries.
+    smoothing : float, optional
+        Length of shear (m) over which a straight line is fitted to the dilatancy around each shear; near the
+        ends of the path the window is cut. None: the slope through the two neighbours of each shear. The
+        angle depends on this length, as the slope of any fractal curve does, so the length in use is kept
+        in the result over `shear`: compare only angles of equal `smoothing`.
+
+    Returns
+    -------
+    Dataset
+        dilatancy_angle, friction_angle (degree) over (direction, shear), and over step where forces were
+        given; then also shear_strength (Pa), NaN where the friction angle reaches 90 degrees and the faces
+        lock. It is negative where the block would slide down by itself. Over (direction[, step]):
+        peak_friction_angle, peak_shear (where it is met), peak_shear_strength. Also basic_friction_angle and,
+        over shear, smoothing.
+
+    Raises
+    ------
+    InvalidInput
+        The Dataset is of another kind, has fewer than two shears, or an argument is wrong.
+
+    References
+    ----------
+    Patton (1966), 1st ISRM Congress; Goodman (1989), Introduction to Rock Mechanics; Borri-Brunetto,
+    Carpinteri and Chiaia (1998), FRAMCOS-3, section 4.
+    """
+    import xarray as xr
+
+    with Problems(WHERE) as problems:
+        name, shears = _check_dilatancy(dilatancy, problems)
+        carried = None if problems.found else dilatancy.get("basic_friction_angle")
+        given = carried if basic_friction_angle is None else basic_friction_angle
+        basic = (
+            0.0
+            if problems.found
+            else problems.number("basic_friction_angle", _plain(given), at_least=0, below=90)
+        )
+        if smoothing is not None:
+            problems.number("smoothing", smoothing, above=0)
+    heights = dilatancy[name].transpose("shear", ...)
+    curves = heights.values.reshape(shears.size, -1)
+    slopes, lengths = (
+        neighbour_slopes(shears, curves)
+        if smoothing is None
+        else fitted_slopes(shears, curves, float(smoothing))
+    )
+    angle = heights.copy(data=np.degrees(np.arctan(slopes)).reshape(heights.shape))
+    angle = angle.transpose(*dilatancy[name].dims)
+    total = angle + basic
+    result = xr.Dataset({"dilatancy_angle": angle, "friction_angle": total})
+    _add_peaks(result, dilatancy if name == "dilatancy" else None)
+    result["basic_friction_angle"], result["smoothing"] = basic, ("shear", lengths)
+    parameters = {
+        "dilatancy": dilatancy,
+        "basic_friction_angle": basic_friction_angle,
+        "smoothing": smoothing,
+    }
+    result = stamp(
+        label(result), WHERE, parameters, title="friction of a joint", references=REFERENCES, slope_of=name
+    )
+    if "shear_strength" in result:
+        result["shear_strength"].attrs["comment"] = LOCKED
+    return result
+
+
+def _add_peaks(result: xr.Dataset, forced: xr.Dataset | None) -> None:
+    """Add the greatest angle along the shear, where it is met, and with forces the strengths."""
+    total = result["friction_angle"]
+    place = total.fillna(-np.inf).argmax("shear")
+    result["peak_friction_angle"] = total.isel(shear=place).drop_vars("shear")
+    result["peak_shear"] = result["shear"].isel(shear=place).drop_vars("shear")
+    if forced is None:
+        return
+    tangent = total.copy(data=np.tan(np.radians(total.where(total < 90.0).values)))
+    result["shear_strength"] = (tangent * forced["nominal_pressure"]).transpose(*total.dims)
+    result["peak_shear_strength"] = result["shear_strength"].isel(shear=place).drop_vars("shear")
+
+
+def _check_dilatancy(dilatancy: Any, problems: Problems) -> tuple[str, np.ndarray]:
+    import xarray as xr
+
+    expected = "the Dataset of fractalcontact.joints.dilatancy"
+    if not isinstance(dilatancy, xr.Dataset):
+        problems.add("dilatancy", expected, type(dilatancy).__name__)
+        return "", np.arange(2.0)
+    name = "dilatancy" if "dilatancy" in dilatancy else "rigid_dilatancy"
+    needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
+    absent = [word for word in needed if word not in dilatancy.variables]
+    if absent or "shear" not in dilatancy[name].dims:
+        problems.add("dilatancy", expected, f"no {', '.join(absent) or 'dim shear'}")
+        return "", np.arange(2.0)
+    shears = np.asarray(dilatancy["shear"].values, dtype=np.float64)
+    if shears.size < 2 or not (np.diff(shears) > 0).all():
+        problems.add("dilatancy.shear", "at least two shears, ascending", shears)
+    return name, shears
+
+
+def _plain(value: Any) -> Any:
+    """Return the number inside a scalar DataArray."""
+    return value.item() if hasattr(value, "item") and getattr(value, "size", 0) == 1 else value

@@ -1,0 +1,286 @@
+"""The crack and its delta-surface: layout of the block, exact shifts, missing heights, messages."""
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+MATERIAL = {"young": 30e9, "poisson": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("n", "edge", "cells", "start"), [(512, 0.02, 250, 131), (512, 0.02001, 250, 131), (9, 4e-4, 5, 2)]
+)
+def test_block_is_whole_cells_in_the_middle(make_face, n, edge, cells, start):
+    crack = fc.joints.Crack(make_face(np.zeros((n, n)), 8e-5), block=edge, **MATERIAL)
+    assert crack.layout.cells == (cells, cells)
+    assert crack.layout.start == (start, start)
+    assert crack.block == pytest.approx((cells * 8e-5,) * 2, rel=1e-12)
+    assert crack.nominal_area == pytest.approx((cells * 8e-5) ** 2, rel=1e-12)
+
+
+def test_block_pair_is_y_then_x_and_whole_face_is_the_default(make_face):
+    face = make_face(np.zeros((20, 30)), (2.0, 1.0))
+    assert fc.joints.Crack(face, block=(10.0, 20.0), **MATERIAL).layout.cells == (5, 20)
+    assert fc.joints.Crack(face, **MATERIAL).layout.cells == (20, 30)
+
+
+def test_travel_of_the_paper_is_131_cells(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((512, 512)), 8e-5), block=0.02, **MATERIAL)
+    for direction in "ENWS":
+        assert crack.travel(direction) == pytest.approx(131 * 8e-5, rel=1e-12)
+    assert crack.travel("NE") == pytest.approx(131 * 8e-5 * np.sqrt(2), rel=1e-12)
+    assert crack.travel(45) == crack.travel("NE") == crack.travel(405)
+
+
+def test_odd_room_gives_unequal_travel(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((10, 10))), block=5, **MATERIAL)
+    assert (crack.travel("E"), crack.travel("W")) == (3.0, 2.0)
+
+
+def test_modulus_is_that_of_two_equal_bodies(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((4, 4))), young=30e9, poisson=0.2)
+    assert crack.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
+
+
+def test_all_problems_come_at_once(make_face):
+    face = make_face(np.zeros((8, 8)))
+    with pytest.raises(fc.base.errors.InvalidInput) as caught:
+        fc.joints.Crack(
+            face, make_face(np.zeros((7, 8))), young=-1, poisson=0.5, block=20.0, basic_friction_angle=95
+        )
+    text = str(caught.value)
+    for word in ("young", "poisson", "block", "basic_friction_angle", "upper"):
+        assert word in text
+
+
+def test_missing_heights_inside_the_block_are_refused_and_outside_allowed(make_face):
+    heights = np.zeros((20, 20))
+    heights[0, 0] = np.nan
+    fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    heights[9, 9] = np.nan
+    with pytest.raises(ValueError, match="lower inside the block.*fill"):
+        fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    with pytest.raises(ValueError, match="upper inside the block.*fill"):
+        fc.joints.Crack(make_face(np.zeros((20, 20))), make_face(heights), block=10, **MATERIAL)
+
+
+def test_infinite_heights_are_refused_everywhere(make_face):
+    heights = np.zeros((20, 20))
+    heights[0, 0] = -np.inf
+    with pytest.raises(ValueError, match="infinite"):
+        fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+
+
+def test_upper_must_lie_on_the_same_grid(make_face):
+    face = make_face(np.zeros((9, 9)))
+    with pytest.raises(ValueError, match="upper.x"):
+        fc.joints.Crack(face, make_face(np.zeros((9, 9)), origin=(0.0, 0.4)), **MATERIAL)
+
+
+def test_crack_cannot_change_and_survives_a_pickle(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((16, 16), 0)), block=8, **MATERIAL)
+    with pytest.raises(AttributeError):
+        crack.young = 1.0
+    twin = pickle.loads(pickle.dumps(crack))
+    assert twin.layout == crack.layout
+    assert twin.block == crack.block
+    assert "block of 8 x 8" in repr(crack)
+
+
+def slow_delta(lower, upper, crack, shift):
+    (ay, ax), (by, bx), (ny, nx) = crack.layout.start, crack.layout.cells, lower.shape
+    out = np.empty((by, bx))
+    for i in range(by):
+        for j in range(bx):
+            out[i, j] = lower[(ay + i + shift[0]) % ny, (ax + j + shift[1]) % nx] - upper[ay + i, ax + j]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("direction", "shift"), [("E", (0, 3)), ("N", (3, 0)), ("W", (0, -3)), ("S", (-3, 0))]
+)
+@pytest.mark.parametrize("mated", [True, False])
+def test_whole_shift_is_exact(make_face, rough, direction, shift, mated):
+    lower, upper = rough((21, 24), 1), rough((21, 24), 2)
+    upper = lower if mated else upper
+    crack = fc.joints.Crack(
+        make_face(lower, 8e-5), None if mated else make_face(upper, 8e-5), block=(8e-4, 9.6e-4), **MATERIAL
+    )
+    delta = fc.joints.delta_surface(crack, 3 * 8e-5, direction)
+    np.testing.assert_array_equal(delta.values, slow_delta(lower, upper, crack, shift))
+    np.testing.assert_array_equal(delta.x, crack.lower.x[crack.layout.slices[1]])
+    assert delta.dims == ("y", "x")
+    assert delta.name == "height"
+    assert delta.attrs["units"] == "m"
+    assert "period" not in delta.x.attrs
+    assert delta.direction == direction
+
+
+def test_almost_whole_is_whole(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((24, 24), 1), 8e-5), block=8e-4, **MATERIAL)
+    exact = fc.joints.delta_surface(crack, 3 * 8e-5)
+    near = fc.joints.delta_surface(crack, 3 * 8e-5 * (1 + 3e-7))
+    np.testing.assert_array_equal(exact, near)
+    off = fc.joints.delta_surface(crack, 3 * 8e-5 * (1 + 3e-6))
+    assert np.abs(exact - off).max() > 0
+
+
+def test_periodic_face_wraps_and_stays_periodic(make_face, rough):
+    lower = rough((12, 16), 3)
+    crack = fc.joints.Crack(make_face(lower, periodic=True), **MATERIAL)
+    assert crack.travel("N") == np.inf
+    delta = fc.joints.delta_surface(crack, 37.0, "W")
+    np.testing.assert_array_equal(delta.values, np.roll(lower, 37, axis=1) - lower)
+    assert delta.x.attrs["period"] == 16.0
+    assert delta.y.attrs["period"] == 12.0
+
+
+def test_block_on_a_periodic_face_wraps_and_is_free(make_face, rough):
+    lower = rough((12, 16), 3)
+    crack = fc.joints.Crack(make_face(lower, periodic=True), block=6, **MATERIAL)
+    delta = fc.joints.delta_surface(crack, 9.0, "E")
+    np.testing.assert_array_equal(delta.values, slow_delta(lower, lower, crack, (0, 9)))
+    assert "period" not in delta.x.attrs
+
+
+@pytest.mark.parametrize("direction", ["E", "NE", "S", 200.0])
+@pytest.mark.parametrize("shear", [1.0, 2.0, 0.37, 5.5])
+def test_spectrum_identity_on_a_wrapped_face(make_face, rough, direction, shear):
+    # odd sizes: no wave sits at the ambiguous Nyquist wavenumber
+    lower = rough((45, 63), 4, hurst=0.5)
+    crack = fc.joints.Crack(make_face(lower, periodic=True), **MATERIAL)
+    delta = fc.joints.delta_surface(crack, shear, direction)
+    angle = np.radians(float(delta.azimuth))
+    qy, qx = 2 * np.pi * np.fft.fftfreq(45)[:, None], 2 * np.pi * np.fft.fftfreq(63)[None, :]
+    expected = 4 * np.sin((qy * np.sin(angle) + qx * np.cos(angle)) * shear / 2) ** 2
+    expected = expected * np.abs(np.fft.fft2(lower)) ** 2
+    got = np.abs(np.fft.fft2(delta.values)) ** 2
+    assert np.abs(got - expected).max() <= 1e-12 * expected.max()
+
+
+def test_fractional_shift_of_the_nyquist_wave_keeps_its_real_part(make_face):
+    wave = np.broadcast_to(np.cos(np.pi * np.arange(8)), (6, 8))
+    crack = fc.joints.Crack(make_face(wave, periodic=True), **MATERIAL)
+    delta = fc.joints.delta_surface(crack, 0.25, "E")
+    np.testing.assert_allclose(delta, (np.cos(np.pi / 4) - 1) * wave, atol=1e-15)
+
+
+@pytest.mark.parametrize(("direction", "shear"), [("E", 7.3), (30.0, 5.5), ("S", 0.01), (211.0, 8.2)])
+def test_spline_shift_of_a_smooth_free_face(make_face, direction, shear):
+    def surface(y, x):
+        return np.sin(0.3 * x + 0.2 * y) + 0.01 * x - 0.02 * y
+
+    y, x = np.mgrid[:64, :48].astype(float)
+    crack = fc.joints.Crack(make_face(surface(y, x)), block=30, **MATERIAL)
+    delta = fc.joints.delta_surface(crack, shear, direction)
+    angle = np.radians(float(delta.azimuth))
+    y, x = y[crack.layout.slices], x[crack.layout.slices]
+    exact = surface(y + shear * np.sin(angle), x + shear * np.cos(angle)) - surface(y, x)
+    np.testing.assert_allclose(delta, exact, atol=3e-6)
+    assert '"interpolation_error"' in delta.attrs["provenance"]
+
+
+def test_spline_error_falls_with_the_sixth_power(make_face):
+    errors = []
+    for waves in (8, 4):
+        x = np.arange(400.0)
+        crack = fc.joints.Crack(
+            make_face(np.broadcast_to(np.cos(2 * np.pi * waves * x / 128), (5, 400))),
+            block=(5, 128),
+            **MATERIAL,
+        )
+        start = crack.layout.start[1]
+        delta = fc.joints.delta_surface(crack, 0.5)
+        x = x[start : start + 128]
+        exact = np.cos(2 * np.pi * waves * (x + 0.5) / 128) - np.cos(2 * np.pi * waves * x / 128)
+        errors.append(np.abs(delta.values - exact).max())
+    assert 40 < errors[0] / errors[1] < 100
+
+
+def test_quintic_is_exact_up_to_the_edge_of_a_free_face(make_face):
+    x = np.arange(30.0) / 30
+    heights = np.broadcast_to(x**5 - 2 * x**4 + x, (5, 30))
+    crack = fc.joints.Crack(make_face(heights), block=(5, 10), **MATERIAL)
+    shear = crack.travel("E") - 0.4
+    moved = x[crack.layout.slices[1]] + shear / 30
+    delta = fc.joints.delta_surface(crack, shear)
+    exact = moved**5 - 2 * moved**4 + moved - heights[0, crack.layout.slices[1]]
+    np.testing.assert_allclose(delta.values, np.broadcast_to(exact, (5, 10)), atol=1e-13)
+
+
+def test_missing_heights_matter_only_in_the_path(make_face, rough):
+    heights = rough((30, 30), 5)
+    whole = fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    holed = heights.copy()
+    holed[15, 24] = np.nan
+    crack = fc.joints.Crack(make_face(holed), block=10, **MATERIAL)
+    np.testing.assert_array_equal(fc.joints.delta_surface(crack, 3.0), fc.joints.delta_surface(whole, 3.0))
+    between, expected = fc.joints.delta_surface(crack, 3.5), fc.joints.delta_surface(whole, 3.5)
+    assert np.isfinite(between).all()
+    # a spline forgets a node by a factor of 0.43 with every cell
+    np.testing.assert_allclose(between[:, 0], expected[:, 0], atol=3 * 0.43**10)
+    with pytest.raises(ValueError, match=r"lower.*fill.*1 missing.*5 m towards E"):
+        fc.joints.delta_surface(crack, 5.0, "E")
+    with pytest.raises(ValueError, match="missing"):
+        fc.joints.delta_surface(crack, 4.5, "E")
+
+
+def test_shear_beyond_the_face_names_the_travel(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((20, 20))), block=10, **MATERIAL)
+    with pytest.raises(ValueError, match=r"at most 5 m towards E"):
+        fc.joints.delta_surface(crack, 5.1)
+    with pytest.raises(ValueError, match=r"smaller `block`"):
+        fc.joints.delta_surface(fc.joints.Crack(make_face(np.zeros((20, 20))), **MATERIAL), 1.0)
+    with pytest.raises(ValueError, match=r"direction.*'Q'"):
+        fc.joints.delta_surface(crack, 1.0, "Q")
+    with pytest.raises(ValueError, match=r"shear.*>= 0"):
+        fc.joints.delta_surface(crack, -1.0)
+
+
+def test_sequence_of_shears_is_a_dim(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((20, 20), 6)), block=10, **MATERIAL)
+    stack = fc.joints.delta_surface(crack, [0.0, 2.0, 2.5], "N")
+    assert stack.dims == ("shear", "y", "x")
+    assert not stack.sel(shear=0.0).any()
+    np.testing.assert_array_equal(stack.sel(shear=2.5), fc.joints.delta_surface(crack, 2.5, "N"))
+
+
+@pytest.mark.parametrize("shear", [2.0, 2.5])
+@pytest.mark.parametrize("periodic", [True, False])
+def test_power_of_two_units_change_only_exponents(make_face, rough, shear, periodic):
+    heights = rough((20, 22), 7)
+    one = fc.joints.Crack(make_face(heights, 1.0, periodic=periodic), block=10.0, **MATERIAL)
+    two = fc.joints.Crack(
+        make_face(heights * 2.0**-30, 2.0**-20, periodic=periodic), block=10 * 2.0**-20, **MATERIAL
+    )
+    a = fc.joints.delta_surface(one, shear, "N").values
+    b = fc.joints.delta_surface(two, shear * 2.0**-20, "N").values
+    np.testing.assert_array_equal(a * 2.0**-30, b)
+
+
+def test_rigid_study_loads_no_solver():
+    code = (
+        "import sys, numpy as np, xarray as xr, fractalcontact as fc\n"
+        "x = xr.DataArray(np.arange(20.0), dims='x'); y = xr.DataArray(np.arange(20.0), dims='y')\n"
+        "z = np.random.default_rng(0).random((20, 20))\n"
+        "z = xr.DataArray(z, dims=('y', 'x'), coords={'x': x, 'y': y})\n"
+        "crack = fc.joints.Crack(z, young=1.0, poisson=0.2, block=10)\n"
+        "fc.joints.friction(fc.joints.dilatancy(crack, shear=[0, 1, 2, 2.5]))\n"
+        "heavy = ('numba', 'fractalcontact.contact', 'skimage', 'matplotlib', 'pyamg')\n"
+        "assert not [name for name in heavy if name in sys.modules]\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_importing_the_room_loads_nothing_heavy():
+    code = (
+        "import sys, fractalcontact.joints\n"
+        "heavy = ('numba', 'xarray', 'skimage', 'matplotlib', 'netCDF4', 'dask', 'pyamg')\n"
+        "assert not [name for name in heavy if name in sys.modules]\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
