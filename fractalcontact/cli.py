@@ -53,6 +53,15 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
     run.set_defaults(action=_run)
 
+    accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
+    accuracy.add_argument(
+        "parts", nargs="*", help="surfaces, dimensions, contact, domains, joints; all if none is named"
+    )
+    accuracy.add_argument("-o", "--out", help="folder for accuracy.nc and its figures")
+    accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
+    accuracy.add_argument("--extreme", action="store_true", help="run the catalogue of extreme cases instead")
+    accuracy.set_defaults(action=_accuracy)
+
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
     methods.set_defaults(action=_methods)
 
@@ -95,6 +104,23 @@ def _checked_scene(path: str) -> Any:
             problems += [line for line in error.problems if line not in problems]
         raise InvalidInput(f"scene {scene.name}", problems)
     return scene
+
+
+def _accuracy(options: argparse.Namespace) -> int:
+    from fractalcontact import accuracy
+    from fractalcontact.accuracy.reporting import cases_table, curves_table
+
+    if options.extreme:
+        findings = {name: accuracy.examine(case) for name, case in accuracy.cases.items()}
+        print(cases_table(findings))
+        return 0 if all(one.ok for found in findings.values() for one in found) else 1
+    result = accuracy.measure(options.parts or None, budget=options.budget)
+    print(curves_table(result))
+    if options.out is not None:
+        from fractalcontact.base.netcdf import save
+
+        print(f"written to {options.out}: {save(result, Path(options.out) / 'accuracy.nc').name}")
+    return 0
 
 
 def _methods(options: argparse.Namespace) -> int:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from fractalcontact.base.text import table
+
 if TYPE_CHECKING:
     from fractalcontact.scenes.reading import Scene
 
@@ -52,10 +54,9 @@ class Plan:
 
     def __str__(self) -> str:
         """Return a table: stage, what it needs, why it is there."""
-        rows = [("stage", "needs", "because")]
+        rows: list[tuple[str, ...]] = [("stage", "needs", "because")]
         rows += [(s.name + ("" if s.stored else " (not stored)"), ", ".join(s.needs), s.reason) for s in self]
-        widths = [max(len(row[i]) for row in rows) for i in range(2)]
-        return "\n".join(f"{a:<{widths[0]}}  {b:<{widths[1]}}  {c}".rstrip() for a, b, c in rows)
+        return table(rows)
 
 
 def plan(scene: Scene) -> Plan:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.text import table
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     import xarray as xr
 
@@ -55,7 +57,7 @@ def stage_table(result: Any) -> str:
         note = "" if facts.get("origin") == "computed" else f" ({facts.get('origin')})"
         rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_told(told)) + note))
     rows.append(("total", f"{sum(facts['run_time'] for facts in stages.values()):.2f}", ""))
-    return _table(rows)
+    return table(rows)
 
 
 def _single_entry(entry: dict[str, Any]) -> str:
@@ -109,7 +111,7 @@ def _dimensions(tree: xr.DataTree) -> str:
         )
         scales = f"{float(one['scale_min']):.2g} ... {float(one['scale_max']):.2g} m"
         rows.append((str(method), f"{dimension:.3f}", interval, scales))
-    return _table(rows)
+    return table(rows)
 
 
 def _closure(tree: xr.DataTree) -> str:
@@ -130,7 +132,7 @@ def _closure(tree: xr.DataTree) -> str:
                 f"{float(one['corrected_contact_fraction']) * 100:.3g} %",
             )
         )
-    return _table(rows)
+    return table(rows)
 
 
 def _dilatancy(tree: xr.DataTree) -> str:
@@ -149,7 +151,7 @@ def _dilatancy(tree: xr.DataTree) -> str:
                 f"{float(one['mean_slope']):+.4f}" if "mean_slope" in one else "",
             )
         )
-    return _table(rows)
+    return table(rows)
 
 
 def _friction(tree: xr.DataTree) -> str:
@@ -168,7 +170,7 @@ def _friction(tree: xr.DataTree) -> str:
                 else np.nan
             )
             rows.append((str(direction), f"{force / 1e6:.3g} MPa", f"{float(at) / 1e6:.4g} MPa"))
-    return _table(rows)
+    return table(rows)
 
 
 def _domains(tree: xr.DataTree) -> str:
@@ -181,13 +183,4 @@ def _domains(tree: xr.DataTree) -> str:
         one = last.sel(shear=shear) if shear is not None and "shear" in last.dims else last
         place = "last step" if shear is None else f"last step, {float(shear) * 1e3:.3g} mm"
         rows.append((place, f"{float(one['box_dimension']):.3f}", f"{float(one['dust_dimension']):.3f}"))
-    return _table(rows)
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> str:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = [
-        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-    return "\n".join([lines[0], "-" * min(110, sum(widths) + 2 * len(widths) - 2), *lines[1:]])
+    return table(rows)

@@ -101,11 +101,22 @@ def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Pro
     crack = None
     with _gather(problems, "joint"):
         crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
+    if crack is None:
+        return
     for stage in plan(scene):
         given = scene.options("joint", stage.name.removeprefix("joints/"), ("shear", "direction"))
-        if crack is not None and stage.name.startswith("joints/") and "shear" in given:
-            with _gather(problems, stage.name):
-                crack.check_shear(given["shear"], given.get("direction", ("E", "N", "W", "S")))
+        if stage.name.startswith("joints/") and "shear" in given:
+            _check_travel(crack, given, stage.name, problems)
+
+
+def _check_travel(crack: Crack, given: dict[str, Any], place: str, problems: Problems) -> None:
+    """Note the shears that would push the block off its face."""
+    directions = given.get("direction", ("E", "N", "W", "S"))
+    longest = max(given["shear"]) if isinstance(given["shear"], list) else given["shear"]
+    for word in [directions] if isinstance(directions, str) else directions:
+        travel = crack.travel(word)
+        if longest > travel * (1.0 + 1e-6):
+            problems.add(f"{place}: shear", f"at most {travel:g} m towards {word}", longest)
 
 
 class _gather:

@@ -1,0 +1,17 @@
+"""How right, how fast, and what happens at the edges.
+
+cases      the catalogue of extreme surfaces and masks, with what is expected of each
+examine    every room's functions run on one case, held against what is expected
+measure    true error against run time of the methods, over their own knobs
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "catalogue": ["Case", "cases"],
+        "examination": ["examine"],
+        "measuring": ["measure"],
+    },
+)
