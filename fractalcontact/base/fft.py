@@ -59,6 +59,49 @@ def fft2(plane: Array) -> Array:
     return scipy.fft.fft2(plane, workers=thread_count())  # type: ignore[no-any-return]
 
 
+def ifft(modes: Array) -> Array:
+    """Undo the complex transform of the last axis."""
+    if library() == "ducc0":
+        return _ducc0().c2c(  # type: ignore[no-any-return]
+            modes, axes=_axes(modes, (-1,)), forward=False, inorm=2, nthreads=_ducc_threads()
+        )
+    return scipy.fft.ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
+
+
+def cosine(corner: Array, axes: tuple[int, ...]) -> Array:
+    """Transform an array that is even about the first and the last point of each of `axes`.
+
+    Given the n//2 + 1 points of a corner, the result is the real transform of all n (cosine transform of
+    type 1). Each axis has at least 2 points.
+    """
+    if library() == "ducc0":
+        return _ducc0().dct(  # type: ignore[no-any-return]
+            corner, axes=_axes(corner, axes), type=1, inorm=0, nthreads=_ducc_threads()
+        )
+    return scipy.fft.dctn(corner, type=1, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+
+
+def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
+    """Cosine transform of kind 1, 2 or 3 along `axes`, without any normalisation.
+
+    Kind 2 sums 2 a_j cos(pi k (j + 1/2) / n); kind 1, with n + 1 values, a_0 + (-1)^k a_n plus the sum of
+    2 a_j cos(pi k j / n); kind 3 is the transpose of kind 2 up to the factor of its first value.
+    """
+    if library() == "ducc0":
+        return _ducc0().dct(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
+    return scipy.fft.dctn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+
+
+def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
+    """Sine transform along `axes`, without any normalisation.
+
+    Kind 1, with n - 1 values a_1 to a_{n-1}, sums 2 a_j sin(pi k j / n) for k = 1 to n - 1.
+    """
+    if library() == "ducc0":
+        return _ducc0().dst(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
+    return scipy.fft.dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+
+
 def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
     """Return the wavenumbers 2 pi k / (n spacing) of a transform, in rad m-1.
 

@@ -1,0 +1,288 @@
+"""Power spectra of surfaces: the conventions, written once.
+
+Wavenumbers q are in rad m-1. The two-dimensional power spectral density C (m4) of heights z on ny x nx
+cells of dy x dx is C(q) = dx dy |Z(q)|^2 / (nx ny), Z being the plain sum of z exp(-i q r). The mean square
+of the heights is then the sum of C over all modes, divided by the extent A: the discrete form of the
+integral of C dqx dqy / (2 pi)^2. For a profile, C (m3) = dx |Z|^2 / nx and A is its length.
+
+Only the half-plane of a real transform is kept; `weights` counts each of its columns once (q_x = 0, and the
+Nyquist column of an even grid) or twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base import fft
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def half_weights(nx: int) -> Array:
+    """Return how often each column of the half-plane counts in a sum over all modes, shape (nx//2 + 1,)."""
+    weights = np.full(nx // 2 + 1, 2.0)
+    weights[0] = 1.0
+    if nx % 2 == 0:
+        weights[-1] = 1.0
+    return weights
+
+
+def half_wavenumbers(shape: Sequence[int], spacing: Sequence[float]) -> tuple[Array, ...]:
+    """Return the wavenumbers of each axis of the half-plane, y first: shapes (ny,) and (nx//2 + 1,)."""
+    last = len(shape) - 1
+    pairs = zip(shape, spacing, strict=True)
+    return tuple(fft.wavenumbers(n, step, real=axis == last) for axis, (n, step) in enumerate(pairs))
+
+
+def radial_wavenumber(shape: Sequence[int], spacing: Sequence[float]) -> Array:
+    """Return |q| on the half-plane, shape (ny, nx//2 + 1), or (nx//2 + 1,) of a profile."""
+    return np.asarray(np.sqrt(_square(half_wavenumbers(shape, spacing))))
+
+
+def window_weights(n: int, name: str | None) -> Array:
+    """Return a taper of n points with mean square 1: None (all ones) or "hann"."""
+    if name is None:
+        return np.ones(n)
+    if name != "hann":
+        raise ValueError(f"window: expected None or 'hann', got {name!r}")
+    taper = np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2
+    return np.asarray(taper / np.sqrt(np.mean(taper**2)))
+
+
+def periodogram(
+    heights: Array, spacing: Sequence[float], window: str | Sequence[str | None] | None = None
+) -> tuple[Array, Array]:
+    """Return the power spectral density on the half-plane, and the weights of its columns.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (..., ny, nx), or (..., nx) with one spacing
+        Finite. No mean and no plane is removed: do that first where it matters.
+    spacing : sequence of float
+        (dy, dx) in metres; its length tells a plane from a profile.
+    window : None, "hann", or one of them for each axis
+        Taper of the free axes; its loss of mean square is made good.
+
+    Returns
+    -------
+    psd : ndarray, shape (..., ny, nx//2 + 1) or (..., nx//2 + 1)
+        In m4 (plane) or m3 (profile). sum(psd * weights) / extent is the mean square of the heights.
+    weights : ndarray, shape (nx//2 + 1,)
+    """
+    axes = len(spacing)
+    shape = heights.shape[-axes:]
+    names = (window,) * axes if window is None or isinstance(window, str) else tuple(window)
+    if any(name is not None for name in names):
+        heights = heights * window_weights(shape[-1], names[-1])
+        if axes == 2:
+            heights = heights * window_weights(shape[0], names[0])[:, None]
+    modes = fft.rfft(heights) if axes == 1 else fft.rfft2(heights)
+    psd = modes.real**2
+    psd += modes.imag**2
+    psd *= np.prod(spacing) / np.prod(shape)
+    return psd, half_weights(shape[-1])
+
+
+def radial_average(
+    psd: Array, shape: Sequence[int], spacing: Sequence[float], edges: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """Average a half-plane density over rings of |q|, up to the smaller Nyquist wavenumber.
+
+    Parameters
+    ----------
+    psd : ndarray, shape (..., ny, nx//2 + 1)
+    shape, spacing : pairs
+        (ny, nx) and (dy, dx) of the heights.
+    edges : ndarray, optional
+        Ascending edges of the rings in rad m-1 (the lower one belongs to the ring). Default: rings as wide
+        as the coarser step of the wavenumbers, centred on its multiples.
+
+    Returns
+    -------
+    q : ndarray, shape (k,)
+        Mean wavenumber of the modes in each ring that is not empty.
+    mean : ndarray, shape (..., k)
+    counts : ndarray of int64, shape (k,)
+        Modes in each ring, in the whole plane; half as many are independent.
+    """
+    radius = radial_wavenumber(shape, spacing)
+    weights = np.broadcast_to(half_weights(shape[-1]), radius.shape)
+    nyquist = np.pi / max(spacing)
+    if edges is None:
+        step = max(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
+        edges = step * (np.arange(int(np.floor(nyquist / step + 0.5)) + 1) + 0.5)
+    edges = np.asarray(edges, dtype=np.float64)
+    ring = np.searchsorted(edges, radius.ravel(), side="right") - 1
+    inside = (
+        (ring >= 0)
+        & (ring < edges.size - 1)
+        & (radius.ravel() <= nyquist * (1 + 1e-12))
+        & (radius.ravel() > 0)
+    )
+    ring, weight = ring[inside], weights.ravel()[inside]
+    counts = np.bincount(ring, weight, minlength=edges.size - 1)
+    kept = counts > 0
+    q = np.bincount(ring, weight * radius.ravel()[inside], minlength=counts.size)[kept] / counts[kept]
+    planes = psd.reshape(-1, radius.size)[:, inside]
+    mean: Array = np.stack(
+        [np.bincount(ring, weight * plane, minlength=counts.size)[kept] for plane in planes]
+    )
+    mean = mean / counts[kept]
+    return q, mean.reshape(*psd.shape[: -len(shape)], q.size), counts[kept].astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Mean squares of the heights, of their gradient and of their Laplacian.
+
+    For an isotropic surface they are the radial moments of the spectrum, <|q|^n C> for n = 0, 2, 4. The mean
+    height is not in them.
+
+    Attributes
+    ----------
+    height, slope, laplacian : float
+        In m2, 1 and m-2.
+    axes : int
+        2 for a plane, 1 for a profile.
+    """
+
+    height: float
+    slope: float
+    laplacian: float
+    axes: int = 2
+
+    @property
+    def rms_height(self) -> float:
+        """Root mean square height in m."""
+        return float(np.sqrt(self.height))
+
+    @property
+    def rms_slope(self) -> float:
+        """Root mean square of the gradient, both components of a plane."""
+        return float(np.sqrt(self.slope))
+
+    @property
+    def rms_curvature(self) -> float:
+        """Root mean square of the mean curvature (half the Laplacian; of z'' for a profile), in m-1."""
+        return float(np.sqrt(self.laplacian)) / self.axes
+
+    @property
+    def nayak(self) -> float:
+        """Bandwidth parameter m0 m4 / m2^2 of the profiles; NaN for a surface without slope."""
+        if not self.slope > 0:
+            return float("nan")
+        factor = 1.5 if self.axes == 2 else 1.0  # m2 = slope / 2 and m4 = 3/8 laplacian, isotropic
+        return factor * (self.height / self.slope) * (self.laplacian / self.slope)
+
+
+def spectral_moments(psd: Array, shape: Sequence[int], spacing: Sequence[float]) -> Moments:
+    """Return the moments of one half-plane density, summed over its modes."""
+    extent = float(np.prod([n * s for n, s in zip(shape, spacing, strict=True)]))
+    square = _square(half_wavenumbers(shape, spacing))
+    density = psd * (half_weights(shape[-1]) / extent)
+    density[(0,) * density.ndim] = 0.0
+    height = float(density.sum())
+    density *= square
+    slope = float(density.sum())
+    density *= square
+    return Moments(height, slope, float(density.sum()), len(shape))
+
+
+def directional_slopes(psd: Array, shape: Sequence[int], spacing: Sequence[float]) -> tuple[float, ...]:
+    """Return the root mean square slope along each axis, y first."""
+    extent = float(np.prod([n * s for n, s in zip(shape, spacing, strict=True)]))
+    density = psd * (half_weights(shape[-1]) / extent)
+    waves = half_wavenumbers(shape, spacing)
+    sums = (density,) if len(shape) == 1 else (density.sum(axis=1), density.sum(axis=0))
+    return tuple(float(np.sqrt((q**2 * part).sum())) for q, part in zip(waves, sums, strict=True))
+
+
+def _square(waves: Sequence[Array]) -> Array:
+    if len(waves) == 1:
+        return np.asarray(waves[0] ** 2)
+    return np.asarray(waves[0][:, None] ** 2 + waves[1] ** 2)
+
+
+@dataclass(frozen=True)
+class SelfAffine:
+    """The self-affine spectrum with a plateau, in closed form (Persson 2005; Jacobs et al. 2017).
+
+    C(q) = plateau for 2 pi/long_cutoff <= q < 2 pi/rolloff, then it falls as
+    plateau (q rolloff / 2 pi)^(-2 - 2 hurst) up to q = 2 pi/short_cutoff, and nothing outside.
+
+    Attributes
+    ----------
+    hurst : float
+        Between 0 and 1.
+    long_cutoff, rolloff, short_cutoff : float
+        Wavelengths in metres, long_cutoff >= rolloff >= short_cutoff.
+    plateau : float
+        C at the roll-off, in m4.
+
+    References
+    ----------
+    Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
+    """
+
+    hurst: float
+    long_cutoff: float
+    rolloff: float
+    short_cutoff: float
+    plateau: float = 1.0
+
+    @classmethod
+    def scaled(
+        cls,
+        hurst: float,
+        long_cutoff: float,
+        rolloff: float,
+        short_cutoff: float,
+        *,
+        rms_height: float | None = None,
+        rms_slope: float | None = None,
+    ) -> SelfAffine:
+        """Return the spectrum that has this rms height or, failing it, this rms slope."""
+        unit = cls(hurst, long_cutoff, rolloff, short_cutoff)
+        if rms_height is not None:
+            plateau = rms_height**2 / unit.moment(0)
+        elif rms_slope is not None:
+            plateau = rms_slope**2 / unit.moment(2)
+        else:
+            plateau = 1.0
+        return cls(hurst, long_cutoff, rolloff, short_cutoff, plateau)
+
+    def psd(self, q: Array) -> Array:
+        """Return C(q) in m4; q in rad m-1."""
+        q = np.asarray(q, dtype=np.float64)
+        low, corner, high = self._wavenumbers()
+        with np.errstate(divide="ignore"):
+            tail = (np.maximum(q, corner) / corner) ** (-2.0 - 2.0 * self.hurst)
+        return np.where((q >= low) & (q <= high), self.plateau * tail, 0.0)
+
+    def moment(self, order: float) -> float:
+        """Return the integral of q^order C(q) q dq / (2 pi)."""
+        low, corner, high = self._wavenumbers()
+        flat = _power_integral(order + 1.0, low, corner)
+        tail = _power_integral(order - 1.0 - 2.0 * self.hurst, corner, high) * corner ** (
+            2.0 + 2.0 * self.hurst
+        )
+        return float(self.plateau * (flat + tail) / (2.0 * np.pi))
+
+    def moments(self) -> Moments:
+        """Return the mean squares of height, gradient and Laplacian."""
+        return Moments(self.moment(0), self.moment(2), self.moment(4))
+
+    def _wavenumbers(self) -> tuple[float, float, float]:
+        return tuple(2.0 * np.pi / length for length in (self.long_cutoff, self.rolloff, self.short_cutoff))  # type: ignore[return-value]
+
+
+def _power_integral(power: float, low: float, high: float) -> float:
+    """Return the integral of q^power from low to high, without loss as power nears -1."""
+    exponent = power + 1.0
+    span = np.log(high / low)
+    growth = span if abs(exponent * span) < 1e-300 else np.expm1(exponent * span) / exponent
+    return float(low**exponent * growth)

@@ -1,0 +1,192 @@
+"""Exact fractional Brownian surfaces by intrinsic embedding (Stein 2002), arrays only.
+
+Lengths are divided by the diagonal between the outermost points, so that no two points are farther apart
+than 1. On that disc r^(2H) is the variogram of a stationary field plus that of a random plane; the
+covariance of the stationary field ends at r = R and is smooth enough to be positive definite, so that it
+can be summed over a torus of side R + extent and sampled with Fourier transforms without any error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base import fft
+from fractalcontact.base.errors import FractalContactError
+
+Array = np.ndarray[Any, np.dtype[Any]]
+ROUNDING = 1e-14  # largest negative eigenvalue, over the largest, that rounding may leave
+BLOCK = 1 << 16  # numbers worked on at a time: they stay in the cache
+
+
+@dataclass(frozen=True)
+class Stein:
+    """The covariance of the stationary part: c0 - r^2H + c2 r^2 up to r = 1, beta (R - r)^3 / r up to R."""
+
+    hurst: float
+    radius: float
+    c0: float
+    c2: float
+    beta: float
+
+    @classmethod
+    def of(cls, hurst: float) -> Stein:
+        """Return the constants for this exponent, with the smaller radius where that is enough."""
+        power = 2.0 * hurst
+        if hurst <= 0.75:
+            return cls(hurst, 1.0, 1.0 - power / 2.0, power / 2.0, 0.0)
+        radius = 2.0
+        beta = power * (2.0 - power) / (3.0 * radius * (radius**2 - 1.0))
+        c2 = (power - beta * (radius - 1.0) ** 2 * (radius + 2.0)) / 2.0
+        return cls(hurst, radius, beta * (radius - 1.0) ** 3 + 1.0 - c2, c2, beta)
+
+    def __call__(self, square: Array) -> Array:
+        """Return the covariance at squared distances; `square` is used up."""
+        near = np.minimum(square, 1.0)
+        covariance = self.c0 + self.c2 * near
+        covariance -= np.power(near, self.hurst, out=near)
+        if self.beta == 0.0:
+            covariance[square > 1.0] = 0.0
+            return covariance
+        distance = np.sqrt(square, out=square)
+        far = distance > 1.0
+        gap = np.maximum(self.radius - distance[far], 0.0)
+        covariance[far] = self.beta * gap**3 / distance[far]
+        return covariance
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """A torus whose modes give the surface.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (ny, nx) of the surface; ny = 1 for a profile.
+    torus : tuple of int
+        Points of the torus along each axis, even (or 1).
+    step : tuple of float
+        Spacing over the diagonal of the surface.
+    amplitude : ndarray, shape (torus_x//2 + 1, torus_y//2 + 1)
+        Square root of the eigenvalues, one quadrant, x first: the others mirror it.
+    drift : float
+        Standard deviation of the slope of the random plane, per diagonal.
+    smallest : float
+        Smallest eigenvalue over the largest, before clipping.
+    clipped : float
+        Fraction of the eigenvalues that rounding had left below zero.
+    """
+
+    shape: tuple[int, int]
+    torus: tuple[int, int]
+    step: tuple[float, float]
+    amplitude: Array
+    drift: float
+    smallest: float
+    clipped: float
+
+    def variogram(self) -> tuple[Array, Array]:
+        """Return what the amplitudes imply: lags and mean square increments over r^2H, shapes (ny, nx).
+
+        Lags are in diagonals; an exact embedding gives 2 lag^(2H).
+        """
+        axes = tuple(axis for axis, n in enumerate(self.amplitude.shape) if n > 1)
+        covariance = fft.cosine(self.amplitude**2, axes) / np.prod(self.torus)
+        covariance = covariance.T[: self.shape[0], : self.shape[1]]
+        y, x = (np.arange(n) * step for n, step in zip(self.shape, self.step, strict=True))
+        square = y[:, None] ** 2 + x**2
+        return np.sqrt(square), 2.0 * (covariance[0, 0] - covariance) + self.drift**2 * square
+
+
+def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
+    """Return the embedding of a surface of this shape; ny = 1 makes a profile."""
+    model = Stein.of(hurst)
+    diagonal = float(np.hypot((shape[0] - 1) * spacing[0], (shape[1] - 1) * spacing[1]))
+    step = (spacing[0] / diagonal, spacing[1] / diagonal)
+    torus = (_side(shape[0], step[0], model.radius), _side(shape[1], step[1], model.radius))
+    covariance = _covariance(model, torus, step)
+    axes = tuple(axis for axis, n in enumerate(covariance.shape) if n > 1)
+    eigenvalues = fft.cosine(covariance, axes)
+    largest, smallest = float(eigenvalues.max()), float(eigenvalues.min())
+    if not smallest >= -ROUNDING * largest:
+        raise FractalContactError(
+            f"fractional Brownian surface: the embedding of shape {shape} with hurst = {hurst:g} is not "
+            f"positive definite (least eigenvalue {smallest / largest:.2g} of the largest): please report it"
+        )
+    clipped = 0.0
+    if smallest < 0.0:
+        clipped = float(np.count_nonzero(eigenvalues < 0.0) / eigenvalues.size)
+        np.maximum(eigenvalues, 0.0, out=eigenvalues)
+    amplitude = np.sqrt(eigenvalues, out=eigenvalues)
+    drift = float(np.sqrt(2.0 * model.c2))
+    return Embedding(shape, torus, step, amplitude, drift, smallest / largest, clipped)
+
+
+def _side(n: int, step: float, radius: float) -> int:
+    """Return the even, fast number of points that holds the extent and one radius."""
+    if n == 1:
+        return 1
+    needed = int(np.ceil(radius / step * (1.0 - 1e-12))) + n - 1
+    return 2 * fft.fast_length((needed + 1) // 2)
+
+
+def _covariance(model: Stein, torus: tuple[int, int], step: tuple[float, float]) -> Array:
+    """Return the covariance summed over the torus, on the quadrant (x, y) of its offsets."""
+    y, x = (np.arange(n // 2 + 1) * s for n, s in zip(torus, step, strict=True))
+    side_y, side_x = (
+        n * s if n > 1 else np.inf for n, s in zip(torus, step, strict=True)
+    )  # a profile has no images
+    covariance = np.zeros((x.size, y.size))
+    rows = max(1, BLOCK // y.size)
+    for start in range(0, x.size, rows):
+        block = slice(start, min(start + rows, x.size))
+        for image_x in (x[block], side_x - x[block]):
+            reach_x = np.flatnonzero(image_x < model.radius)
+            for image_y in (y, side_y - y):
+                reach_y = np.flatnonzero(image_y < model.radius)
+                if reach_x.size and reach_y.size:
+                    part = (
+                        slice(start + reach_x[0], start + reach_x[-1] + 1),
+                        slice(reach_y[0], reach_y[-1] + 1),
+                    )
+                    covariance[part] += model(image_x[reach_x][:, None] ** 2 + image_y[reach_y] ** 2)
+    return covariance
+
+
+def draw(embedding: Embedding, rng: np.random.Generator) -> Array:
+    """Return one surface with E[(z(a) - z(b))^2] = 2 r^(2H), r in diagonals, shape (ny, nx)."""
+    ny, nx = embedding.shape
+    slope_y, slope_x = embedding.drift * rng.standard_normal(2)
+    lines = _columns(embedding, rng)
+    heights = np.empty((ny, nx))
+    rows = max(1, BLOCK // embedding.torus[1])
+    for start in range(0, ny, rows):
+        block = slice(start, start + rows)
+        heights[block] = fft.irfft(lines[block], embedding.torus[1])[:, :nx]
+        heights[block] += slope_x * embedding.step[1] * np.arange(nx)
+        heights[block] += (slope_y * embedding.step[0] * np.arange(ny)[block])[:, None]
+    return heights
+
+
+def _columns(embedding: Embedding, rng: np.random.Generator) -> Array:
+    """Draw the modes, undo the transform along y, and keep the rows of the surface: (ny, torus_x//2 + 1)."""
+    ny = embedding.shape[0]
+    torus_y, torus_x = embedding.torus
+    width = torus_x // 2 + 1
+    lines = np.empty((ny, width), dtype=np.complex128)
+    # a pair of normal numbers has mean square 2; the columns that mirror themselves keep their real part
+    scale = np.full(width, np.sqrt(0.5 * torus_x * torus_y))
+    scale[[0, -1]] *= np.sqrt(2.0)
+    half = torus_y // 2 + 1
+    rows = max(1, BLOCK // torus_y)
+    for start in range(0, width, rows):
+        block = slice(start, min(start + rows, width))
+        amplitude = embedding.amplitude[block] * scale[block, None]
+        modes = rng.standard_normal((amplitude.shape[0], torus_y, 2)).view(np.complex128)[..., 0]
+        modes[:, :half] *= amplitude
+        modes[:, half:] *= amplitude[:, half - 2 : 0 : -1]
+        lines[:, block] = fft.ifft(modes)[:, :ny].T
+    lines[:, [0, -1]] = lines[:, [0, -1]].real
+    return lines

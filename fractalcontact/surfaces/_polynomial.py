@@ -1,0 +1,102 @@
+"""Least-squares planes and quadrics under planes with gaps, arrays only."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+RANK = 1e-10  # smallest singular value over the largest for which the points fix the polynomial
+
+
+def shifted(heights: Array) -> tuple[Array, float, float]:
+    """Return (heights - reference) / scale with the reference and the scale, a power of two.
+
+    The reference is an observed height, so that the subtraction loses nothing where heights are close to
+    each other; NaN stays. Scaled values lie within -1 and 1.
+    """
+    observed = heights[np.isfinite(heights)]
+    reference = float(observed[observed.size // 2])
+    offset = heights - reference
+    largest = float(np.nanmax(np.abs(offset)))
+    scale = math.ldexp(1.0, math.frexp(largest)[1]) if largest > 0 else 1.0
+    offset /= scale
+    return offset, reference, scale
+
+
+def detrended(heights: Array, order: int) -> tuple[Array, bool]:
+    """Return the heights less their least-squares polynomial, and whether the points fix it.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (ny, nx) or (nx,)
+        NaN where missing; at least one value is there.
+    order : int
+        Total degree of the polynomial.
+    """
+    values, _, scale = shifted(heights)
+    observed = np.isfinite(values)
+    values[~observed] = 0.0
+    basis = _basis(heights.shape, order)
+    gram = _gram(basis, observed)
+    singular = np.linalg.svd(gram, compute_uv=False)
+    if singular[-1] < RANK * singular[0]:
+        return heights, False
+    for _ in range(2):  # the second pass takes out what rounding left in the first
+        right = np.array([_project(values, functions) for functions in basis])
+        values -= _surface(basis, np.linalg.solve(gram, right))
+        values[~observed] = 0.0
+    values *= scale
+    values[~observed] = np.nan
+    return values, True
+
+
+def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
+    """Return the slope of the mean plane along each axis, y first; NaN where the points do not fix it."""
+    values, _, scale = shifted(heights)
+    observed = np.isfinite(values)
+    values[~observed] = 0.0
+    basis = _basis(heights.shape, 1)
+    gram = _gram(basis, observed)
+    singular = np.linalg.svd(gram, compute_uv=False)
+    if singular[-1] < RANK * singular[0]:
+        return (math.nan,) * heights.ndim
+    weights = np.linalg.solve(gram, np.array([_project(values, functions) for functions in basis]))
+    # the basis is 1, then each axis in half-extents, x before y
+    halves = [0.5 * (n - 1) * step for n, step in zip(heights.shape, spacing, strict=True)]
+    return tuple(float(w) * scale / half for w, half in zip(weights[:0:-1], halves, strict=True))
+
+
+def _basis(shape: tuple[int, ...], order: int) -> list[tuple[Array, ...]]:
+    """Return products of Legendre polynomials of the axes on -1 ... 1, by total degree, y power rising."""
+    axes = [np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, n), order).T for n in shape]
+    powers = itertools.product(range(order + 1), repeat=len(shape))
+    chosen = sorted((p for p in powers if sum(p) <= order), key=lambda p: (sum(p), p))
+    return [tuple(axis[power] for axis, power in zip(axes, p, strict=True)) for p in chosen]
+
+
+def _gram(basis: list[tuple[Array, ...]], observed: Array) -> Array:
+    """Return the sums of products of the basis over the observed points."""
+    weight = observed.astype(np.float64)
+    gram = np.empty((len(basis), len(basis)))
+    for (i, first), (j, second) in itertools.combinations_with_replacement(enumerate(basis), 2):
+        functions = tuple(a * b for a, b in zip(first, second, strict=True))
+        gram[i, j] = gram[j, i] = _project(weight, functions)
+    return gram
+
+
+def _project(values: Array, functions: tuple[Array, ...]) -> float:
+    """Return the sum of values times the product of one function for each axis."""
+    lines = np.einsum("...j,j->...", values, functions[-1])
+    return float(lines if len(functions) == 1 else np.einsum("i,i->", lines, functions[0]))
+
+
+def _surface(basis: list[tuple[Array, ...]], weights: Array) -> Array:
+    """Return the weighted sum of the basis."""
+    if len(basis[0]) == 1:
+        return np.asarray(sum(w * f[0] for w, f in zip(weights, basis, strict=True)))
+    return np.asarray(sum(np.multiply.outer(w * f[0], f[1]) for w, f in zip(weights, basis, strict=True)))
