@@ -156,6 +156,7 @@ QUANTITIES: dict[str, Quantity] = {
     "box_size": Quantity("1", "edge of the box in cells"),
     "box_length": Quantity("m", "edge of the box"),
     "box_count": Quantity("1", "number of boxes that meet the set"),
+    "box_measure": Quantity("1", "number of boxes that meet the set, those cut by the edge by their part inside"),
     "box_dimension": Quantity("1", "box dimension of the set"),
     "dust_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
     "dust_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
@@ -188,7 +189,7 @@ QUANTITIES: dict[str, Quantity] = {
     # accuracy
     "error": Quantity("1", "true error"),
     "memory": Quantity("byte", "peak memory"),
-    "part": Quantity(None, "part of the package"),
+    "first_run_time": Quantity("s", "run time of the first call, with compilation"),
     "knob": Quantity("1", "setting that trades error for time"),
 }
 

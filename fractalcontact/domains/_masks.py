@@ -1,0 +1,201 @@
+"""Reading a mask, and putting results back on its leading dims.
+
+A mask is boolean, or integer flags where contact means value > 0, with dims (..., y, x). Every study of this
+room works on a stack of planes and gives back what the leading dims of the mask were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.grid import Grid, grid_of, resolve_periodic
+from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, label
+from fractalcontact.base.threads import thread_count
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = np.ndarray[Any, np.dtype[Any]]
+S = TypeVar("S")
+R = TypeVar("R")
+
+EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
+
+
+@dataclass(frozen=True)
+class Planes:
+    """The planes of a mask, their grid, and the dims they came in.
+
+    `cells` is uint8 of 0 and 1, shape (planes, ny, nx), C order. `valid` is None, or uint8 of shape
+    (1 or planes, ny, nx): cells that were not observed are 0 there, and 0 in `cells`.
+    """
+
+    cells: Array
+    valid: Array | None
+    grid: Grid
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    coords: dict[str, xr.DataArray]
+    plane_coords: dict[str, xr.DataArray]
+
+    @property
+    def count(self) -> int:
+        """Number of planes."""
+        return int(self.cells.shape[0])
+
+    @property
+    def observed(self) -> Array:
+        """Observed cells of each plane, int64."""
+        ny, nx = self.grid.shape
+        if self.valid is None:
+            return np.full(self.count, ny * nx, np.int64)
+        return np.broadcast_to(np.count_nonzero(self.valid, axis=(-2, -1)), self.count).astype(np.int64)
+
+    @property
+    def occupied(self) -> Array:
+        """Cells of the set in each plane, int64."""
+        return np.asarray(np.count_nonzero(self.cells, axis=(-2, -1)), np.int64)
+
+    @property
+    def coverage(self) -> Array:
+        """Share of the observed cells in the set; NaN where nothing was observed."""
+        return np.where(self.observed > 0, self.occupied / np.maximum(self.observed, 1), np.nan)
+
+    @property
+    def side(self) -> float:
+        """Edge in metres of a square as large as one cell; NaN without coordinates."""
+        return float(np.sqrt(self.grid.cell_area)) if self.grid.known else float("nan")
+
+    def valid_of(self, plane: int) -> Array | None:
+        """Return the observed cells of one plane, or None if all of them are."""
+        return None if self.valid is None else self.valid[min(plane, self.valid.shape[0] - 1)]
+
+    def variable(self, values: Any, *new: str) -> tuple[tuple[str, ...], Array]:
+        """Return (dims, values) with the first axis of `values` spread over the leading dims."""
+        values = np.asarray(values)
+        return (*self.dims, *new), values.reshape(self.shape + values.shape[1:])
+
+
+def read_mask(
+    mask: Any,
+    problems: Problems,
+    *,
+    valid: Any = None,
+    periodic: bool | None = None,
+    argument: str = "mask",
+) -> Planes:
+    """Check a mask and what was observed of it; lay the planes out."""
+    import xarray as xr
+
+    stand_in = Planes(
+        np.zeros((1, 1, 1), np.uint8), None, Grid((1, 1), (1.0, 1.0), (False, False)), (), (), {}, {}
+    )
+    if not isinstance(mask, xr.DataArray):
+        problems.add(argument, EXPECTED, mask)
+        return stand_in
+    if mask.dtype.kind not in "biu":
+        problems.add(
+            argument, f"{EXPECTED}; compare numbers first, as in `pressure > 0`", f"type {mask.dtype}"
+        )
+        return stand_in
+    if tuple(mask.dims[-2:]) != CORE_DIMS or min(mask.shape, default=0) < 1:
+        problems.add(argument, EXPECTED + ", none of them empty", f"sizes {dict(mask.sizes)}")
+        return stand_in
+    grid = _grid(mask, problems, argument)
+    wraps = resolve_periodic(periodic, grid, problems, "periodic")
+    grid = Grid(grid.shape, grid.spacing, (wraps[0], wraps[1]), grid.known)
+    cells = (mask.values > 0).astype(np.uint8).reshape(-1, *grid.shape)
+    observed = _observed(valid, mask, problems)
+    if observed is not None:
+        cells = cells * observed
+    return Planes(
+        np.ascontiguousarray(cells),
+        observed,
+        grid,
+        tuple(str(dim) for dim in mask.dims[:-2]),
+        tuple(mask.shape[:-2]),
+        _leading_coords(mask),
+        {dim: mask.coords[dim] for dim in CORE_DIMS} if grid.known else {},
+    )
+
+
+def _grid(mask: xr.DataArray, problems: Problems, argument: str) -> Grid:
+    if any(dim in mask.coords for dim in CORE_DIMS):
+        return grid_of(mask, problems, argument)
+    shape = (int(mask.sizes["y"]), int(mask.sizes["x"]))
+    return Grid(shape, (1.0, 1.0), (False, False), known=False)
+
+
+def _observed(valid: Any, mask: xr.DataArray, problems: Problems) -> Array | None:
+    """Return the observed cells as (1 or planes, ny, nx), or None if nothing is said."""
+    import xarray as xr
+
+    if valid is None:
+        return None
+    dims = tuple(valid.dims) if isinstance(valid, xr.DataArray) else None
+    ny, nx = mask.shape[-2:]
+    if dims is None or valid.dtype.kind != "b" or dims not in (CORE_DIMS, tuple(mask.dims)):
+        problems.add("valid", f"a boolean DataArray with dims (y, x) or {tuple(mask.dims)}", valid)
+        return None
+    if valid.shape != mask.shape[-valid.ndim :]:
+        problems.add("valid", f"the shape of the mask, {mask.shape[-valid.ndim :]}", f"shape {valid.shape}")
+        return None
+    return np.ascontiguousarray(valid.values.reshape(-1, ny, nx)).astype(np.uint8)
+
+
+def _leading_coords(mask: xr.DataArray) -> dict[str, xr.DataArray]:
+    """Return the known coordinates that live on the leading dims alone."""
+    leading = set(mask.dims[:-2])
+    return {
+        str(name): coordinate.reset_coords(drop=True)
+        for name, coordinate in mask.coords.items()
+        if name in QUANTITIES and set(coordinate.dims) <= leading
+    }
+
+
+def assemble(
+    planes: Planes,
+    variables: dict[str, Any],
+    coords: dict[str, Any] | None = None,
+    *,
+    on_plane: bool = False,
+    notes: dict[str, dict[str, str]] | None = None,
+) -> xr.Dataset:
+    """Build a labelled Dataset from variables (dims, values) on the dims of the mask.
+
+    `notes` gives further attributes by name, or other units and meanings than those of the schema.
+    """
+    import xarray as xr
+
+    there = {**planes.coords, **(planes.plane_coords if on_plane else {}), **(coords or {})}
+    dataset = label(xr.Dataset(variables, coords=there))
+    for name, attributes in (notes or {}).items():
+        dataset[name].attrs.update(attributes)
+    return dataset
+
+
+def together(function: Callable[[S], R], items: Iterable[S]) -> list[R]:
+    """Apply a function that holds no Python lock to all items, on the threads of this process, in order."""
+    items = list(items)
+    threads = min(thread_count(), len(items))
+    if threads < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(function, items))
+
+
+def box_sizes(sizes: Any, default: Array, problems: Problems, argument: str, *, longest: int) -> Array:
+    """Return edges of boxes in cells: whole numbers, ascending, each once."""
+    if sizes is None:
+        return default
+    values = problems.numbers(argument, sizes, at_least=1, at_most=longest)
+    whole = np.rint(values)
+    if not np.array_equal(whole, values):
+        problems.add(argument, "whole numbers of cells", values[whole != values][0])
+    return np.unique(whole.astype(np.int64))

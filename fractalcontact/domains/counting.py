@@ -1,0 +1,231 @@
+"""Box counting: the number of boxes that meet a set, and the box dimension with its null."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.scaling import local_slope
+from fractalcontact.domains import _covers, _dust
+from fractalcontact.domains._masks import Array, Planes, assemble, box_sizes, read_mask
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ROUNDING = 1e-14  # no interval is narrower
+SOURCE = (
+    "Falconer, Fractal Geometry (1990), ch. 3 (box dimension); Borri-Brunetto, Carpinteri and Chiaia, "
+    "FRAMCOS-3 (1998) (of contact domains)"
+)
+
+
+def box_dimension(
+    mask: xr.DataArray, *, scales: Any = None, cover: str = "minimum", valid: xr.DataArray | None = None
+) -> xr.Dataset:
+    """Box dimension of a set of cells, with its interval and with the value of a random dust beside it.
+
+    Parameters
+    ----------
+    mask : DataArray, dims (..., y, x)
+        Boolean, or integer flags where contact means value > 0. Axes that wrap say so by their `period`.
+    scales : sequence of int, optional
+        Edges of the boxes in cells. The dimension is then the least-squares slope of ln N over ln s, all
+        sizes alike. By default the sizes are the products of 2 and 3 from one cell to the geometric mean
+        of the cell and the extent (at least to 9), and the dimension is the mean of the local slopes over
+        the ratio, 2 or 3, at which they are steadiest.
+    cover : {"minimum", "mean", "aligned"}
+        Which boxes: the fewest over all offsets of the grid, their mean over all offsets, or those of the
+        one grid that starts at the first cell. The default call with "minimum" also looks at the mean,
+        and where that is the steadier of the two lets it count as much.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Cells that were observed. Others are in no set; the counts are divided by the share of the boxes'
+        area that was observed.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims of the mask: `box_dimension`; `ci_low` and `ci_high`, two standard deviations
+        of the local slopes to either side (a statement about how well a power law holds over the window,
+        NaN where fewer than two slopes speak); `scale_min`, `scale_max` (cells); `coverage`;
+        `dust_dimension`, the same fit to the expected counts of as many cells thrown at random, with the
+        standard deviation `dust_spread` from dust to dust; `differs_from_dust`, whether the mean counts at
+        sizes 2 to 4 are out of reach for a dust. Over `box_size` (cells) too, with `box_length` (m, the
+        side of a square as large as the box): `box_count`, of whole boxes; `box_measure`, where a box cut
+        by the edge of the mask counts by its part inside if the set runs on into the next box, so that a
+        full mask has exactly n/s boxes along an axis; `local_slope`, -d ln(box_measure)/d ln(box_size);
+        `dust_count`. Exactly 0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask.
+
+    Raises
+    ------
+    InvalidInput
+        The mask is not boolean or integer, its dims are not (..., y, x), a scale is not a whole number of
+        cells between 1 and the extent, or `cover` is unknown.
+
+    Notes
+    -----
+    An empty plane gives NaN, with the reason in the attributes. A dimension needs a stated window of scales:
+    over the full range, the counts of any set measure little but its coverage, which is why the dust's
+    value stands beside it. A single island of a few cells is a point at scales above its size.
+    """
+    begin = time.perf_counter()
+    with Problems("fractalcontact.domains.box_dimension") as problems:
+        problems.choice("cover", cover, _covers.COVERS)
+        planes = read_mask(mask, problems, valid=valid)
+        sizes = _sizes(scales, planes, cover, problems)
+    found = _covers.curve(planes, sizes, cover)
+    dimension, half = _fit(planes, sizes, found, cover, chosen=scales is not None)
+    null = _null(planes, sizes, chosen=scales is not None)
+    known = np.isfinite(dimension)
+    variables = {
+        "box_dimension": planes.variable(dimension),
+        "ci_low": planes.variable(dimension - half),
+        "ci_high": planes.variable(dimension + half),
+        "scale_min": planes.variable(np.where(known, sizes.min(), np.nan)),
+        "scale_max": planes.variable(np.where(known, sizes.max(), np.nan)),
+        "coverage": planes.variable(planes.coverage),
+        **{name: planes.variable(values) for name, values in null.items() if name != "dust_count"},
+        "box_count": planes.variable(found.count, "box_size"),
+        "box_measure": planes.variable(found.measure, "box_size"),
+        "local_slope": planes.variable(0.0 - local_slope(sizes, found.measure), "box_size"),
+        "dust_count": planes.variable(null["dust_count"], "box_size"),
+        "run_time": ((), time.perf_counter() - begin),
+    }
+    dataset = assemble(planes, variables, _size_coords(sizes, planes), notes=_notes(known, sizes))
+    parameters = {"mask": mask, "scales": scales, "cover": cover, "valid": valid}
+    return stamp(
+        dataset, "fractalcontact.domains.box_dimension", parameters, title="Box dimension", references=SOURCE
+    )
+
+
+def box_counts(
+    mask: xr.DataArray, sizes: Any = None, *, cover: str = "mean", valid: xr.DataArray | None = None
+) -> xr.Dataset:
+    """Number of boxes that meet a set, by size, before any fit.
+
+    Parameters
+    ----------
+    mask, cover, valid
+        See `box_dimension`.
+    sizes : sequence of int, optional
+        Edges of the boxes in cells; by default all from 1 to half the shorter side. With the cover "mean"
+        all sizes together cost about as much as one.
+
+    Returns
+    -------
+    Dataset
+        `box_count`, `box_measure` and `local_slope` over the leading dims of the mask and `box_size`
+        (cells), with `box_length` (m).
+
+    Raises
+    ------
+    InvalidInput
+        As `box_dimension`.
+    """
+    begin = time.perf_counter()
+    with Problems("fractalcontact.domains.box_counts") as problems:
+        problems.choice("cover", cover, _covers.COVERS)
+        planes = read_mask(mask, problems, valid=valid)
+        every = np.arange(1, max(1, min(planes.grid.shape) // 2) + 1)
+        chosen = _sizes(every if sizes is None else sizes, planes, cover, problems, "sizes")
+    found = _covers.curve(planes, chosen, cover)
+    variables = {
+        "box_count": planes.variable(found.count, "box_size"),
+        "box_measure": planes.variable(found.measure, "box_size"),
+        "local_slope": planes.variable(0.0 - local_slope(chosen, found.measure), "box_size"),
+        "run_time": ((), time.perf_counter() - begin),
+    }
+    dataset = assemble(planes, variables, _size_coords(chosen, planes))
+    parameters = {"mask": mask, "sizes": sizes, "cover": cover, "valid": valid}
+    return stamp(
+        dataset, "fractalcontact.domains.box_counts", parameters, title="Box counts", references=SOURCE
+    )
+
+
+def _sizes(scales: Any, planes: Planes, cover: str, problems: Problems, argument: str = "scales") -> Array:
+    """Sizes as given, or the default ones; the mean needs boxes no longer than half the shorter side."""
+    shape = planes.grid.shape
+    longest = max(1, min(shape) // 2) if cover == "mean" else 2 * max(shape)
+    default = _covers.default_sizes(shape)
+    return box_sizes(scales, default[default <= longest], problems, argument, longest=longest)
+
+
+def _size_coords(sizes: Array, planes: Planes) -> dict[str, Any]:
+    return {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
+
+
+def _fit(
+    planes: Planes, sizes: Array, found: _covers.Curve, cover: str, *, chosen: bool
+) -> tuple[Array, Array]:
+    """Return the dimension and the half-width of its interval for every plane."""
+    if chosen:
+        fits = [_covers.regression(sizes, measure) for measure in found.measure]
+        pairs = [(fit.dimension, 2.0 * fit.spread) for fit in fits]
+    elif cover == "aligned":
+        fits = [_covers.steady(sizes, area) for area in found.area]
+        pairs = [(fit.dimension, 2.0 * fit.spread) for fit in fits]
+    else:
+        other = found
+        if 2 * sizes.max() <= min(planes.grid.shape):
+            other = _covers.curve(planes, sizes, "mean" if cover == "minimum" else "minimum")
+        fewest, mean = (found.area, other.area) if cover == "minimum" else (other.area, found.area)
+        pairs = [_covers.estimate(sizes, few, many, cover) for few, many in zip(fewest, mean, strict=True)]
+    dimension, half = np.array(pairs, float).reshape(-1, 2).T
+    half = half + ROUNDING
+    return dimension, half if sizes.size > (2 if chosen else 3) else np.full(half.shape, np.nan)
+
+
+def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
+    """Return the dust's counts, dimension and spread, and whether the set differs from it."""
+    small = np.array([size for size in _dust.LOOK if 2 * size <= min(planes.grid.shape)], np.int64)
+    region = _region(planes, np.union1d(sizes, small))
+    mean = _covers.curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
+    counts, rows = [], []
+    for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
+        areas = region[min(plane, region.shape[0] - 1)]
+        of = dict(zip(np.union1d(sizes, small).tolist(), areas.tolist(), strict=True))
+        null = _dust.expected(cells, observed, sizes, np.array([of[size] for size in sizes.tolist()]))
+        fit = _covers.regression(sizes, null) if chosen else _covers.steady(sizes, null * sizes**2)
+        known = np.isfinite(fit.dimension)
+        deviation = _dust.spread(cells, observed, sizes, null, fit.weights) if known else np.nan
+        looked = np.array([of[size] for size in small.tolist()])
+        other = known and _dust.differs(cells, observed, small, mean[plane], looked)
+        counts.append(null)
+        rows.append((fit.dimension, deviation, other))
+    dimension, deviation, other = np.array(rows, float).T
+    return {
+        "dust_count": np.array(counts),
+        "dust_dimension": dimension,
+        "dust_spread": deviation,
+        "differs_from_dust": other.astype(bool),
+    }
+
+
+def _region(planes: Planes, sizes: Array) -> Array:
+    """Observed cells in a box that has any, on average; shape (1 or planes, sizes)."""
+    area = sizes.astype(float) ** 2
+    if planes.valid is None:
+        return area[None]
+    everything = Planes(planes.valid, None, planes.grid, (), (), {}, {})
+    usable = np.minimum(sizes, max(1, min(planes.grid.shape) // 2))
+    seen = _covers.mean_cover(everything, usable).measure * (usable / sizes) ** 2
+    return np.where(seen > 0, everything.occupied[:, None] / np.where(seen > 0, seen, 1.0), 0.0)
+
+
+def _notes(known: Array, sizes: Array) -> dict[str, dict[str, str]]:
+    interval = "two standard deviations of the local slopes"
+    notes = {
+        "ci_low": {"long_name": f"lower end of the interval of the box dimension ({interval})"},
+        "ci_high": {"long_name": f"upper end of the interval of the box dimension ({interval})"},
+        "scale_min": {"units": "1", "long_name": "smallest box of the fit, in cells"},
+        "scale_max": {"units": "1", "long_name": "largest box of the fit, in cells"},
+        "local_slope": {"long_name": "local dimension, -d ln(box_measure)/d ln(box_size)"},
+    }
+    if sizes.size < 2:
+        notes["box_dimension"] = {"comment": "NaN: one size of box gives no slope; the mask is too narrow"}
+    elif not known.all():
+        notes["box_dimension"] = {"comment": f"NaN where the set is empty ({int((~known).sum())} planes)"}
+    return notes
