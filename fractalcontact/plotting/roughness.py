@@ -1,0 +1,230 @@
+"""How rough a face is: the scaling curves, what was fitted to them, and the dimensions that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.scaling import fit_line
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._reading import as_dataset, result_of, table, words
+from fractalcontact.plotting._units import axis_label, name_of, scale_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
+CURVES = (
+    "power_spectral_density",
+    "profile_power_spectral_density",
+    "second_variogram",
+    "variogram",
+    "madogram",
+    "cube_count",
+    "roughness",
+    "covering_area",
+    "variation",
+)
+COLUMNS = 3
+
+
+@_style.styled
+def dimension_curves(
+    curves: Any, estimates: Any = None, *, figure: Figure | SubFigure | None = None
+) -> Figure:
+    """Draw scaling curves with their local slopes, and the window and slope that were fitted.
+
+    Parameters
+    ----------
+    curves : mapping of str to Dataset, Dataset, or node of a DataTree
+        From `fractalcontact.dimensions.spectrum`, `.variogram`, `.cube_counts` ..., by name. Of the node
+        /dimensions of a study the children are taken, with the estimates beside them.
+    estimates : Dataset, optional
+        From `fractalcontact.dimensions.estimate`: where it has a method of the same name, its window
+        (scale_min, scale_max, in m) is shaded, the straight line through the curve in that window is drawn
+        and its slope told.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        There is no curve.
+    """
+    found, fitted = _curves_in(curves, estimates)
+    names = list(found)
+    rows, columns = -(-len(names) // COLUMNS), min(len(names), COLUMNS)
+    width = 2.7 * columns + (0.4 if columns > 1 else 1.6)
+    sheet = _style.sheet(figure, (width, 3.7 * rows))
+    heights = (2.2, 1.0) * rows
+    axes = np.asarray(sheet.subplots(2 * rows, columns, squeeze=False, height_ratios=heights))
+    for number in range(rows * columns):
+        row, column = divmod(number, columns)
+        upper, lower = axes[2 * row, column], axes[2 * row + 1, column]
+        if number >= len(names):
+            upper.set_axis_off()
+            lower.set_axis_off()
+            continue
+        _draw_curve(upper, lower, names[number], found[names[number]], _fit_of(fitted, names[number]))
+    return _style.root(sheet)
+
+
+def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
+    import xarray as xr
+
+    found: dict[str, xr.Dataset] = {}
+    if isinstance(curves, xr.DataTree) and curves.children:
+        found = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
+        estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
+    elif isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset | xr.DataTree):
+        found = {str(name): as_dataset(curve, "dimension_curves") for name, curve in curves.items()}
+    else:
+        one = as_dataset(curves, "dimension_curves")
+        found = {curve_of(one)[1]: one}
+    found = {name: curve for name, curve in found.items() if curve_of(curve)[1]}
+    with Problems("fc.plotting.dimension_curves") as problems:
+        problems.require(bool(found), "curves", f"a variable out of {', '.join(CURVES)}", "none")
+    return found, None if estimates is None else as_dataset(estimates, "dimension_curves")
+
+
+def curve_of(curve: xr.Dataset) -> tuple[str, str]:
+    """Return the names of the scale and of the quantity of a scaling curve; empty where there is none."""
+    for value in CURVES:
+        if value in curve.data_vars:
+            for scale in SCALES:
+                if scale in curve.variables and set(curve[scale].dims) <= set(curve[value].dims):
+                    return scale, value
+    return "", ""
+
+
+def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
+    if estimates is None or "method" not in estimates.dims:
+        return None
+    methods = words(estimates["method"])
+    return estimates.isel(method=methods.index(name)) if name in methods else None
+
+
+def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
+    for ax in (upper, lower):
+        _style.dress(ax)
+    scale, value = curve_of(curve)
+    curve = result_of(curve, "dimension_curves", (scale, value), ())
+    dim = curve[scale].dims[0]
+    x, y = np.asarray(curve[scale].values, float), table(curve, value, (dim,))
+    along, across = scale_of(curve[scale]), scale_of(curve[value])
+    marker = "." if x.size <= 60 else ""
+    upper.plot(along(x), across(y), color=_style.BLUE, marker=marker, lw=1.2)
+    if "local_slope" in curve:
+        lower.plot(along(x), table(curve, "local_slope", (dim,)), color=_style.BLUE, lw=1.0, marker=marker)
+    for ax in (upper, lower):
+        _style.log_scale(ax, x=x)
+    _style.log_scale(upper, y=y)
+    if fit is not None:
+        _draw_fit(upper, lower, fit, scale, x, y, (along, across))
+    upper.set_title(name.replace("_", " "))
+    upper.set_ylabel(across.label(name_of(curve[value])))
+    upper.tick_params(labelbottom=False)
+    lower.set_xlim(upper.get_xlim())
+    lower.set_xlabel(axis_label(curve[scale], along))
+    lower.set_ylabel("local slope")
+    if not np.isfinite(y).any():
+        _style.say(upper, "no curve")
+
+
+def _draw_fit(
+    upper: Axes, lower: Axes, fit: xr.Dataset, scale: str, x: Any, y: Any, shown: tuple[Any, Any]
+) -> None:
+    """Shade the window of the fit, draw its line, and tell its slope."""
+    window = np.sort([float(fit["scale_min"]), float(fit["scale_max"])])
+    if scale == "wavenumber":
+        window = np.sort(2 * np.pi / window)
+    if not np.isfinite(window).all():
+        return
+    for ax in (upper, lower):
+        ax.axvspan(*shown[0](window), color=_style.PALE, alpha=0.55, lw=0, zorder=0)
+    inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9))
+    line = fit_line(x[inside], y[inside])
+    if not np.isfinite(line.slope):
+        return
+    ends = np.array([x[inside].min(), x[inside].max()])
+    upper.plot(shown[0](ends), shown[1](np.exp(line.intercept) * ends**line.slope), color=_style.RED, lw=1.4)
+    lower.plot(shown[0](ends), [line.slope] * 2, color=_style.RED, lw=1.2)
+    text = f"slope {line.slope:.2f}\n" + rf"$\Delta$ = {float(fit['fractal_dimension']):.2f}"
+    rising = line.slope > 0
+    upper.text(0.04 if rising else 0.96, 0.96, text, transform=upper.transAxes, va="top", color=_style.RED,
+               ha="left" if rising else "right")  # fmt: skip
+
+
+@_style.styled
+def dimensions(
+    estimates: Any,
+    *,
+    truth: float | None = None,
+    band: tuple[float, float] | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw the fractal dimension by each method with its 95 % interval.
+
+    A method that gives no honest interval is drawn as an open circle.
+
+    Parameters
+    ----------
+    estimates : Dataset or node of a DataTree
+        From `fractalcontact.dimensions.estimate`: hurst, fractal_dimension, ci_low, ci_high (of the Hurst
+        exponent) over `method`.
+    truth : float, optional
+        Dimension to compare with, drawn as a line.
+    band : pair of float, optional
+        Range of dimensions to compare with, shaded.
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing.
+    """
+    data = result_of(estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",))
+    names = words(data["method"])
+    figure, ax = _style.canvas(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
+    value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))
+    top = value + hurst  # 3 of a surface, 2 of a profile
+    nothing = np.full(value.shape, np.nan)
+    low = top - table(data, "ci_high", ("method",)) if "ci_high" in data else nothing
+    high = top - table(data, "ci_low", ("method",)) if "ci_low" in data else nothing
+    places = np.arange(len(names))[::-1]
+    known = np.isfinite(low) & np.isfinite(high)
+    ax.hlines(places[known], low[known], high[known], color=_style.BLUE, lw=2.2)
+    ax.plot(value[known], places[known], "o", color=_style.BLUE, ms=6)
+    ax.plot(value[~known], places[~known], "o", mfc="white", mec=_style.BLUE, ms=6)
+    entries = (
+        [_style.line_entry("95 % interval", color=_style.BLUE, lw=2.2, marker="o")] if known.any() else []
+    )
+    if not known.all():
+        entries.append(
+            _style.line_entry("no interval", ls="", marker="o", mfc="white", mec=_style.BLUE, ms=6)
+        )
+    if band is not None:
+        ax.axvspan(*band, color=_style.PALE, lw=0, zorder=0)
+    if truth is not None:
+        ax.axvline(truth, color=_style.BLACK, lw=0.9, ls=":")
+        entries.append(_style.line_entry("true", color=_style.BLACK, lw=0.9, ls=":"))
+    ax.set_yticks(places, [name.replace("_", " ") for name in names])
+    ax.set_ylim(-0.6, len(names) - 0.4)
+    ax.grid(False, axis="y")
+    ax.set_xlabel(name_of(data["fractal_dimension"]))
+    _style.beside(ax, entries)
+    return figure

@@ -1,0 +1,209 @@
+"""What stands on the axes is what stands in the Dataset, in the unit that the label names."""
+
+import re
+
+import numpy as np
+import pytest
+
+from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
+
+FACTORS = {
+    "m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "N": 1.0, "kN": 1e3, "Pa": 1.0, "MPa": 1e6, "GPa": 1e9,
+    "%": 0.01, "°": 1.0, "mm²": 1e-6, "m⁴": 1.0, "rad m⁻¹": 1.0, "µm²": 1e-12,
+}  # fmt: skip
+
+
+def factor(label):
+    """Return the SI value of the unit in brackets at the end of a label."""
+    return FACTORS[re.search(r"\(([^()]*)\)$", label).group(1)]
+
+
+def drawn(ax):
+    """Return the curves on an axes in SI units."""
+    fx, fy = factor(ax.get_xlabel()), factor(ax.get_ylabel())
+    return [np.array([line.get_xdata(), line.get_ydata()], float) * [[fx], [fy]] for line in ax.lines]
+
+
+def holds(curves, x, y):
+    """Tell whether one of the curves goes through the points."""
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    return any(c.shape[1] == x.size and np.allclose(c, [x, y], rtol=1e-12, equal_nan=True) for c in curves)
+
+
+@pytest.fixture
+def closed(made):
+    return made.closure(made.delta(made.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
+
+
+def test_closure_laws_show_both_closures_of_every_shear(closed):
+    curves = drawn(plotting.closure_laws(closed).axes[0])
+    for v in closed.shear:
+        for name in ("closure", "interface_closure"):
+            assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
+
+
+def test_marked_points_lie_on_the_curve_of_the_chosen_shear(closed):
+    ax = plotting.closure_laws(closed, shear=1.6e-3, marked=[1, 3]).axes[0]
+    one = closed.sel(shear=1.6e-3).isel(step=[1, 3])
+    assert holds(drawn(ax), one.interface_closure, one.normal_force)
+    assert [text.get_text() for text in ax.texts] == ["A", "B"]
+
+
+def test_contact_area_shows_raw_and_corrected(closed):
+    curves = drawn(plotting.contact_area(closed).axes[0])
+    for v in closed.shear:
+        one = closed.sel(shear=v)
+        assert holds(curves, one.normal_force, one.contact_fraction)
+        assert holds(curves, one.normal_force, one.corrected_contact_fraction)
+
+
+def test_contact_area_against_closure(closed):
+    curves = drawn(plotting.contact_area(closed, against="closure").axes[0])
+    assert holds(curves, closed.closure.isel(shear=0), closed.contact_fraction.isel(shear=0))
+
+
+def test_rigid_dilatancy_shows_each_direction_and_its_mean_slope(made):
+    opening = made.dilatancy(forces=())
+    ax = plotting.rigid_dilatancy(opening).axes[0]
+    for word in "ENWS":
+        one = opening.sel(direction=word)
+        assert holds(drawn(ax), one.shear, one.rigid_dilatancy)
+        end = float(opening.shear.max())
+        assert holds(drawn(ax), [0, end], [0, end * float(one.mean_slope)])
+
+
+def test_elastic_dilatancy_shows_each_force_beside_the_rigid_curve(made):
+    opening = made.dilatancy()
+    ax = plotting.elastic_dilatancy(opening, direction="N", reach=8e-4).axes[0]
+    one = opening.sel(direction="N").where(opening.shear < 8.1e-4, drop=True)
+    assert holds(drawn(ax), one.shear, one.rigid_dilatancy)
+    for step in range(3):
+        assert holds(drawn(ax), one.shear, one.dilatancy.isel(step=step))
+    assert len(ax.lines) == 4
+
+
+def test_friction_shows_angle_strength_and_basic_angle(made):
+    rubbed = made.friction(made.dilatancy(directions=("W",)))
+    angle, strength = plotting.friction(rubbed).axes
+    for step in range(3):
+        one = rubbed.isel(direction=0, step=step)
+        assert holds(drawn(angle), one.shear, one.friction_angle)
+        assert holds(drawn(strength), one.shear, one.shear_strength)
+    assert any(np.allclose(line.get_ydata(), 35.0) for line in angle.lines)
+
+
+def test_friction_of_rigid_faces_has_a_curve_for_each_direction(made):
+    rubbed = made.friction(made.dilatancy(forces=()))
+    (ax,) = plotting.friction(rubbed).axes
+    for word in "ENWS":
+        one = rubbed.sel(direction=word)
+        assert holds(drawn(ax), one.shear, one.friction_angle)
+
+
+def test_box_dimension_shows_the_dust_and_the_interval(made, closed):
+    result = made.box_dimension(closed)
+    by_load, by_shear = plotting.box_dimension(result).axes
+
+    def lines(ax):
+        fx = factor(ax.get_xlabel())
+        return [np.array([np.asarray(line.get_xdata()) * fx, line.get_ydata()]) for line in ax.lines]
+
+    for name in ("box_dimension", "dust_dimension"):
+        for v in result.shear:
+            assert holds(lines(by_load), result.normal_force, result[name].sel(shear=v))
+        assert holds(lines(by_shear), result.shear, result[name].isel(step=-1))
+    low, high = (result[name].isel(step=-1) for name in ("ci_low", "ci_high"))
+    band = by_shear.collections[0].get_paths()[0].vertices[:, 1]
+    assert band.min() == pytest.approx(float(low.min()))
+    assert band.max() == pytest.approx(float(high.max()))
+
+
+def test_box_dimension_at_a_chosen_force(made, closed):
+    result = made.box_dimension(closed)
+    ax = plotting.box_dimension(result, normal_force=1e3).axes[1]
+    assert np.allclose(ax.lines[0].get_ydata(), result.box_dimension.sel(step=2))
+    assert "1 kN" in ax.get_title(loc="left")
+
+
+def test_lacunarity_shows_every_step_and_its_dust(made, closed):
+    result = made.lacunarity(closed)
+    by_load, by_shear = plotting.lacunarity(result, shear=8e-3).axes
+    shown = [np.asarray(line.get_ydata()) for line in by_load.lines]
+    for step in range(1, 5):
+        one = result.sel(shear=8e-3).isel(step=step)
+        for name in ("lacunarity", "dust_lacunarity"):
+            assert any(np.allclose(y, one[name].transpose("box_size")) for y in shown)
+    assert factor(by_load.get_xlabel()) * np.asarray(by_load.lines[0].get_xdata()) == pytest.approx(
+        result.box_length.values
+    )
+    assert len(by_shear.lines) == 6
+
+
+def test_hydraulic_aperture_shows_each_flow(made, closed):
+    result = made.transmissivity(closed)
+    ax = plotting.hydraulic_aperture(result).axes[0]
+    for v in result.shear:
+        for word in "xy":
+            one = result.sel(shear=v, axis=word)
+            assert holds(drawn(ax), one.normal_force, one.hydraulic_aperture)
+
+
+def test_dimension_curves_show_curve_window_and_slope(made):
+    curves, estimates = made.curves(), made.estimates()
+    axes = plotting.dimension_curves(curves, estimates).axes
+    upper, lower = axes[:3], axes[3:]
+    for ax, below, (name, curve) in zip(upper, lower, curves.items(), strict=True):
+        scale = next(iter(curve.dims))
+        fx = factor(below.get_xlabel())
+        assert np.asarray(ax.lines[0].get_xdata()) * fx == pytest.approx(curve[scale].values)
+        slope = float(curve.local_slope[0])
+        assert np.allclose(below.lines[1].get_ydata(), slope)
+        assert f"slope {slope:.2f}".replace("-", "-") in ax.texts[0].get_text()
+        window = np.array([2e-4, 4e-3])
+        window = np.sort(2 * np.pi / window) if scale == "wavenumber" else window
+        shaded = ax.patches[0]
+        assert np.array([shaded.get_x(), shaded.get_x() + shaded.get_width()]) * fx == pytest.approx(window)
+        assert name.replace("_", " ") == ax.get_title(loc="left")
+
+
+def test_dimensions_show_intervals_of_the_dimension_not_of_the_hurst_exponent(made):
+    estimates = made.estimates()
+    ax = plotting.dimensions(estimates, truth=2.22, band=(2.15, 2.29)).axes[0]
+    known = estimates.isel(method=slice(0, -1))
+    segments = np.array(ax.collections[0].get_segments())[:, :, 0]
+    assert segments[:, 0] == pytest.approx((3 - known.ci_high).values)
+    assert segments[:, 1] == pytest.approx((3 - known.ci_low).values)
+    assert [t.get_text() for t in ax.get_yticklabels()] == ["default", "spectrum", "variogram", "cube counts"]
+
+
+def test_a_result_that_runs_over_more_than_is_drawn_is_refused(made):
+    with pytest.raises(InvalidInput, match=r"one direction; choose with \.sel or \.isel, got 4"):
+        plotting.elastic_dilatancy(made.dilatancy())
+
+
+def test_what_is_missing_is_named(made):
+    with pytest.raises(InvalidInput, match="'closure'.*\n.*'normal_force'"):
+        plotting.closure_laws(made.estimates())
+    with pytest.raises(InvalidInput, match="labelled result"):
+        plotting.box_dimension([1, 2, 3])
+    with pytest.raises(InvalidInput, match="one of 'E', 'N', 'W', 'S', got 'Q'"):
+        plotting.elastic_dilatancy(made.dilatancy(), direction="Q")
+
+
+def test_a_figure_can_be_part_of_a_larger_one(made, closed):
+    from matplotlib.figure import Figure
+
+    sheet = Figure(layout="constrained")
+    left, right = sheet.subplots(1, 2)
+    assert plotting.closure_laws(closed, ax=left) is sheet
+    assert plotting.contact_area(closed, ax=right) is sheet
+    assert len(sheet.axes) == 2
+
+
+def test_the_callers_settings_are_left_alone(closed):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    plotting.closure_laws(closed)
+    assert dict(matplotlib.rcParams) == before
