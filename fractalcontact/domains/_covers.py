@@ -83,7 +83,7 @@ def aligned_cover(planes: Planes, sizes: Array) -> Curve:
         for size in map(int, sizes):
             finest = max(known for known in levels if size % known == 0)
             levels[size] = levels[finest] if finest == size else coarsen(levels[finest], size // finest)
-        return [int(np.count_nonzero(levels[int(size)])) for size in sizes]
+        return [int(np.count_nonzero(levels[int(size)].view(np.bool_))) for size in sizes]
 
     found = np.array(together(counts, planes.cells), np.int64).reshape(planes.count, sizes.size)
     return Curve(sizes, found, found * sizes.astype(float) ** 2)

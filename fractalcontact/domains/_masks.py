@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -49,18 +50,19 @@ class Planes:
         """Number of planes."""
         return int(self.cells.shape[0])
 
-    @property
+    @cached_property
     def observed(self) -> Array:
         """Observed cells of each plane, int64."""
         ny, nx = self.grid.shape
         if self.valid is None:
             return np.full(self.count, ny * nx, np.int64)
-        return np.broadcast_to(np.count_nonzero(self.valid, axis=(-2, -1)), self.count).astype(np.int64)
+        seen = [np.count_nonzero(plane) for plane in self.valid.view(np.bool_)]
+        return np.array(np.broadcast_to(seen, self.count), np.int64)
 
-    @property
+    @cached_property
     def occupied(self) -> Array:
         """Cells of the set in each plane, int64."""
-        return np.asarray(np.count_nonzero(self.cells, axis=(-2, -1)), np.int64)
+        return np.array([np.count_nonzero(plane) for plane in self.cells.view(np.bool_)], np.int64)
 
     @property
     def coverage(self) -> Array:
@@ -110,12 +112,14 @@ def read_mask(
     grid = _grid(mask, problems, argument)
     wraps = resolve_periodic(periodic, grid, problems, "periodic")
     grid = Grid(grid.shape, grid.spacing, (wraps[0], wraps[1]), grid.known)
-    cells = (mask.values > 0).astype(np.uint8).reshape(-1, *grid.shape)
+    values = np.ascontiguousarray(mask.values)
+    flags = values if values.dtype.kind == "b" else values > 0
+    cells = flags.view(np.uint8).reshape(-1, *grid.shape)
     observed = _observed(valid, mask, problems)
     if observed is not None:
         cells = cells * observed
     return Planes(
-        np.ascontiguousarray(cells),
+        cells,
         observed,
         grid,
         tuple(str(dim) for dim in mask.dims[:-2]),

@@ -190,7 +190,7 @@ def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
         null = _dust.expected(cells, observed, sizes, np.array([of[size] for size in sizes.tolist()]))
         fit = _covers.regression(sizes, null) if chosen else _covers.steady(sizes, null * sizes**2)
         known = np.isfinite(fit.dimension)
-        deviation = _dust.spread(cells, observed, sizes, null, fit.weights) if known else np.nan
+        deviation = _spread(cells, observed, sizes, null, fit) if known else np.nan
         looked = np.array([of[size] for size in small.tolist()])
         other = known and _dust.differs(cells, observed, small, mean[plane], looked)
         counts.append(null)
@@ -202,6 +202,15 @@ def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
         "dust_spread": deviation,
         "differs_from_dust": other.astype(bool),
     }
+
+
+def _spread(cells: int, observed: int, sizes: Array, null: Array, fit: _covers.Fit) -> float:
+    """Return the standard deviation of the dust's dimension; of many sizes a few dozen stand for all."""
+    if sizes.size > 64:
+        places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], 48)))
+        sizes, null = sizes[places], null[places]
+        fit = _covers.regression(sizes, null)
+    return _dust.spread(cells, observed, sizes, null, fit.weights)
 
 
 def _region(planes: Planes, sizes: Array) -> Array:
