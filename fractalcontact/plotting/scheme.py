@@ -129,12 +129,12 @@ def _cut(ax: Axes, lower: xr.DataArray, facing: xr.DataArray, slide: Slide, lift
     _style.dress(ax)
     ax.grid(False)
     left, right, bottom, top = extent_of(slide.block)
-    centre = (left + right) / 2, (bottom + top) / 2
+    # through the middle cell of the block, so that along x and y the cut meets centres of cells
+    centre = np.array([float(slide.block[dim][slide.block.sizes[dim] // 2]) for dim in ("x", "y")])
     place, ground = line_through(lower, centre, slide.unit)
     _, own = line_through(facing, centre, slide.unit)
-    halves = np.array([right - left, top - bottom]) / 2
-    half = float(np.min(halves / np.maximum(np.abs(slide.unit), 1e-9)))
-    inside = np.abs(place) <= half
+    x, y = centre[:, None] + slide.unit[:, None] * place
+    inside = (x > left) & (x < right) & (y > bottom) & (y < top)
     own, moved = own[inside], place[inside] + slide.shear
     span = max(float(np.nanmax(ground) - np.nanmin(ground)), 1e-9 * float(np.ptp(place)))
     floor, roof = float(np.nanmin(ground)) - 0.5 * span, float(np.nanmax(own)) + slide.lift + 0.5 * span
@@ -154,7 +154,7 @@ def _cut(ax: Axes, lower: xr.DataArray, facing: xr.DataArray, slide: Slide, lift
         color="white",
     )
     ax.text(0.02, 0.04, "face", transform=ax.transAxes)
-    _measure(ax, (along, up), slide, lift_name, (-half, float(own[0]), roof + 0.14 * span))
+    _measure(ax, (along, up), slide, lift_name, (float(place[inside][0]), float(own[0]), roof + 0.14 * span))
     ax.set_xlabel(along.label("position along the slide"))
     ax.set_ylabel(up.label("height"))
 
@@ -182,7 +182,7 @@ def _measure(
                     textcoords="offset points", color=_style.BLUE, ha="right", va="center")  # fmt: skip
 
 
-def line_through(plane: xr.DataArray, centre: tuple[float, float], unit: Array) -> tuple[Array, Array]:
+def line_through(plane: xr.DataArray, centre: Array, unit: Array) -> tuple[Array, Array]:
     """Return positions (m, from the centre) and heights of the cells along a line through a plane."""
     axes = [np.asarray(plane[dim].values, dtype=float) for dim in ("x", "y")]
     steps = [float(axis[-1] - axis[0]) / (axis.size - 1) for axis in axes]
