@@ -12,5 +12,6 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "counting": ["box_counts", "box_dimension"],
         "gliding": ["lacunarity"],
+        "labelling": ["islands"],
     },
 )

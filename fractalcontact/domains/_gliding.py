@@ -33,10 +33,10 @@ def _glided(planes: Planes, plane: int, size: int) -> float:
     squares = np.zeros(rows, np.int64 if size**4 * columns <= EXACT else np.float64)
     valid = planes.valid_of(plane)
     if valid is None:
-        kernels.glide(planes.cells[plane], size, wrap_y, wrap_x, masses, squares)
+        kernels.glide(planes.cells[plane], size, wrap_x, masses, squares)
         return _ratio(rows * columns, masses, squares)
     places = np.zeros(rows, np.int64)
-    kernels.glide_observed(planes.cells[plane], valid, size, wrap_y, wrap_x, masses, squares, places)
+    kernels.glide_observed(planes.cells[plane], valid, size, wrap_x, masses, squares, places)
     return _ratio(int(places.sum()), masses, squares)
 
 
@@ -46,8 +46,8 @@ def _ratio(places: int, masses: Array, squares: Array) -> float:
     if places == 0 or mass == 0:
         return float("nan")
     if squares.dtype == np.float64:
-        return places * float(squares.sum()) / float(mass) ** 2
-    return int(places * sum(squares.tolist())) / mass**2
+        return float(places * squares.sum() / float(mass) ** 2)
+    return float(places * sum(squares.tolist()) / mass**2)
 
 
 def _from_pairs(cells: Array, sizes: Array) -> Array:
@@ -73,7 +73,7 @@ def _whole(places: int, square: np.generic, mass: int) -> float:
 
 
 def dust(coverage: Array, sizes: Array) -> Array:
-    """Return 1 + (1 - p) / (p r^2), the lacunarity of independent cells of coverage p, shape (planes, sizes)."""
+    """Return the lacunarity of independent cells of coverage p, 1 + (1 - p) / (p r^2); (planes, sizes)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(coverage > 0, (1.0 - coverage) / coverage, np.nan)
     return np.asarray(1.0 + excess[:, None] / sizes.astype(float) ** 2)

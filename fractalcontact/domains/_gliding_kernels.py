@@ -30,7 +30,7 @@ def _first_band(mask: Array, size: int) -> Array:
 
 
 @kernel
-def glide(mask: Array, size: int, wrap_y: bool, wrap_x: bool, masses: Array, squares: Array) -> None:
+def glide(mask: Array, size: int, wrap_x: bool, masses: Array, squares: Array) -> None:
     """Add up the mass in the box and its square along every row of positions.
 
     `masses` (int64) and `squares` (int64, or float64 where it could overflow) hold one value per row of
@@ -65,7 +65,6 @@ def glide_observed(
     mask: Array,
     valid: Array,
     size: int,
-    wrap_y: bool,
     wrap_x: bool,
     masses: Array,
     squares: Array,
