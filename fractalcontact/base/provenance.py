@@ -73,7 +73,7 @@ def stamp(
             "history": f"{now} {call}",
             "references": references,
             "comment": "x and y are positions in the plane of the surface, in metres, at cell centres",
-            "provenance": json.dumps(entry, sort_keys=True),
+            "provenance": json.dumps(entry),
         }
     )
     return data

@@ -236,5 +236,5 @@ def _write(tree: xr.DataTree, scene: Scene, folder: Path, record: dict[str, dict
         plotting.draw(tree, folder)
         record["figures"] = {"run_time": time.perf_counter() - start, "origin": "computed"}
         entry = json.loads(tree.attrs["provenance"])
-        tree.attrs["provenance"] = json.dumps(entry | {"stages": provenance.plain(record)}, sort_keys=True)
+        tree.attrs["provenance"] = json.dumps(entry | {"stages": provenance.plain(record)})
     netcdf.save(tree, folder / RESULT)

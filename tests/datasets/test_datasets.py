@@ -1,0 +1,63 @@
+"""The shipped surfaces are what their scripts make, and what they are said to be."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.shipped import datasets_folder
+
+
+@pytest.fixture(scope="module")
+def script():
+    path = datasets_folder() / "make_concrete_crack.py"
+    spec = importlib.util.spec_from_file_location("make_concrete_crack", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_crack_is_what_its_script_makes(script):
+    shipped, made = fc.surfaces.sample("concrete_crack"), script.crack()
+    steps = np.abs(np.rint(shipped.values / script.PRECISION) - np.rint(made.values / script.PRECISION))
+    # another transform library may round a height that lies halfway the other way
+    assert steps.max() <= 1
+    assert (steps > 0).mean() < 1e-3
+    np.testing.assert_allclose(shipped.x, made.x, rtol=1e-12)
+
+
+def test_the_crack_is_as_the_paper_tells():
+    face = fc.surfaces.sample("concrete_crack")
+    assert face.shape == (512, 512)
+    np.testing.assert_allclose(np.diff(face.x), 80e-6)
+    assert "period" not in face.x.attrs
+    dimension = fc.dimensions.estimate(face, ["default", "variogram"])["fractal_dimension"]
+    assert ((dimension > 2.15) & (dimension < 2.29)).all()
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=0.02)
+    assert crack.layout.cells == (250, 250)
+    rise = fc.joints.dilatancy(crack, shear=[0.0, 0.8e-3, 5e-3, 10e-3])["rigid_dilatancy"]
+    plateau, slope = rise.sel(direction=["W", "N"]), rise.sel(direction=["E", "S"])
+    assert (rise.isel(shear=0) == 0).all()
+    assert (rise.isel(shear=1) > 0.6e-3).all()
+    assert (plateau.isel(shear=-1) < 1.2 * plateau.isel(shear=1)).all()
+    assert (slope.isel(shear=-1) > 1.2 * slope.isel(shear=1)).all()
+
+
+def test_the_land_surface_lies_as_on_the_map():
+    land = fc.surfaces.sample("jacksboro_fault_dem")
+    assert land.shape == (344, 403)
+    # length of one degree at 36.6 N: 110.96 km of latitude, 89.5 km of longitude (tables of the ellipsoid)
+    np.testing.assert_allclose(float(land.y[1] - land.y[0]), 110.96e3 * 0.00083333, rtol=1e-3)
+    np.testing.assert_allclose(float(land.x[1] - land.x[0]), 89.5e3 * 0.00083333, rtol=2e-3)
+    from matplotlib import cbook
+
+    with cbook.get_sample_data("jacksboro_fault_dem.npz") as file:
+        north = file["elevation"][0]
+    np.testing.assert_array_equal(land.isel(y=-1), north)
+    assert (land == land.round()).all()
+
+
+def test_an_unknown_sample_is_refused():
+    with pytest.raises(ValueError, match="concrete_crack"):
+        fc.surfaces.sample("moon")
