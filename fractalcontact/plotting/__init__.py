@@ -25,6 +25,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "scheme": ["sliding_scheme"],
         "lacunar": ["box_dimension", "lacunarity"],
         "leakage": ["hydraulic_aperture"],
+        "accuracy_curves": ["error_against_time"],
         "paper": ["paper_figure"],
         "drawing": ["draw"],
     },

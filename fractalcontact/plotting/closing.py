@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._reading import nearest, result_of, table
-from fractalcontact.plotting._units import amount, axis_label, name_of, scale_of, units_of
+from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,39 +151,9 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
 
 def shear_key(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
     """Name the curves by their shear; a single curve without a shear needs no name."""
-    title, texts = shear_entries(data)
+    title, texts = shear_words(data)
     if texts:
         _style.key(ax, title, texts, colours)
-
-
-def shear_entries(data: xr.Dataset) -> tuple[str, list[str]]:
-    """Return the title of a key of shears, and a text for each; none where no shear is known."""
-    if "shear" not in data.coords:
-        return "", []
-    scale = scale_of(data["shear"])
-    return scale.label("shear $v$"), [f"{v:.4g}" for v in scale(np.atleast_1d(data["shear"].values))]
-
-
-def load_words(data: xr.Dataset, steps: int) -> tuple[str, list[str]]:
-    """Return what the steps of a path are told apart by, and a text for each.
-
-    That is the force or pressure where it is the same for all curves, else the number of the step.
-    """
-    for name in ("normal_force", "nominal_pressure", "closure"):
-        if name in data.variables and data[name].dims in (("step",), ()):
-            values = np.atleast_1d(data[name].values)
-            scale = scale_of(data[name])
-            return scale.label(name_of(data[name])), [f"{v:.3g}" for v in scale(values)]
-    return "step", [str(i) for i in range(steps)]
-
-
-def load_text(data: xr.Dataset, *, short: bool = True) -> str:
-    """Return the load of one step, `F = 30 kN` for example."""
-    for name, symbol in (("normal_force", "$F$"), ("nominal_pressure", "$p$"), ("closure", "$w$")):
-        if name in data.variables and data[name].ndim == 0:
-            text = amount(float(data[name]), units_of(data[name]))
-            return f"{symbol} = {text}" if short else f"{name_of(data[name])} = {text}"
-    return ""
 
 
 def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._reading import as_dataset, extent_of, nearest, result_of
-from fractalcontact.plotting._units import amount, axis_label, scale_of, units_of
-from fractalcontact.plotting.closing import load_text
+from fractalcontact.plotting._paths import chosen_path, load_text, shear_text
+from fractalcontact.plotting._reading import as_dataset, extent_of, result_of
+from fractalcontact.plotting._units import axis_label, scale_of
 from fractalcontact.plotting.relief import name_plane, plane_scale
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def contact_domains(
     normal_force : float, optional
         Force (N) at which the shears are shown; the nearest step is taken.
     panels : int
-        Greatest number of maps, evenly spread along the path, its end included.
+        Greatest number of maps: along the load evenly spread over the closure, its end included.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -54,106 +54,50 @@ def contact_domains(
     ------
     InvalidInput
         There is no state, or both a path of shear and one of load and neither is chosen.
-
-    Notes
-    -----
-    The number in each title is the fraction of the cells in contact.
     """
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
-    maps = path_of_maps(data, shear, normal_force, panels)
-    columns = min(len(maps), COLUMNS)
+    path, dim = chosen_path(data, shear, normal_force, panels, "contact_domains")
+    count, columns = path.sizes[dim], min(path.sizes[dim], COLUMNS)
     width = _style.WIDTH * columns / COLUMNS
-    sheet = _style.sheet(figure, (max(width, 3.0), maps_height(maps, width)))
-    axes = sheet.subplots(-(-len(maps) // columns), columns, squeeze=False).ravel()
-    yielded = False
+    sheet = _style.sheet(figure, (max(width, 3.0), maps_height(path, count, width)))
+    axes = sheet.subplots(-(-count // columns), columns, squeeze=False).ravel()
+    names = [_name(path.isel({dim: number}), data, dim) for number in range(count)]
     for number, ax in enumerate(axes):
-        if number >= len(maps):
+        if number >= count:
             ax.set_axis_off()
             continue
-        one = maps[number]
-        flags = np.asarray(one["state"].transpose("y", "x").values)
-        yielded |= bool((flags > 1).any())
-        extent, length = extent_of(one["state"]), plane_scale(one["state"])
-        _maps.state(ax, flags, extent, length)
-        _maps.framed(ax)
-        ax.set_title(map_title(number if len(maps) > 1 else None, one, flags), fontsize=8.5)
-        if number == (len(maps) - 1) // columns * columns and "x" in one["state"].coords:
-            _maps.ruler(ax, extent, length)
-    if yielded:
+        _state_map(ax, path["state"].isel({dim: number}), number if count > 1 else None, names[number])
+    if "x" in path.coords:
+        extent, length = extent_of(path["state"]), plane_scale(path["state"])
+        _maps.ruler(axes[(count - 1) // columns * columns], extent, length)
+    common = shear_text(path, data) if dim == "step" else load_text(path, data)
+    if common:
+        sheet.suptitle(common, x=0.01, ha="left", fontsize=9)
+    if bool((path["state"] > 1).any()):
         _state_key(sheet)
     return _style.root(sheet)
 
 
-def maps_height(maps: list[xr.Dataset], width: float) -> float:
-    """Return the height (inches) of a sheet of maps on paper of the given width."""
-    columns = min(len(maps), COLUMNS)
-    left, right, bottom, top = extent_of(maps[0]["state"])
-    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
-    return 0.2 + -(-len(maps) // columns) * (shape * (width / columns - 0.1) + 0.26)
-
-
-def path_of_maps(
-    data: xr.Dataset, shear: float | None, normal_force: float | None, panels: int
-) -> list[xr.Dataset]:
-    """Return the single maps to show, along the one path that was chosen."""
-    with Problems("fc.plotting.contact_domains") as problems:
-        problems.integer("panels", panels, at_least=1)
-        if data.sizes["shear"] > 1 and data.sizes["step"] > 1:
-            problems.exactly_one(shear=shear, normal_force=normal_force)
-        if normal_force is not None:
-            problems.require(
-                "normal_force" in data.variables, "result", "the variable 'normal_force'", "none"
-            )
-    if normal_force is not None:
-        every = [one.isel(step=nearest_step(one, normal_force)) for one in singles(data, "shear")]
-        return [every[i] for i in _style.chosen(len(every), panels)]
-    if data.sizes["step"] == 1 and shear is None:
-        every = singles(data.isel(step=0), "shear")
-        return [every[i] for i in _style.chosen(len(every), panels)]
-    row = 0 if shear is None or data.sizes["shear"] == 1 else nearest(data["shear"], shear)
-    path = data.isel(shear=row)
-    return [path.isel(step=i) for i in loaded_steps(path, panels)]
-
-
-def singles(data: xr.Dataset, dim: str) -> list[xr.Dataset]:
-    """Return the slices of `data` along a dim."""
-    return [data.isel({dim: i}) for i in range(data.sizes[dim])]
-
-
-def nearest_step(path: xr.Dataset, normal_force: float) -> int:
-    """Return the step of one path whose force is nearest."""
-    force = np.atleast_1d(path["normal_force"].values)
-    return nearest(force, normal_force) if force.size == path.sizes["step"] else 0
-
-
-def loaded_steps(path: xr.Dataset, panels: int) -> list[int]:
-    """Return the steps to show of one path: loaded ones, spread evenly over the closure."""
-    steps = np.arange(path.sizes["step"])
-    if "normal_force" in path.variables and path["normal_force"].dims == ("step",):
-        loaded = steps[np.asarray(path["normal_force"].values) > 0]
-        steps = loaded if loaded.size else steps
-    even = [int(steps[i]) for i in _style.chosen(len(steps), panels)]
-    if len(steps) <= panels or "closure" not in path.variables or path["closure"].dims != ("step",):
-        return even
-    closed = np.asarray(path["closure"].values, dtype=float)[steps]
-    if not (np.isfinite(closed).all() and (np.diff(closed) > 0).all()):
-        return even
-    wanted = np.linspace(closed[0], closed[-1], panels)
-    return sorted({int(steps[nearest(closed, w)]) for w in wanted})
-
-
-def map_title(number: int | None, one: xr.Dataset, flags: Any) -> str:
-    """Return letter, shear, load and contact fraction of one map."""
-    parts = []
-    if "shear" in one.coords:
-        parts.append(f"$v$ = {amount(float(one['shear']), units_of(one['shear']))}")
-    load = load_text(one)
-    if load:
-        parts.append(load)
-    fraction = float(np.mean(np.asarray(flags) > 0)) if np.size(flags) else 0.0
-    parts.append(f"{100 * fraction:.2g} %")
+def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> None:
+    flags = np.asarray(plane.transpose("y", "x").values)
+    _maps.state(ax, flags, extent_of(plane), plane_scale(plane))
+    _maps.framed(ax)
     head = "" if number is None else rf"$\bf{{{_style.letter(number)}}}$  "
-    return head + ",  ".join(parts)
+    touching = 100 * float(np.mean(flags > 0)) if flags.size else 0.0
+    ax.set_title(f"{head}{name}{',  ' if name else ''}{touching:.2g} % in contact", fontsize=8.5)
+
+
+def _name(one: xr.Dataset, data: xr.Dataset, dim: str) -> str:
+    """Return what tells a map from its neighbours."""
+    return load_text(one, data) if dim == "step" else shear_text(one, data)
+
+
+def maps_height(path: xr.Dataset, count: int, width: float) -> float:
+    """Return the height (inches) of a sheet of maps on paper of the given width."""
+    columns = min(count, COLUMNS)
+    left, right, bottom, top = extent_of(path["state"])
+    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
+    return 0.5 + -(-count // columns) * (shape * (width / columns - 0.15) + 0.28)
 
 
 @_style.styled

@@ -7,20 +7,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._reading import nearest, result_of, table
+from fractalcontact.plotting._paths import (
+    at_force,
+    at_shear,
+    load_of,
+    load_text,
+    load_words,
+    loaded_steps,
+    shear_text,
+    shear_words,
+)
+from fractalcontact.plotting._reading import result_of, table
 from fractalcontact.plotting._units import axis_label, name_of, scale_for, scale_of
-from fractalcontact.plotting.closing import load_text, load_words, shear_entries
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-LOADS = ("normal_force", "nominal_pressure", "closure", "coverage")
 SIZES = ("box_length", "box_size")
 DUST: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}
 WIDE = 30.0  # ratio of the numbers on an axis beyond which it is logarithmic
 FEW = 15  # points of a curve that are shown as points
+CURVES = 6  # of a family whose members cross their own dust
+UNSURE = 0.5  # width of an interval beyond which a point is drawn open
 
 
 @_style.styled
@@ -29,7 +39,8 @@ def box_dimension(
 ) -> Figure:
     """Draw the box dimension of the contact domain against load, and against shear under one force.
 
-    The bands are the 95 % intervals. The broken lines are a random dust of equal coverage: the number that
+    The bands are the 95 % intervals, drawn where the curve stands alone; a point whose interval is wider
+    than 0.5, or that has none, is open. The broken lines are a random dust of equal coverage: the number that
     contacts scattered without any structure would have.
 
     Parameters
@@ -52,24 +63,42 @@ def box_dimension(
     """
     data = result_of(result, "box_dimension", ("box_dimension",), ("shear", "step"))
     sheet, axes = _panels(figure, data)
+    colours = _style.family(data.sizes["shear"])
     for ax, dim in axes:
         if dim == "step":
-            colours = _style.family(data.sizes["shear"])
             for i, colour in enumerate(colours):
-                _dimension_curve(ax, data.isel(shear=i), dim, colour)
+                _dimension_curve(ax, data.isel(shear=i), dim, colour, band=len(colours) == 1)
         else:
-            one, colours = at_force(data, normal_force), [_style.BLACK]
-            _dimension_curve(ax, one, dim, colours[0])
-            ax.set_title(load_text(one))
+            one = at_force(data, normal_force)
+            _dimension_curve(ax, one, dim, _style.BLACK, band=True)
+            ax.set_title(load_text(one, data))
         ax.set_ylim(-0.05, 2.05)
     axes[0][0].set_ylabel(name_of(data["box_dimension"]))
-    notes = [_style.line_entry("contact domain")]
-    if "ci_low" in data:
-        notes.append(_band_entry("95 % interval"))
+    last = axes[-1][0]
+    if data.sizes["step"] > 1:
+        title, texts = shear_words(data)
+        _style.key(last, title, texts, colours)
+    _style.beside(last, _dimension_notes(data), low=data.sizes["step"] > 1)
+    return _style.root(sheet)
+
+
+def _dimension_notes(data: xr.Dataset) -> list[Any]:
+    """Return the entries of the key that tell the kinds of lines and points."""
+    from matplotlib.patches import Patch
+
+    notes = [_style.line_entry("contact domain", marker="o")]
+    if "ci_low" in data and "ci_high" in data:
+        notes.append(Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label="95 % interval"))
+        if bool(_unsure(data).any()):
+            label = f"interval wider\nthan {UNSURE:g}, or none"
+            notes.append(_style.line_entry(label, ls="", marker="o", mfc="white"))
     if "dust_dimension" in data:
         notes.append(_style.line_entry("random dust of\nequal coverage", **DUST))
-    _keys(axes, data, notes)
-    return _style.root(sheet)
+    return notes
+
+
+def _unsure(data: xr.Dataset) -> xr.DataArray:
+    return ~(data["ci_high"] - data["ci_low"] <= UNSURE) & data["box_dimension"].notnull()
 
 
 @_style.styled
@@ -82,7 +111,7 @@ def lacunarity(
 ) -> Figure:
     """Draw the gliding-box lacunarity against the size of the box, at growing load and at growing shear.
 
-    The broken lines are a random dust of equal coverage.
+    The broken lines are a random dust of equal coverage. Of more than six curves some are drawn.
 
     Parameters
     ----------
@@ -108,21 +137,21 @@ def lacunarity(
     sheet, axes = _panels(figure, data)
     for ax, dim in axes:
         if dim == "step":
-            row = data.sizes["shear"] // 2 if shear is None else nearest(data["shear"], shear)
-            path = data.isel(shear=row)
-            title, texts = load_words(path, path.sizes["step"])
-            ax.set_title(shear_text(path))
+            path = at_shear(data, shear)
+            path = path.isel(step=loaded_steps(path, CURVES))
+            ax.set_title(shear_text(path, data))
+            title, texts = load_words(path)
         else:
             path = at_force(data, normal_force)
-            title, texts = shear_entries(path)
-            ax.set_title(load_text(path))
+            path = path.isel(shear=_style.chosen(path.sizes["shear"], CURVES))
+            ax.set_title(load_text(path, data))
+            title, texts = shear_words(path)
         colours = _style.family(path.sizes[dim])
         _lacunarity_curves(ax, path, dim, colours)
-        shown = _style.chosen(len(texts), _style.LONGEST_KEY)
-        entries = [_style.line_entry(texts[i], color=colours[i]) for i in shown]
-        if ax is axes[-1][0] and "dust_lacunarity" in data:
-            entries.append(_style.line_entry("random dust of\nequal coverage", **DUST))
-        _style.beside(ax, entries, title=title)
+        _style.key(ax, title, texts, colours)
+    if "dust_lacunarity" in data:
+        note = _style.line_entry("random dust of\nequal coverage", **DUST)
+        _style.beside(axes[-1][0], [note], low=True)
     return _style.root(sheet)
 
 
@@ -136,16 +165,23 @@ def _panels(figure: Any, data: xr.Dataset) -> tuple[Any, list[tuple[Axes, str]]]
     return sheet, list(zip(axes, dims, strict=True))
 
 
-def _dimension_curve(ax: Axes, one: xr.Dataset, dim: str, colour: Any) -> None:
-    against = "shear" if dim == "shear" else next((name for name in LOADS if name in one.variables), dim)
+def _dimension_curve(ax: Axes, one: xr.Dataset, dim: str, colour: Any, *, band: bool) -> None:
+    load = load_of(one) or ("coverage" if "coverage" in one else dim)
+    against = "shear" if dim == "shear" else load
     values = table(one, "box_dimension", (dim,))
     known = against in one.variables
     places = table(one, against, (dim,)) if known else np.arange(values.size, dtype=float)
     scale = scale_of(one[against]) if known else scale_for("", 1.0)
-    ax.plot(scale(places), values, color=colour, marker="o" if values.size <= FEW else "")
+    sure = np.full(values.shape, True)
     if "ci_low" in one and "ci_high" in one:
         low, high = (table(one, name, (dim,)) for name in ("ci_low", "ci_high"))
-        ax.fill_between(scale(places), low, high, color=colour, alpha=0.14, lw=0)
+        sure = high - low <= UNSURE
+        if band:
+            ax.fill_between(scale(places), low, high, color=colour, alpha=0.14, lw=0)
+    ax.plot(scale(places), values, color=colour)
+    if values.size <= FEW:
+        ax.plot(scale(places)[sure], values[sure], "o", color=colour)
+        ax.plot(scale(places)[~sure], values[~sure], "o", mec=colour, mfc="white")
     if "dust_dimension" in one:
         ax.plot(scale(places), table(one, "dust_dimension", (dim,)), color=colour, **DUST)
     wide_axis(ax, places)
@@ -172,28 +208,6 @@ def _lacunarity_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any])
         _style.say(ax, "no contact")
 
 
-def at_force(data: xr.Dataset, normal_force: float | None) -> xr.Dataset:
-    """Return, for each shear, the step whose force is nearest to the wanted one (None: the last step)."""
-    import xarray as xr
-
-    if normal_force is None or "normal_force" not in data.variables:
-        return data.isel(step=-1)
-    forces = table(data, "normal_force", ("shear", "step"))
-    steps = [nearest(row, normal_force) for row in forces]
-    if len(set(steps)) == 1:
-        return data.isel(step=steps[0])
-    return data.isel(step=xr.DataArray(steps, dims="shear"))
-
-
-def shear_text(one: xr.Dataset) -> str:
-    """Return the shear of one path, `v = 0.4 mm` for example."""
-    from fractalcontact.plotting._units import amount, units_of
-
-    if "shear" not in one.coords or one["shear"].ndim:
-        return ""
-    return f"$v$ = {amount(float(one['shear']), units_of(one['shear']))}"
-
-
 def wide_axis(ax: Axes, places: Any) -> None:
     """Make the x axis logarithmic where positive numbers spread widely over it."""
     shown = np.asarray(places, dtype=float)
@@ -201,22 +215,3 @@ def wide_axis(ax: Axes, places: Any) -> None:
     if shown.size and shown.min() > 0 and shown.max() > WIDE * shown.min():
         ax.set_xscale("log")
         _style.plain_ticks(ax)
-
-
-def _keys(axes: list[tuple[Axes, str]], data: xr.Dataset, notes: list[Any]) -> None:
-    title, texts = shear_entries(data)
-    entries = list(notes)
-    if texts and data.sizes["step"] > 1:
-        colours = _style.family(len(texts))
-        shown = _style.chosen(len(texts), _style.LONGEST_KEY)
-        curves = [_style.line_entry(texts[i], color=colours[i]) for i in shown]
-        _style.beside(axes[-1][0], curves, title=title)
-        _style.beside(axes[-1][0], entries, low=True)
-    else:
-        _style.beside(axes[-1][0], entries)
-
-
-def _band_entry(label: str) -> Any:
-    from matplotlib.patches import Patch
-
-    return Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label=label)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._paths import load_of, shear_words
 from fractalcontact.plotting._reading import result_of, table, words
 from fractalcontact.plotting._units import axis_label, scale_for, scale_of
-from fractalcontact.plotting.closing import shear_entries
-from fractalcontact.plotting.lacunar import FEW, LOADS, wide_axis
+from fractalcontact.plotting.lacunar import FEW, wide_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
     data = result_of(result, "hydraulic_aperture", ("hydraulic_aperture",), ("shear", "step", "axis"))
     by_shear = data.sizes["step"] == 1 and "shear" in data.coords
     over, dim = ("step", "shear") if by_shear else ("shear", "step")
-    against = "shear" if by_shear else next((name for name in LOADS if name in data.variables), "step")
+    against = "shear" if by_shear else load_of(data) or "step"
     aperture = table(data, "hydraulic_aperture", (over, dim, "axis"))
     known = against in data.variables
     places = (
@@ -66,7 +66,7 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
         ax.set_ylim(bottom=0)
     ax.set_xlabel(axis_label(data[against], along) if known else against)
     ax.set_ylabel(axis_label(data["hydraulic_aperture"], across))
-    title, texts = ("", []) if by_shear else shear_entries(data)
+    title, texts = ("", []) if by_shear else shear_words(data)
     shown = _style.chosen(len(texts), _style.LONGEST_KEY)
     if texts:
         _style.beside(ax, [_style.line_entry(texts[i], color=colours[i]) for i in shown], title=title)

@@ -8,10 +8,11 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._paths import at_shear, chosen_path, loaded_steps
 from fractalcontact.plotting._reading import extent_of, nearest, result_of, words
 from fractalcontact.plotting._units import amount
 from fractalcontact.plotting.closing import closure_laws, contact_area
-from fractalcontact.plotting.domain_maps import contact_domains, loaded_steps, maps_height, path_of_maps
+from fractalcontact.plotting.domain_maps import contact_domains, maps_height
 from fractalcontact.plotting.relief import face
 from fractalcontact.plotting.scheme import slide_of, sliding_scheme
 from fractalcontact.plotting.sliding import direction_word, elastic_dilatancy, first_part, rigid_dilatancy
@@ -111,8 +112,7 @@ def _closure(tree: xr.DataTree) -> Figure:
     sheet = _style.sheet(None, (9.4, 3.3))
     left, right = sheet.subplots(1, 2)
     shear = shown_shear(data)
-    row = 0 if shear is None else nearest(data["shear"], shear)
-    marked = loaded_steps(data.isel(shear=row), PANELS) if "state" in data else ()
+    marked = loaded_steps(at_shear(data, shear), PANELS) if "state" in data else ()
     closure_laws(data, shear=shear, marked=marked, key=False, ax=left)
     contact_area(data, ax=right)
     left.set_title(r"$\bf{a}$  closure laws")
@@ -131,10 +131,11 @@ def _dilatancy(tree: xr.DataTree) -> Figure:
     closure = group(tree, "joints/closure")
     force = _last_force(closure if elastic is None else elastic)
     maps = None if closure is None or "state" not in closure or force is None else closure
-    width, top, below = 9.4 if len(curves) == 2 else _style.PANEL[0], 3.1, 0.0
+    width, top, below = 9.4 if len(curves) == 2 else _style.WIDTH, 3.1, 0.0
     if maps is not None:
         data = result_of(maps, "paper_figure", ("state",), ("shear", "step"))
-        below = maps_height(path_of_maps(data, None, force, PANELS), width)
+        path, dim = chosen_path(data, None, force, PANELS, "paper_figure")
+        below = maps_height(path, path.sizes[dim], width)
     sheet = _style.sheet(None, (width, top + below))
     parts = sheet.subfigures(2, 1, height_ratios=(top, below)) if maps is not None else [sheet]
     axes = parts[0].subplots(1, len(curves), squeeze=False)[0]

@@ -176,10 +176,14 @@ def _measure(
                     textcoords="offset points", color=_style.RED, ha="center", va="bottom")  # fmt: skip
     if slide.lift > 0:
         low, high = float(up(foot)), float(up(foot + slide.lift))
+        wide = slide.shear > 0.12 * np.ptp(along.factor * np.array(ax.get_xlim()))
         ax.plot([start, end], [high, high], color=_style.BLUE, lw=0.7, ls=":")
         ax.annotate("", (start, low), (start, high), arrowprops=look | {"color": _style.BLUE})
-        ax.annotate(f"{lift_name} = {amount(slide.lift, 'm')}", (start, (low + high) / 2), (-6, 0),
-                    textcoords="offset points", color=_style.BLUE, ha="right", va="center")  # fmt: skip
+        side: dict[str, Any] = (
+            {"xytext": (6, 0), "ha": "left"} if wide else {"xytext": (-6, 0), "ha": "right"}
+        )
+        ax.annotate(f"{lift_name} = {amount(slide.lift, 'm')}", (start, (low + high) / 2), **side,
+                    textcoords="offset points", color=_style.BLUE, va="center")  # fmt: skip
 
 
 def line_through(plane: xr.DataArray, centre: Array, unit: Array) -> tuple[Array, Array]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._paths import load_words
 from fractalcontact.plotting._reading import as_dataset, nearest, result_of, table, words
 from fractalcontact.plotting._units import axis_label, scale_for, scale_of
-from fractalcontact.plotting.closing import load_words, mark
+from fractalcontact.plotting.closing import mark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,7 +128,7 @@ def elastic_dilatancy(
         at = nearest(shear, place)
         if np.isclose(shear[at], place, rtol=1e-6, atol=0.0):
             mark(ax, along(shear[at : at + 1]), across(opening[at : at + 1, -1]), colours[-1], number)
-    title, texts = load_words(data, opening.shape[1])
+    title, texts = load_words(data)
     entries += [_style.line_entry(text, color=colour) for text, colour in zip(texts, colours, strict=True)]
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel(across.label(r"dilatancy $\delta$"))
@@ -202,7 +203,7 @@ def curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any])
 
 def _friction_key(data: xr.Dataset, over: str) -> tuple[list[Any], str]:
     if over == "step":
-        title, texts = load_words(data, data.sizes["step"])
+        title, texts = load_words(data)
         colours = _style.family(len(texts))
         return [_style.line_entry(t, color=c) for t, c in zip(texts, colours, strict=True)], title
     names = words(data["direction"]) if "direction" in data.coords else [""]

@@ -203,6 +203,20 @@ def transmissivity(closed):
     return label(xr.Dataset({"hydraulic_aperture": (("shear", "step", "axis"), aperture)}, coords=coords))
 
 
+def accuracy():
+    """Return two parts of error against run time; one method stops early."""
+    import xarray as xr
+
+    knob = np.array([8.0, 16.0, 32.0, 64.0])
+    error = np.array([1 / knob, 4 / knob**2])
+    error[0, 3] = np.nan
+    dims = ("method", "knob")
+    data = {"error": (dims, error), "run_time": (dims, 1e-6 * knob**2 * np.array([[1.0], [3.0]]))}
+    part = label(xr.Dataset(data, coords={"method": ["plain", "fast, disc"], "knob": knob}))
+    part["error"].attrs["error"] = "relative error of the force"
+    return xr.DataTree.from_dict({"/contact": part, "/joints": part * 1})
+
+
 def study():
     """Return a whole study as a tree, with the groups that a scene gives."""
     import xarray as xr

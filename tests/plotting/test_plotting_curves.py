@@ -113,6 +113,7 @@ def test_box_dimension_shows_the_dust_and_the_interval(made, closed):
         for v in result.shear:
             assert holds(lines(by_load), result.normal_force, result[name].sel(shear=v))
         assert holds(lines(by_shear), result.shear, result[name].isel(step=-1))
+    assert not by_load.collections  # six bands on each other would tell nothing
     low, high = (result[name].isel(step=-1) for name in ("ci_low", "ci_high"))
     band = by_shear.collections[0].get_paths()[0].vertices[:, 1]
     assert band.min() == pytest.approx(float(low.min()))
@@ -124,6 +125,30 @@ def test_box_dimension_at_a_chosen_force(made, closed):
     ax = plotting.box_dimension(result, normal_force=1e3).axes[1]
     assert np.allclose(ax.lines[0].get_ydata(), result.box_dimension.sel(step=2))
     assert "1 kN" in ax.get_title(loc="left")
+
+
+def test_box_dimension_with_a_wide_interval_or_none_is_an_open_point(made, closed):
+    result = made.box_dimension(closed).isel(shear=0, step=slice(1, None)).copy(deep=True)
+    result["ci_high"].values[0] += 0.6
+    result["ci_low"].values[1] = np.nan
+    (ax,) = plotting.box_dimension(result).axes
+    _, filled, hollow, _ = ax.lines
+    assert hollow.get_markerfacecolor() == "white"
+    assert np.array_equal(hollow.get_ydata(), result.box_dimension.values[:2])
+    assert np.array_equal(filled.get_ydata(), result.box_dimension.values[2:])
+    assert len(ax.collections) == 1
+
+
+def test_error_against_time_shows_what_was_measured(made):
+    measured = made.accuracy()
+    axes = plotting.error_against_time(measured).axes
+    for ax, (name, part) in zip(axes, measured.children.items(), strict=True):
+        assert ax.get_title(loc="left").startswith(name)
+        seconds = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", ax.get_xlabel()).group(1)]
+        for line, method in zip(ax.lines, part.method.values, strict=True):
+            one = part.to_dataset().sel(method=method).dropna("knob")
+            assert np.asarray(line.get_xdata()) * seconds == pytest.approx(one.run_time.values)
+            assert np.array_equal(line.get_ydata(), one.error.values)
 
 
 def test_lacunarity_shows_every_step_and_its_dust(made, closed):

@@ -36,7 +36,9 @@ def test_maps_at_growing_load_are_those_of_the_chosen_shear(made):
     for ax, step in zip(axes, steps, strict=True):
         one = closed.sel(shear=1.6e-3).isel(step=step)
         assert np.array_equal(np.all(colours(ax) == CONTACT, axis=-1), one.state.values == 1)
-        assert f"{100 * float(one.state.mean()):.2g} %" in ax.get_title(loc="left")
+        assert f"{100 * float(one.state.mean()):.2g} % in contact" in ax.get_title(loc="left")
+        assert f"{float(one.normal_force) / 1e3:g} kN" in ax.get_title(loc="left")
+    assert "1.6 mm" in axes[0].figure.get_suptitle()
 
 
 def test_maps_at_growing_shear_are_those_of_the_chosen_force(made):
@@ -45,7 +47,8 @@ def test_maps_at_growing_shear_are_those_of_the_chosen_force(made):
     assert len(axes) == 3
     for ax, v in zip(axes, closed.shear, strict=True):
         assert np.array_equal(np.all(colours(ax) == CONTACT, axis=-1), closed.state.sel(shear=v, step=3) == 1)
-        assert "10 kN" in ax.get_title(loc="left")
+        assert f"{float(v) * 1e3:g} mm" in ax.get_title(loc="left")
+    assert "10 kN" in axes[0].figure.get_suptitle()
 
 
 def test_one_of_shear_and_force_must_be_chosen(made):
