@@ -146,7 +146,7 @@ def test_error_against_time_shows_what_was_measured(made):
         assert ax.get_title(loc="left").startswith(name)
         seconds = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", ax.get_xlabel()).group(1)]
         for line, method in zip(ax.lines, part.method.values, strict=True):
-            one = part.to_dataset().sel(method=method).dropna("knob")
+            one = part.to_dataset().sel({"method": method}).dropna("knob")
             assert np.asarray(line.get_xdata()) * seconds == pytest.approx(one.run_time.values)
             assert np.array_equal(line.get_ydata(), one.error.values)
 
