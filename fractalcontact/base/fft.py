@@ -102,6 +102,48 @@ def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     return scipy.fft.dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
+def convolve(plane: Array, symbol: Array, padded: tuple[int, int]) -> Array:
+    """Return the plane convolved with the kernel of a real symbol, on a plane padded with zeros.
+
+    Parameters
+    ----------
+    plane : ndarray, shape (ny, nx)
+    symbol : ndarray, shape (my, mx//2 + 1)
+        Transform of the kernel on the padded plane (my, mx).
+    padded : (my, mx)
+        Shape of the padded plane.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+        A view of a larger array. Rows of zeros are never transformed along x.
+    """
+    ny, nx = plane.shape
+    if library() == "ducc0":
+        return _convolve_ducc0(plane, symbol, padded)
+    threads = thread_count()
+    modes = scipy.fft.rfft(plane, n=padded[1], axis=1, workers=threads)
+    modes = scipy.fft.fft(modes, n=padded[0], axis=0, workers=threads)
+    modes *= symbol
+    modes = scipy.fft.ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
+    return scipy.fft.irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx]  # type: ignore[no-any-return]
+
+
+def _convolve_ducc0(plane: Array, symbol: Array, padded: tuple[int, int]) -> Array:
+    ny, nx = plane.shape
+    transform, threads = _ducc0(), _ducc_threads()
+    rows = np.zeros((ny, padded[1]), dtype=plane.dtype)
+    rows[:, :nx] = plane
+    modes = np.zeros(symbol.shape, dtype=np.result_type(plane.dtype, np.complex64))
+    transform.r2c(rows, axes=(1,), forward=True, nthreads=threads, out=modes[:ny])
+    transform.c2c(modes, axes=(0,), forward=True, nthreads=threads, out=modes)
+    modes *= symbol
+    transform.c2c(modes, axes=(0,), forward=False, inorm=2, nthreads=threads, out=modes)
+    return transform.c2r(  # type: ignore[no-any-return]
+        modes[:ny], axes=(1,), lastsize=padded[1], forward=False, inorm=2, nthreads=threads, out=rows
+    )[:, :nx]
+
+
 def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
     """Return the wavenumbers 2 pi k / (n spacing) of a transform, in rad m-1.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.contact._descent import Preconditioner
+from fractalcontact.contact._precondition import Preconditioner
 from fractalcontact.contact._problem import Body, serial_mean, serial_sum
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -40,7 +40,7 @@ def flat_block(body: Body) -> FlatBlock:
     p = np.full(body.shape, 1.0 / size)
     if body.periodic:
         return FlatBlock(p, np.zeros(body.shape), 0.0, 0, 0, 0.0)
-    operator, precondition = body.operator(), Preconditioner(body.shape, body.spacing)
+    operator, precondition = body.operator(), Preconditioner(body, np.float64)
     u = operator.apply(p)
     t, product, best = np.zeros_like(p), 0.0, (np.inf, p, u)
     for iteration in range(GREATEST_ITERATIONS):
@@ -52,7 +52,7 @@ def flat_block(body: Body) -> FlatBlock:
         if error <= TARGET or error > 1e3 * best[0]:
             break
         g -= serial_mean(g)
-        z = precondition.apply(g)
+        z = precondition.whole(g)
         z -= serial_mean(z)
         previous, product = product, serial_sum(g * z)
         t = z + (product / previous) * t if previous > 0 else z

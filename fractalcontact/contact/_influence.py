@@ -37,6 +37,7 @@ def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) ->
     Shape (ny, nx), 1/m for a modulus of 1. Near cells by the closed form, far ones by Gauss quadrature,
     because the closed form loses digits with the square of the distance.
     """
+    from fractalcontact.base.jit import in_bands
     from fractalcontact.contact._kernels import love_table
 
     orders = (3, 4, 6, 10, 16)
@@ -46,7 +47,7 @@ def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) ->
     for row, (x, w) in enumerate(rules):
         nodes[row, : x.size], weights[row, : x.size] = x / 2, w / 2
     table = np.empty(shape)
-    love_table(table, spacing[0], spacing[1], np.array(orders), nodes, weights)
+    in_bands(love_table, shape[0], table.size, table, *spacing, np.array(orders), nodes, weights)
     return table
 
 

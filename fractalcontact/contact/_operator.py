@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.jit import in_bands
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -21,39 +22,51 @@ class Operator(Protocol):
         ...
 
 
-class PeriodicOperator:
-    """A body that repeats itself: the compliance multiplies the modes of the pressure."""
+class Wavenumbers:
+    """Multiplies the modes of a plane by a power of |q|, without keeping a table of it."""
 
-    def __init__(self, compliance: Array, shape: tuple[int, int]) -> None:
-        self.compliance, self.shape = compliance, shape
+    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
+        self.shape = shape
+        self.qy2 = fft.wavenumbers(shape[0], spacing[0]) ** 2
+        self.qx2 = fft.wavenumbers(shape[1], spacing[1], real=True) ** 2
+
+    def apply(self, plane: Array, factor: float, *, invert: bool, mean: float) -> Array:
+        """Return the plane with its modes times factor |q| (or factor / |q|), its mean times `mean`."""
+        from fractalcontact.contact._kernels import scale_modes
+
+        modes = fft.rfft2(plane)
+        kind = plane.dtype.type
+        qy2, qx2 = self.qy2.astype(kind), self.qx2.astype(kind)
+        in_bands(scale_modes, modes.shape[0], modes.size, modes, qy2, qx2, kind(factor), invert, kind(mean))
+        return fft.irfft2(modes, self.shape, overwrite=True)
+
+
+class PeriodicOperator:
+    """A body that repeats itself: 2/|q| times the modes of the pressure; the mean is a rigid motion."""
+
+    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
+        self.wavenumbers = Wavenumbers(shape, spacing)
         self.transforms = 0
 
     def apply(self, pressure: Array) -> Array:
         """Return the settlement under `pressure`, without its mean."""
-        modes = fft.rfft2(pressure)
-        modes *= self.compliance
         self.transforms += 1
-        return fft.irfft2(modes, self.shape, overwrite=True)
+        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0)
 
 
 class FreeOperator:
     """A half-space loaded inside a window alone: convolution on a plane padded so that nothing wraps."""
 
-    def __init__(self, table: Array) -> None:
-        self.shape = (int(table.shape[0]), int(table.shape[1]))
-        self.padded = (padded_length(self.shape[0]), padded_length(self.shape[1]))
-        self.symbol = convolution_symbol(table, self.padded)
-        self.buffer = np.zeros(self.padded, dtype=table.dtype)
+    def __init__(self, table: Array, kind: Any = np.float64) -> None:
+        shape = table.shape
+        self.padded = (padded_length(shape[0]), padded_length(shape[1]))
+        self.symbol = convolution_symbol(table, self.padded).astype(kind)
         self.transforms = 0
 
     def apply(self, pressure: Array) -> Array:
         """Return the settlement under `pressure`."""
-        ny, nx = self.shape
-        self.buffer[:ny, :nx] = pressure
-        modes = fft.rfft2(self.buffer)
-        modes *= self.symbol
         self.transforms += 1
-        return fft.irfft2(modes, self.padded, overwrite=True)[:ny, :nx]
+        return fft.convolve(pressure, self.symbol, self.padded)
 
 
 def padded_length(n: int) -> int:

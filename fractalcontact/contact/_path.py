@@ -140,16 +140,14 @@ def _eliminator(problem: Problem):  # type: ignore[no-untyped-def]
 
 
 def _descender(problem: Problem, tolerance: float):  # type: ignore[no-untyped-def]
-    from fractalcontact.contact import _descent
+    from fractalcontact.contact._descent import Control, Descent
 
-    operator = problem.body.operator()
-    precondition = _descent.Preconditioner(problem.body.shape, problem.body.spacing)
+    descent = Descent(problem)
     last: list[Array | None] = [None]
 
     def advance(total: float | None, closure: float | None) -> Solution:
-        solution = _descent.solve(
-            problem, operator, precondition, last[0], total=total, closure=closure, tolerance=tolerance
-        )
+        start = np.ones(problem.body.shape) if last[0] is None else last[0]
+        solution = descent.solve(start, Control(total, closure), tolerance)
         last[0] = solution.pressure
         return solution
 

@@ -41,11 +41,11 @@ class Body:
             return _influence.disc_coefficients(shape, self.spacing, self.radius) * self.cell_area
         return _influence.square_coefficients(shape, self.spacing) * self.cell_area
 
-    def operator(self) -> Operator:
+    def operator(self, kind: Any = np.float64) -> Operator:
         """Return the settlement under a plane of pressure."""
         if self.periodic:
-            return PeriodicOperator(_influence.spectral_compliance(self.shape, self.spacing), self.shape)
-        return FreeOperator(self.table())
+            return PeriodicOperator(self.shape, self.spacing)
+        return FreeOperator(self.table(), kind)
 
 
 @dataclass(frozen=True)
