@@ -22,5 +22,6 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "sliding": ["delta_surface"],
         "opening": ["dilatancy"],
         "strength": ["friction"],
+        "leakage": ["transmissivity"],
     },
 )

@@ -1,0 +1,304 @@
+"""Leakage against closed forms, a slow assembly, and invariances."""
+
+import sys
+from collections import deque
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+
+def flow(make_face, gap, spacing=1.0, *, periodic=False, **options):
+    return fc.joints.transmissivity(make_face(gap, spacing, periodic=periodic), **options)
+
+
+@pytest.mark.parametrize(
+    ("shape", "periodic"),
+    [((3, 3), False), ((7, 5), False), ((64, 31), False), ((7, 5), True), ((1, 1), True), ((1, 6), True)],
+)
+def test_parallel_plates_are_exact(make_face, shape, periodic):
+    result = flow(make_face, np.full(shape, 2e-4), (1e-3, 3e-3), periodic=periodic, viscosity=1e-3)
+    np.testing.assert_allclose(result.transmissivity, (2e-4) ** 3 / 12, rtol=1e-13)
+    np.testing.assert_allclose(result.hydraulic_aperture, 2e-4, rtol=1e-13)
+    np.testing.assert_allclose(result.flow_conductance, (2e-4) ** 3 / 12e-3, rtol=1e-13)
+    assert result.percolates.all()
+    assert result.open_fraction == 1
+    assert result.aperture == pytest.approx(2e-4)
+
+
+# relative amplitude, hydraulic over mean aperture across and along the crests
+SINUSOIDS = [(0.3, 0.910952, 1.043114), (0.6, 0.652413, 1.154800)]
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize(("amplitude", "across", "along"), SINUSOIDS)
+def test_sinusoidal_aperture(make_face, amplitude, across, along, periodic):
+    x = (np.arange(64) + 0.5) / 64
+    gap = np.broadcast_to(1e-4 * (1 + amplitude * np.cos(2 * np.pi * x)), (40, 64))
+    result = flow(make_face, gap, 1e-3, periodic=periodic)
+    np.testing.assert_allclose(result.hydraulic_aperture.sel(axis="x"), across * 1e-4, rtol=2e-6)
+    np.testing.assert_allclose(result.hydraulic_aperture.sel(axis="y"), along * 1e-4, rtol=2e-6)
+    exact = (1 - amplitude**2) ** 2.5 / (1 + amplitude**2 / 2)
+    np.testing.assert_allclose(result.transmissivity.sel(axis="x") * 12, exact * 1e-12, rtol=1e-10)
+
+
+def test_layers_are_exact_on_any_grid(make_face):
+    gap = np.cbrt(np.repeat([1.0, 10.0, 3.0], 4))
+    result = flow(make_face, np.broadcast_to(gap, (5, 12)), (1.0, 7.0))
+    assert 12 * result.transmissivity.sel(axis="x") == pytest.approx(3 / (1 + 1 / 10 + 1 / 3), rel=1e-12)
+    assert 12 * result.transmissivity.sel(axis="y") == pytest.approx(14 / 3, rel=1e-12)
+
+
+def checkerboard(squares, cells, ratio):
+    pattern = np.indices((squares * cells, squares * cells)) // cells
+    return np.cbrt(np.where(pattern.sum(axis=0) % 2, ratio, 1.0))
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_checkerboard_conducts_the_geometric_mean(make_face, periodic):
+    result = flow(make_face, checkerboard(2, 64, 10.0), periodic=periodic)
+    np.testing.assert_allclose(12 * result.transmissivity, np.sqrt(10.0), rtol=0.01)
+
+
+@pytest.mark.parametrize("ratio", [2.0, 10.0, 1e4])
+def test_checkerboard_error_falls_with_the_grid_and_vanishes_on_few_cells(make_face, ratio):
+    errors = []
+    for cells in (1, 2, 8, 32):
+        result = flow(make_face, checkerboard(2, cells, ratio), periodic=True, axis="x")
+        errors.append(12 * result.transmissivity.item() / np.sqrt(ratio) - 1)
+    np.testing.assert_allclose(errors[:2], 0, atol=1e-11)
+    assert -0.02 < errors[2] < errors[3] < 0
+
+
+def test_four_phases_meet_the_closed_form(make_face):
+    k = np.array([[1.0, 5.0], [2.0, 30.0]])
+    (a, b), (d, c) = k
+    result = flow(make_face, np.cbrt(k), periodic=True)
+    mean = (a * b * c + a * b * d + a * c * d + b * c * d) / (a + b + c + d)
+    along_x = np.sqrt(mean * (a + d) * (b + c) / ((a + b) * (c + d)))
+    # turning the plane by 90 degrees makes the product of the two directions the mean of the triples
+    np.testing.assert_allclose(12 * result.transmissivity, [along_x, mean / along_x], rtol=1e-12)
+
+
+def gain(a, b, c, d):
+    rows = series(a, b) / 2 + series(d, c) / 2
+    if min(a + b, c + d) == 0 or rows == 0:
+        return 1.0
+    triples = (a * b * c + a * b * d + a * c * d + b * c * d) / (a + b + c + d)
+    return max(np.sqrt(triples * (a + d) * (b + c) / (a + b) / (c + d)) / rows, 1.0)
+
+
+def series(a, b):
+    return 2 * a * b / (a + b) if a > 0 and b > 0 else 0.0
+
+
+def slow_conductivity(k, ratio):
+    """Free plane along x, dense, assembled cell by cell."""
+    ny, nx = k.shape
+    at = lambda i, j: k[min(max(i, 0), ny - 1), min(max(j, 0), nx - 1)]  # noqa: E731
+    size = ny * nx
+    matrix, source = np.zeros((size, size)), np.zeros(size)
+    for i in range(ny):
+        for j in range(nx):
+            here = i * nx + j
+            if j + 1 < nx:
+                up = gain(at(i - 1, j), at(i - 1, j + 1), at(i, j + 1), at(i, j))
+                down = gain(at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j))
+                add(matrix, here, here + 1, ratio * series(k[i, j], k[i, j + 1]) * max(up, down))
+            if i + 1 < ny:
+                left = gain(at(i, j - 1), at(i + 1, j - 1), at(i + 1, j), at(i, j))
+                right = gain(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1))
+                add(matrix, here, here + nx, series(k[i, j], k[i + 1, j]) * max(left, right) / ratio)
+            if j == 0:
+                matrix[here, here] += 2 * ratio * k[i, j]
+                source[here] += 2 * ratio * k[i, j]
+            if j == nx - 1:
+                matrix[here, here] += 2 * ratio * k[i, j]
+    p = np.linalg.lstsq(matrix, source, rcond=1e-14)[0].reshape(ny, nx)
+    return float((2 * ratio * k[:, 0] * (1 - p[:, 0])).sum()) * nx / ny / ratio
+
+
+def add(matrix, a, b, link):
+    matrix[a, a] += link
+    matrix[b, b] += link
+    matrix[a, b] -= link
+    matrix[b, a] -= link
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_against_a_dense_assembly(make_face, seed):
+    rng = np.random.default_rng(seed)
+    gap = rng.random((9, 7)) - 0.2 * (seed % 3)
+    result = flow(make_face, gap, (1.0, 1.5))
+    k = np.maximum(gap, 0.0) ** 3
+    expected = [slow_conductivity(k, 1 / 1.5), slow_conductivity(k.T, 1.5)]
+    np.testing.assert_allclose(12 * result.transmissivity, expected, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tiling_a_periodic_plane_changes_nothing(make_face, seed):
+    gap = np.random.default_rng(seed).random((6, 8)) - 0.1
+    one = flow(make_face, gap, periodic=True)
+    many = flow(make_face, np.tile(gap, (3, 2)), periodic=True)
+    np.testing.assert_allclose(one.transmissivity, many.transmissivity, rtol=1e-9)
+    # between plates, many periods end up with the same
+    between = flow(make_face, np.tile(gap, (1, 60)), periodic=(True, False), axis="x")
+    np.testing.assert_allclose(between.transmissivity, one.transmissivity.sel(axis=["x"]), rtol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_turning_and_mirroring_the_plane(make_face, seed):
+    gap = np.random.default_rng(seed).random((12, 9)) - 0.15
+    plain = flow(make_face, gap, (2.0, 1.0)).transmissivity.values
+    turned = flow(make_face, np.rot90(gap), (1.0, 2.0)).transmissivity.values
+    mirrored = flow(make_face, gap[::-1, ::-1], (2.0, 1.0)).transmissivity.values
+    np.testing.assert_allclose(turned, plain[::-1], rtol=1e-10)
+    np.testing.assert_allclose(mirrored, plain, rtol=1e-10)
+
+
+def test_opening_a_cell_never_lowers_the_flow(make_face):
+    rng = np.random.default_rng(1)
+    gap = rng.random((15, 15)) - 0.2
+    before = flow(make_face, gap, axis="x").transmissivity.item()
+    for _ in range(20):
+        i, j = rng.integers(0, 15, 2)
+        gap[i, j] += 0.5
+        after = flow(make_face, gap, axis="x").transmissivity.item()
+        assert after >= before * (1 - 1e-9)
+        before = after
+
+
+def test_a_wall_of_contact_stops_the_flow(make_face):
+    gap = np.ones((8, 9))
+    gap[:, 4] = 0.0
+    gap[3, 4] = -1.0
+    for periodic in (True, False):
+        result = flow(make_face, gap, periodic=periodic)
+        assert result.transmissivity.sel(axis="x") == 0
+        assert result.hydraulic_aperture.sel(axis="x") == 0
+        assert not result.percolates.sel(axis="x")
+        assert result.percolates.sel(axis="y")
+        np.testing.assert_allclose(12 * result.transmissivity.sel(axis="y"), 8 / 9, rtol=1e-12)
+
+
+def test_cells_that_share_a_corner_do_not_leak(make_face):
+    assert not flow(make_face, np.eye(6)).percolates.any()
+    assert not flow(make_face, np.zeros((5, 5))).percolates.any()
+    assert flow(make_face, np.zeros((5, 5))).open_fraction == 0
+
+
+def slow_winding(cells):
+    """Walk on the unrolled plane: does some cell reach its own image along x?"""
+    ny, nx = cells.shape
+    for start in zip(*np.nonzero(cells), strict=True):
+        seen, queue = {start: 0}, deque([(*start, 0)])
+        while queue:
+            i, j, turn = queue.popleft()
+            for di, dj in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+                a, b = (i + di) % ny, j + dj
+                there, b = turn + b // nx, b % nx
+                if not cells[a, b]:
+                    continue
+                if (a, b) not in seen:
+                    seen[a, b] = there
+                    queue.append((a, b, there))
+                elif seen[a, b] != there:
+                    return True
+    return False
+
+
+def test_percolation_on_a_torus_is_winding(make_face):
+    rng = np.random.default_rng(3)
+    seen = set()
+    for _ in range(60):
+        gap = (rng.random((6, 7)) < 0.6).astype(float)
+        result = flow(make_face, gap, periodic=True)
+        expected = [slow_winding(gap > 0), slow_winding(gap.T > 0)]
+        np.testing.assert_array_equal(result.percolates, expected)
+        np.testing.assert_array_equal(result.transmissivity > 0, expected)
+        seen.update(expected)
+    assert seen == {True, False}
+
+
+def test_a_spiral_winds_along_both_axes(make_face):
+    # a diagonal band one cell wide closes only after it has gone around both ways
+    gap = np.eye(6) + np.roll(np.eye(6), 1, axis=1)
+    result = flow(make_face, gap, periodic=True)
+    assert result.percolates.all()
+    assert not flow(make_face, gap, periodic=(False, True)).percolates.sel(axis="x")
+
+
+def test_periodic_can_be_called_free_but_not_the_reverse(make_face):
+    gap = np.random.default_rng(0).random((6, 7)) + 0.1
+    free = flow(make_face, gap)
+    called = fc.joints.transmissivity(make_face(gap, periodic=True), periodic=False)
+    np.testing.assert_array_equal(called.transmissivity, free.transmissivity)
+    with pytest.raises(ValueError, match="periodic"):
+        fc.joints.transmissivity(make_face(gap), periodic=True)
+
+
+def test_power_of_two_units_change_only_exponents(make_face):
+    gap = np.random.default_rng(0).random((12, 13)) - 0.1
+    one = flow(make_face, gap).transmissivity.values
+    two = flow(make_face, gap * 2.0**-40, 2.0**-20).transmissivity.values
+    np.testing.assert_array_equal(one * 2.0**-120, two)
+    large = flow(make_face, gap * 2.0**60).transmissivity.values
+    np.testing.assert_array_equal(one * 2.0**180, large)
+
+
+def test_leading_dims_and_labels(make_face):
+    import xarray as xr
+
+    planes = np.random.default_rng(0).random((2, 3, 6, 5)) - 0.3
+    one = make_face(planes[0, 0], 2.0)
+    stack = xr.DataArray(
+        planes,
+        dims=("shear", "step", "y", "x"),
+        coords={"x": one.x, "y": one.y, "shear": [0.0, 1.0], "normal_force": ("step", [1.0, 2.0, 3.0])},
+    )
+    result = fc.joints.transmissivity(stack, axis=("y", "x"))
+    assert result.transmissivity.dims == ("shear", "step", "axis")
+    assert result.open_fraction.dims == ("shear", "step")
+    alone = fc.joints.transmissivity(make_face(planes[1, 2], 2.0))
+    for axis in ("x", "y"):
+        assert result.transmissivity.sel(axis=axis)[1, 2] == alone.transmissivity.sel(axis=axis)
+    assert "normal_force" in result.coords
+    assert result.transmissivity.attrs["units"] == "m3"
+    assert result.hydraulic_aperture.attrs["units"] == "m"
+
+
+def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
+    from fractalcontact.joints import _flow
+
+    gap = rough((96, 96), 0) + 0.5
+    direct = flow(make_face, gap)
+    monkeypatch.setattr(_flow, "DIRECT", 10)
+    pytest.importorskip("pyamg")
+    multigrid = flow(make_face, gap)
+    np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-10)
+    assert (multigrid.residual <= 1e-8).all()
+    periodic = flow(make_face, gap, periodic=True)
+    monkeypatch.setitem(sys.modules, "pyamg", None)
+    np.testing.assert_allclose(
+        periodic.transmissivity, flow(make_face, gap, periodic=True).transmissivity, rtol=1e-10
+    )
+
+
+def test_messages(make_face):
+    gap = np.ones((5, 5))
+    gap[1, 1] = np.nan
+    with pytest.raises(ValueError, match="fill"):
+        flow(make_face, gap)
+    with pytest.raises(ValueError, match=r"(?s)axis.*viscosity"):
+        flow(make_face, np.ones((5, 5)), axis="z", viscosity=0.0)
+
+
+@pytest.mark.benchmark
+def test_a_million_cells_in_ten_seconds(make_face, rough):
+    heights = rough((1024, 1024), 0)
+    for closed in (0.0, 0.2, 0.35):
+        gap = heights - np.quantile(heights, closed) if closed else heights - heights.min() + 0.1
+        result = flow(make_face, gap, axis="x")
+        assert result.run_time < 10
+        assert result.residual <= 1e-8
