@@ -20,7 +20,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "relief": ["face", "field"],
         "roughness": ["dimension_curves", "dimensions"],
         "closing": ["closure_laws", "contact_area"],
-        "domain_maps": ["contact_domains", "islands"],
+        "domain_maps": ["contact_domains", "islands", "island_map"],
         "sliding": ["rigid_dilatancy", "elastic_dilatancy", "friction"],
         "scheme": ["sliding_scheme"],
         "lacunar": ["box_dimension", "lacunarity"],

@@ -124,35 +124,71 @@ def islands(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
     InvalidInput
         The result has no labels.
     """
-    data = as_dataset(result, "islands")
-    with Problems("fc.plotting.islands") as problems:
-        for name in ("label", "area"):
-            problems.require(name in data, "result", f"the variable {name!r}", list(data.variables))
+    data = _checked_islands(result, ("label", "area"))
     sheet = _style.sheet(figure, (_style.WIDTH, 3.2))
     left, right = sheet.subplots(1, 2, width_ratios=(1, 1.15))
-    _island_map(left, data)
+    island_map(data, ax=left)
     _island_areas(right, data)
     return _style.root(sheet)
 
 
-def _island_map(ax: Axes, data: xr.Dataset) -> None:
+@_style.styled
+def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None) -> Figure:
+    """Draw a map of the islands of a contact domain, neighbouring islands in different colours.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.islands`: label (y, x). Of several masks the last one with an island is
+        mapped.
+    title : str, optional
+        None: the number of islands.
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        The result has no labels.
+    """
     import matplotlib
 
-    plane = data["label"]
+    plane = _last_map(_checked_islands(result, ("label",))["label"])
+    labels = np.asarray(plane.values).astype(np.int64)
+    hues = matplotlib.colormaps[_style.FAMILY_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
+    image = hues[
+        (labels * 5) % PALETTE
+    ]  # numbers that follow each other are often neighbours: keep them apart
+    image[labels <= 0] = matplotlib.colors.to_rgb(_style.STATE_COLOURS[0])
+    figure, ax = _style.canvas(ax, (3.8, 3.8))
+    length = plane_scale(plane)
+    _maps.show(ax, image, extent_of(plane), length)
+    name_plane(ax, plane, length)
+    count = np.unique(labels[labels > 0]).size
+    ax.set_title(f"{count} island{'' if count == 1 else 's'}" if title is None else title)
+    return figure
+
+
+def _checked_islands(result: Any, names: tuple[str, ...]) -> xr.Dataset:
+    data = as_dataset(result, "islands")
+    with Problems("fc.plotting.islands") as problems:
+        for name in names:
+            problems.require(name in data, "result", f"the variable {name!r}", list(data.variables))
+    return data
+
+
+def _last_map(plane: xr.DataArray) -> xr.DataArray:
+    """Return the last of several maps that has an island, or the last of all."""
     leading = [dim for dim in plane.dims if dim not in ("y", "x")]
     if leading:
-        stacked = plane.stack(mask=leading) if len(leading) > 1 else plane.rename({leading[0]: "mask"})
-        filled = np.flatnonzero((stacked > 0).any(("y", "x")).values)
-        plane = stacked.isel(mask=int(filled[-1]) if filled.size else -1)
-    labels = np.asarray(plane.transpose("y", "x").values).astype(np.int64)
-    hues = matplotlib.colormaps[_style.FAMILY_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
-    image = hues[(labels * 5) % PALETTE]  # 5 steps between neighbours in number, which often are neighbours
-    image[labels <= 0] = matplotlib.colors.to_rgb(_style.STATE_COLOURS[0])
-    length, extent = plane_scale(plane), extent_of(plane)
-    _style.dress(ax)
-    _maps.show(ax, image, extent, length)
-    name_plane(ax, plane, length)
-    ax.set_title(f"{np.unique(labels[labels > 0]).size} islands")
+        masks = plane.stack(mask=leading, create_index=False)
+        filled = np.flatnonzero((masks > 0).any(("y", "x")).values)
+        plane = masks.isel(mask=int(filled[-1]) if filled.size else -1)
+    return plane.transpose("y", "x")
 
 
 def _island_areas(ax: Axes, data: xr.Dataset) -> None:
@@ -174,17 +210,13 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
 
 
 def _island_groups(data: xr.Dataset, areas: Any) -> list[Any]:
-    """Return the areas of the islands of each mask, in the order in which the masks appear."""
-    path = [
-        str(name)
-        for name in ("direction", "shear", "step")
-        if name in data.coords and data[name].dims == ("island",)
-    ]
-    if not path:
+    """Return the areas of the islands of each mask, in the order of the masks."""
+    names = [f"island_{dim}" for dim in ("member", "direction", "shear", "step")]
+    keys = [np.unique(data[name].values, return_inverse=True)[1] for name in names if name in data.coords]
+    if not keys:
         return [areas]
-    keys = np.stack([np.unique(data[name].values, return_inverse=True)[1] for name in path], axis=-1)
-    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return [areas[group.ravel() == number] for number in range(first.size)]
+    _, group = np.unique(np.stack(keys, axis=-1), axis=0, return_inverse=True)
+    return [areas[group.ravel() == number] for number in range(group.max() + 1)]
 
 
 def _state_key(sheet: Any) -> None:

@@ -187,7 +187,8 @@ def islands(plane):
         "area": ("island", area),
         "n_islands": ((), count),
     }
-    return label(xr.Dataset(data, coords={"y": plane.y, "x": plane.x, "island": np.arange(1, count + 1)}))
+    coords = {"y": plane.y, "x": plane.x, "island_label": ("island", np.arange(1, count + 1))}
+    return label(xr.Dataset(data, coords=coords))
 
 
 def transmissivity(closed):

@@ -130,6 +130,24 @@ def test_islands_of_different_numbers_have_different_colours(made):
     assert np.array_equal(areas.lines[0].get_ydata(), np.arange(1, found.sizes["island"] + 1))
 
 
+def test_islands_of_several_masks_have_a_curve_each_and_the_last_is_mapped(made):
+    import xarray as xr
+
+    state = made.closure(made.delta(made.heights())).state.isel(shear=0)
+    parts = [made.islands(state.isel(step=step)) for step in (3, 4)]
+    areas = np.concatenate([part.area.values for part in parts])
+    step = np.repeat([3, 4], [part.sizes["island"] for part in parts])
+    data = {
+        "label": (("step", "y", "x"), np.array([part.label.values for part in parts])),
+        "area": ("island", areas),
+    }
+    both = label(xr.Dataset(data, coords={"island_step": ("island", step), "y": state.y, "x": state.x}))
+    map_, curves = plotting.islands(both).axes
+    assert np.array_equal(np.all(colours(map_) == OPEN, axis=-1), parts[1].label.values == 0)
+    for line, part in zip(curves.lines, parts, strict=True):
+        assert np.asarray(line.get_xdata()) * 1e-6 == pytest.approx(np.sort(part.area.values)[::-1])
+
+
 def test_scheme_is_drawn_from_the_cracks_numbers(made):
     face = made.heights()
     slid = made.delta(face, shears=(8e-3,))
