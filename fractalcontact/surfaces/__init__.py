@@ -20,10 +20,12 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
         "brownian": ["fbm"],
-        "measured": ["from_array"],
+        "displacement": ["midpoint"],
+        "measured": ["from_array", "read"],
         "preparing": ["fill", "level"],
         "samples": ["sample"],
         "statistics": ["describe"],
         "synthesis": ["spectral"],
+        "waves": ["weierstrass"],
     },
 )

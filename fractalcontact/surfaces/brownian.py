@@ -70,7 +70,7 @@ def fbm(
     -----
     Intrinsic embedding of Stein (2002): a stationary field on a torus plus a random plane. The torus has
     R times the diagonal plus the extent along each axis, R = 1 up to hurst = .75 and 2 above; for a square
-    of n x n points that is 2.42 n or 3.83 n. Memory: about 4 (R = 1) or 8 (R = 2) arrays of n x n numbers.
+    of n x n points that is 2.42 n or 3.83 n. Memory: about 5 (R = 1) or 9 (R = 2) arrays of n x n numbers.
     A torus side counts the diagonal in spacings of its own axis, so unequal spacings or a slender shape
     cost more.
     """

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base import provenance
+from fractalcontact.base import provenance, schema
 from fractalcontact.base.checks import Problems
-from fractalcontact.surfaces import _arguments
+from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
+from fractalcontact.surfaces import _arguments, _files
 from fractalcontact.surfaces._units import UNITS, in_metres
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -111,3 +117,163 @@ def _flags(problems: Problems, periodic: Any, axes: int) -> tuple[bool, ...]:
         problems.add("periodic", "True or False" + (", or (y, x)" if axes == 2 else ""), periodic)
         return (False,) * axes
     return tuple(bool(flag) for flag in np.broadcast_to(flags, axes))
+
+
+NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    units: str | None = None,
+    spacing: float | Sequence[float] | None = None,
+    first_row: str = "bottom",
+) -> xr.DataArray:
+    """Read a measured surface.
+
+    Parameters
+    ----------
+    path : path-like
+        NetCDF (`.nc`): the variable `height`. numpy (`.npy`) or a table of numbers in text (`.csv`, `.txt`
+        ..., between commas, semicolons, tabs or blanks): rows are y, and `spacing` must be given. Anything
+        else, and text without `spacing`: an instrument's file, read by SurfaceTopography (extra `io`).
+        Files packed with gzip (`.gz`) are unpacked on the fly.
+    channel : str or int, optional
+        Channel of an instrument's file, or variable of a NetCDF file. Default: the first height channel.
+    units : str, optional
+        Unit of the heights, "m", "mm", "um", "nm" ...; needed where a file states none. `.npy` and tables
+        are in metres unless it says otherwise. Where a file states another one, yours is taken, with a
+        warning.
+    spacing : float, or (y, x), optional
+        Distance between points in metres; takes the place of what the file says.
+    first_row : {"bottom", "top"}
+        Whether the first row of an `.npy` file or a table is the smallest y, or the top of an image: then
+        it is flipped. Other formats know themselves.
+
+    Returns
+    -------
+    DataArray
+        `height` with dims (y, x) in metres, y ascending, heights up, NaN where missing. The provenance
+        keeps the name of the file, its unit and size as stated, and what read it.
+
+    Raises
+    ------
+    UnreadableFile
+        The file is corrupt, of an unknown format, states no unit or size, or is not a uniform grid.
+    MissingExtra
+        An instrument's file, and SurfaceTopography is not installed.
+
+    Warns
+    -----
+    ScaleWarning
+        The range of the heights over the extent lies outside 1e-6 ... 10, or a microscope's file is more
+        than 1 m wide: some files, and some readers, are wrong by factors of 1000.
+    """
+    source = Path(path)
+    with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
+        problems.require(source.is_file(), "path", "an existing file", source.name)
+        steps = None if spacing is None else _arguments.plane_spacing(problems, spacing, np.size(spacing))
+        if units is not None:
+            problems.choice("units", units, UNITS)
+        problems.choice("first_row", first_row, ("bottom", "top"))
+        suffix = _files.kind(source)
+        table = suffix == ".npy" or (suffix in TABLES and spacing is not None)
+        if not table:
+            problems.require(
+                first_row == "bottom", "first_row", "'bottom' for a file that knows itself", first_row
+            )
+    if suffix in NETCDF:
+        surface, facts, microscope = _netcdf(source, channel, units, steps)
+    else:
+        found = _table(source, suffix, units, steps, first_row) if table else None
+        surface, facts, microscope = found or _instrument(source, channel, units, steps)
+    axes = 2 if "y" in surface.dims else 1
+    extent = tuple(
+        n * _step(surface, dim) for dim, n in zip(surface.dims[-axes:], surface.shape[-axes:], strict=True)
+    )
+    _files.check_scale(surface.values, extent, source.name, microscope=microscope)
+    parameters = {
+        "path": source,
+        "channel": channel,
+        "units": units,
+        "spacing": steps,
+        "first_row": first_row,
+    }
+    return provenance.stamp(
+        surface, "fractalcontact.surfaces.read", parameters, title=f"Surface read from {source.name}", **facts
+    )
+
+
+Read = tuple["xr.DataArray", dict[str, Any], bool]
+
+
+def _table(
+    path: Path, suffix: str, units: str | None, spacing: tuple[float, ...] | None, first_row: str
+) -> Read | None:
+    """Read an array of numbers; None where a text is not a table."""
+    try:
+        values = _files.read_npy(path) if suffix == ".npy" else _files.read_table(path)
+    except ValueError as error:
+        if suffix in TABLES:
+            return None
+        raise UnreadableFile(
+            "fractalcontact.surfaces.read", [f"path: {path.name!r} is corrupt ({error})"]
+        ) from error
+    with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
+        problems.require(
+            spacing is not None, "spacing", f"the spacing in metres, which {path.name!r} has not", None
+        )
+        if suffix != ".npy" and values.shape[1] == 3 and values.shape[0] > 9:
+            problems.add(
+                "path",
+                "a grid of heights, one row to a line",
+                "three columns, which look like x, y, z points",
+            )
+    rows = values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
+    return from_array(rows, spacing or 1.0, units=units or "m"), {"stated_unit": None}, False
+
+
+def _instrument(
+    path: Path, channel: str | int | None, units: str | None, spacing: tuple[float, ...] | None
+) -> Read:
+    from fractalcontact.surfaces.instruments import read_instrument
+
+    try:
+        reading = read_instrument(path, channel, units, spacing)
+    except MissingExtra:
+        if _files.kind(path) in TABLES and spacing is None:
+            message = (
+                f"spacing: expected the spacing in metres, for {path.name!r} as a table of heights, got None"
+            )
+            raise UnreadableFile("fractalcontact.surfaces.read", [message]) from None
+        raise
+    stated = reading.facts["stated_unit"]
+    if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
+        message = f"{path.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
+        warnings.warn(message, ScaleWarning, stacklevel=3)
+    periodic = (reading.periodic,) * len(reading.spacing)
+    return (
+        _arguments.heights_of(reading.heights, reading.spacing, periodic),
+        reading.facts,
+        reading.microscope,
+    )
+
+
+def _netcdf(
+    path: Path, channel: str | int | None, units: str | None, spacing: tuple[float, ...] | None
+) -> Read:
+    from fractalcontact.surfaces._labelled_files import read_netcdf
+
+    with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
+        problems.require(not isinstance(channel, int), "channel", "the name of a variable", channel)
+        surface = read_netcdf(path, None if channel is None else str(channel), units, spacing, problems)
+    before = surface.attrs.get("provenance")
+    facts = {"stated_unit": surface.attrs.get("units"), "before": json.loads(before) if before else None}
+    return schema.label(surface), facts, False
+
+
+def _step(surface: xr.DataArray, dim: Any) -> float:
+    axis = surface.coords[dim]
+    return float(axis[-1] - axis[0]) / (int(axis.size) - 1)

@@ -1,0 +1,232 @@
+"""Instrument files, through SurfaceTopography: what it reads is brought to (y, x), metres and NaN."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.surfaces import _files
+from fractalcontact.surfaces._units import UNITS, in_metres
+
+Array = np.ndarray[Any, np.dtype[Any]]
+WHERE = "fractalcontact.surfaces.read"
+PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats that are not of microscopes
+DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One channel of a file.
+
+    Attributes
+    ----------
+    heights : ndarray, shape (ny, nx) or (nx,)
+        In metres, the first row at the smallest y, NaN where missing.
+    spacing : tuple of float
+        (y, x) in metres.
+    periodic : bool
+    microscope : bool
+        The format is that of a microscope or a profiler.
+    facts : dict
+        What the file itself says, and what read it.
+    """
+
+    heights: Array
+    spacing: tuple[float, ...]
+    periodic: bool
+    microscope: bool
+    facts: dict[str, Any]
+
+
+def read_instrument(
+    path: Path, channel: str | int | None, units: str | None, spacing: Sequence[float] | None
+) -> Reading:
+    """Read one channel of an instrument's file.
+
+    Parameters
+    ----------
+    path : Path
+        An existing file; `.gz` is unpacked on the fly.
+    channel : str, int or None
+        Name or number of the channel; None takes the one the format puts first.
+    units : str or None
+        Unit of the heights, for a file that states none (or a wrong one).
+    spacing : sequence of float or None
+        (y, x) in metres, or one of them for both, for a file that states none (or a wrong one).
+
+    Raises
+    ------
+    MissingExtra
+        SurfaceTopography is not installed.
+    UnreadableFile
+        Corrupt, of an unknown format, without a unit or a size, or not on a grid.
+    """
+    if importlib.util.find_spec("SurfaceTopography") is None:
+        raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
+    with _quiet() as heard, _files.opened(path) as file:
+        foreign = _foreign_unit(file.read(4096))
+        file.seek(0)
+        reader = _open(file, path)
+        chosen = _channel(reader, channel, path.name)
+        size, unit, lateral = _stated(chosen, foreign, units)
+        with Problems(WHERE, UnreadableFile) as problems:
+            _check(problems, chosen, size, unit, lateral, spacing)
+        heights, periodic = _heights(reader, chosen, size, path.name)
+    points = tuple(int(n) for n in heights.shape)
+    steps = _steps(points, size, lateral, spacing)
+    name = str(reader.format())
+    facts = {
+        "format": name,
+        "channel": str(chosen.name),
+        "stated_unit": foreign or _plain_unit(chosen.unit),
+        "stated_size": None if size is None else [float(edge) for edge in size],
+        "reader": f"SurfaceTopography {_version()}",
+        "reader_warnings": sorted({str(message.message) for message in heard}) or None,
+    }
+    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, facts)
+
+
+@contextmanager
+def _quiet() -> Iterator[list[warnings.WarningMessage]]:
+    """Keep the library's warnings for the provenance; those about imports and open files are dropped."""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", UserWarning)
+        yield heard
+
+
+def _open(file: Any, path: Path) -> Any:
+    """Return the library's reader of an open file."""
+    from SurfaceTopography.IO import open_topography
+
+    try:
+        return open_topography(file)
+    except Exception as error:
+        raise UnreadableFile(WHERE, [_reason(str(error), path)]) from error
+
+
+def _reason(text: str, path: Path) -> str:
+    """Return one line out of the library's long account of every format it tried."""
+    from SurfaceTopography.IO import readers
+
+    suffix = _files.kind(path).lstrip(".")
+    named = {reader.__name__ for reader in readers if suffix in (reader._file_extensions or ())}
+    named |= {reader.__name__ for reader in readers if reader._format == suffix}
+    tried = re.findall(r"tried (\w+):\s*\n\s*(.*)", text)
+    reasons = [
+        f"{name.removesuffix('Reader')} reader: {said.strip()}" for name, said in tried if name in named
+    ]
+    expected = f"path: {path.name!r} is corrupt or of an unknown format"
+    if reasons:
+        return f"{expected} ({'; '.join(reasons)[:300]})"
+    return f"{expected} ({len(tried)} readers tried)" if tried else f"{expected} ({text.strip()[:300]})"
+
+
+def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
+    """Return the channel asked for by name or number."""
+    try:
+        channels = list(reader.channels)
+        if channel is None:
+            return reader.default_channel
+    except Exception as error:
+        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
+    names = [str(one.name) for one in channels]
+    if isinstance(channel, str) and channel in names:
+        return channels[names.index(channel)]
+    if (
+        isinstance(channel, (int, np.integer))
+        and not isinstance(channel, bool)
+        and 0 <= channel < len(channels)
+    ):
+        return channels[channel]
+    allowed = ", ".join(f"{number} = {one!r}" for number, one in enumerate(names))
+    raise UnreadableFile(WHERE, [f"channel: expected one of {allowed}, got {channel!r}"])
+
+
+def _foreign_unit(head: bytes) -> str | None:
+    """Return the unit of the data where a text header states one that is not a length.
+
+    The library applies the conversion factor of such a header, a wavelength, and forgets that the data are
+    phases.
+    """
+    found = DATA_UNIT.search(head)
+    unit = found.group(1).decode("utf-8", "replace") if found else None
+    return unit if unit not in UNITS else None
+
+
+def _stated(chosen: Any, foreign: str | None, units: str | None) -> tuple[Any, str | None, str | None]:
+    """Return the lateral size, the unit of the heights in force, and that of the size."""
+    unit = chosen.unit
+    lateral, vertical = unit if isinstance(unit, tuple) else (unit, unit)
+    if foreign is not None:
+        vertical = foreign
+    return chosen.physical_sizes, units or vertical, lateral or units
+
+
+def _check(
+    problems: Problems,
+    chosen: Any,
+    size: Any,
+    unit: str | None,
+    lateral: str | None,
+    spacing: Sequence[float] | None,
+) -> None:
+    """Note what the file does not tell and the caller did not either."""
+    name = f"channel {chosen.name!r}"
+    problems.require(bool(chosen.is_uniform), name, "points on a uniform grid", "scattered points")
+    if unit not in UNITS:
+        stated = "none" if unit is None else unit
+        problems.add(f"{name}, unit", 'a unit of length; give `units` ("m", "um" ...)', stated)
+    if spacing is None and size is None:
+        problems.add(f"{name}, size", "a lateral size; give `spacing` in metres", "none")
+    elif spacing is None and lateral not in UNITS:
+        problems.add(f"{name}, lateral unit", "a unit of length; give `spacing` in metres", lateral)
+
+
+def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, bool]:
+    """Return the values of a channel as (y, x) with NaN for masked ones, and whether they are periodic."""
+    options: dict[str, Any] = {"channel_index": chosen.index}
+    if size is None:
+        options["physical_sizes"] = tuple(float(n) for n in np.atleast_1d(chosen.nb_grid_pts))
+    try:
+        topography = reader.topography(**options)
+        values = topography.heights()
+    except Exception as error:
+        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
+    if np.iscomplexobj(values) or values.ndim not in (1, 2):
+        raise UnreadableFile(
+            WHERE, [f"channel {chosen.name!r}: expected real heights, got shape {values.shape}"]
+        )
+    heights = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    heights = np.where(np.isfinite(heights), heights, np.nan)
+    return np.ascontiguousarray(heights.T), bool(topography.is_periodic)
+
+
+def _steps(
+    points: tuple[int, ...], size: Any, lateral: str | None, spacing: Sequence[float] | None
+) -> tuple[float, ...]:
+    """Return the spacing (y, x): the extent is n times it."""
+    if spacing is not None:
+        return tuple(float(step) for step in np.broadcast_to(spacing, len(points)))
+    edges = [in_metres(float(edge), str(lateral)) for edge in np.atleast_1d(size)][::-1]
+    return tuple(edge / n for edge, n in zip(edges, points, strict=True))
+
+
+def _plain_unit(unit: Any) -> Any:
+    return list(unit) if isinstance(unit, tuple) else unit
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("SurfaceTopography")

@@ -1,0 +1,136 @@
+"""Spectra: Parseval, weights, windows, rings, moments, closed forms."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from fractalcontact.base import spectra
+
+
+def plane(shape, seed=0):
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+@pytest.mark.parametrize(
+    ("shape", "spacing"),
+    [((8, 6), (2.0, 0.5)), ((7, 9), (1e-9, 3e-9)), ((5, 8), (1.0, 1.0)), ((9,), (0.1,)), ((8,), (2.0,))],
+)
+def test_sum_over_modes_is_the_mean_square(shape, spacing):
+    heights = plane(shape)
+    psd, weights = spectra.periodogram(heights, spacing)
+    extent = np.prod(np.multiply(shape, spacing))
+    assert np.sum(psd * weights) / extent == pytest.approx(np.mean(heights**2), rel=1e-13)
+
+
+def test_leading_axes_are_kept():
+    heights = plane((3, 2, 6, 8))
+    psd, _ = spectra.periodogram(heights, (1.0, 2.0), "hann")
+    assert psd.shape == (3, 2, 6, 5)
+    np.testing.assert_allclose(
+        psd[1, 1], spectra.periodogram(heights[1, 1], (1.0, 2.0), "hann")[0], rtol=1e-13
+    )
+
+
+def test_a_window_keeps_the_level_of_white_noise():
+    heights = plane((400, 32, 32))
+    plain, _ = spectra.periodogram(heights, (1.0, 1.0))
+    for window in ("hann", (None, "hann"), ("hann", None)):
+        tapered, _ = spectra.periodogram(heights, (1.0, 1.0), window)
+        assert tapered.mean() == pytest.approx(plain.mean(), rel=0.01)
+    with pytest.raises(ValueError, match="window"):
+        spectra.periodogram(heights, (1.0, 1.0), "triangle")
+
+
+def test_one_wave_stands_in_one_mode():
+    n, step, amplitude = 16, 0.5, 3.0
+    x = np.arange(n) * step
+    heights = np.tile(amplitude * np.cos(2 * np.pi * 3 * x / (n * step)), (n, 1))
+    psd, weights = spectra.periodogram(heights, (step, step))
+    assert psd[0, 3] * weights[3] / (n * step) ** 2 == pytest.approx(amplitude**2 / 2)
+    assert np.count_nonzero(psd > 1e-20) == 1
+
+
+def test_rings_count_every_mode_of_the_whole_plane_once():
+    shape, spacing = (12, 15), (1.0, 0.7)
+    full = np.hypot(
+        2 * np.pi * np.fft.fftfreq(shape[0], spacing[0])[:, None],
+        2 * np.pi * np.fft.fftfreq(shape[1], spacing[1]),
+    )
+    edges = np.array([0.0, 0.9, 1.7, 3.3])
+    density = full[:, : shape[1] // 2 + 1] ** 2
+    q, mean, counts = spectra.radial_average(density, shape, spacing, edges)
+    nyquist = np.pi / max(spacing) * (1 + 1e-12)
+    for ring, (low, high) in enumerate(itertools.pairwise(edges)):
+        inside = (full >= low) & (full < high) & (full <= nyquist) & (full > 0)
+        assert counts[ring] == np.count_nonzero(inside)
+        assert q[ring] == pytest.approx(full[inside].mean())
+        assert mean[ring] == pytest.approx((full[inside] ** 2).mean())
+
+
+def test_default_rings_end_at_the_nyquist_wavenumber():
+    shape, spacing = (32, 32), (0.5, 0.5)
+    psd, _ = spectra.periodogram(plane((4, *shape)), spacing)
+    q, mean, counts = spectra.radial_average(psd, shape, spacing)
+    assert mean.shape == (4, q.size)
+    assert q[-1] <= np.pi / 0.5
+    assert counts[0] == 8  # (1, 0) and (1, 1) with their mirrors
+    np.testing.assert_allclose(q[1:-1] / q[1:-1][0] * 2, np.arange(2, q.size), rtol=0.1)
+
+
+def test_radial_average_sees_no_difference_in_a_mirror():
+    heights = plane((16, 16))
+    averages = [
+        spectra.radial_average(spectra.periodogram(face, (1.0, 1.0))[0], (16, 16), (1.0, 1.0))[1]
+        for face in (heights, heights[:, ::-1], heights.T)
+    ]
+    np.testing.assert_allclose(averages[1], averages[0], rtol=1e-12)
+    np.testing.assert_allclose(averages[2], averages[0], rtol=1e-12)
+
+
+def test_moments_of_two_waves():
+    n, step, a, b = 32, 0.25, 2.0, 0.5
+    y, x = np.meshgrid(np.arange(n) * step, np.arange(n) * step, indexing="ij")
+    kx, ky = 2 * np.pi * 3 / (n * step), 2 * np.pi * 5 / (n * step)
+    psd, _ = spectra.periodogram(7.0 + a * np.sin(kx * x) + b * np.cos(ky * y), (step, step))
+    moments = spectra.spectral_moments(psd, (n, n), (step, step))
+    assert moments.rms_height == pytest.approx(np.sqrt(a**2 / 2 + b**2 / 2))
+    assert moments.rms_slope == pytest.approx(np.sqrt((a * kx) ** 2 / 2 + (b * ky) ** 2 / 2))
+    assert moments.rms_curvature == pytest.approx(0.5 * np.sqrt((a * kx**2) ** 2 / 2 + (b * ky**2) ** 2 / 2))
+    along = spectra.directional_slopes(psd, (n, n), (step, step))
+    np.testing.assert_allclose(along, [b * ky / np.sqrt(2), a * kx / np.sqrt(2)], rtol=1e-12)
+
+
+def test_nayak_parameter_of_a_ring_and_of_a_wave():
+    # an isotropic ring of one wavelength has 1.5, a profile of one wavelength has 1, and no slope has none
+    assert spectra.Moments(2.0, 2.0 * 9, 2.0 * 81).nayak == pytest.approx(1.5)
+    assert spectra.Moments(2.0, 2.0 * 9, 2.0 * 81, axes=1).nayak == pytest.approx(1.0)
+    assert np.isnan(spectra.Moments(1.0, 0.0, 0.0).nayak)
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("order", [0, 1, 2, 4])
+def test_closed_moments_against_quadrature(hurst, order):
+    spectrum = spectra.SelfAffine(hurst, 1e-3, 3e-4, 2e-6, plateau=4.0)
+    low, corner, high = (2 * np.pi / length for length in (1e-3, 3e-4, 2e-6))
+
+    def integrand(logarithm):
+        q = np.exp(logarithm)
+        return q ** (order + 2) * spectrum.psd(q) / (2 * np.pi)
+
+    parts = [
+        quad(integrand, np.log(a) + 1e-12, np.log(b) - 1e-12, epsrel=1e-11, limit=200)[0]
+        for a, b in ((low, corner), (corner, high))
+    ]
+    assert spectrum.moment(order) == pytest.approx(sum(parts), rel=1e-8)
+
+
+def test_scaled_spectrum_has_the_height_or_slope_asked_for():
+    assert spectra.SelfAffine.scaled(
+        0.8, 1e-3, 1e-3, 1e-6, rms_height=2e-6
+    ).moments().rms_height == pytest.approx(2e-6)
+    assert spectra.SelfAffine.scaled(
+        0.8, 1e-3, 1e-3, 1e-6, rms_slope=0.1
+    ).moments().rms_slope == pytest.approx(0.1)
+    assert spectra.SelfAffine(0.8, 1e-3, 1e-3, 1e-6).psd(np.array([0.0, 1e9])).tolist() == [0.0, 0.0]

@@ -1,0 +1,177 @@
+"""Surfaces in numbers: closed forms, gaps, units, constant faces, labels."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.schema import QUANTITIES
+
+
+def wave(n=64, step=0.1, amplitude=2.0, waves=3, periodic=True):
+    x = np.arange(n) * step
+    heights = np.tile(5.0 + amplitude * np.sin(2 * np.pi * waves * x / (n * step)), (n, 1))
+    return fc.surfaces.from_array(heights, step, periodic=periodic)
+
+
+def test_one_wave_by_its_modes():
+    found = fc.surfaces.describe(wave())
+    k = 2 * np.pi * 3 / 6.4
+    assert float(found.mean_height) == pytest.approx(5.0)
+    assert float(found.rms_height) == pytest.approx(2 / np.sqrt(2))
+    assert float(found.peak_to_valley) == pytest.approx(4.0, rel=0.01)
+    assert float(found.rms_slope) == pytest.approx(2 * k / np.sqrt(2))
+    assert float(found.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2))
+    assert float(found.rms_slope_y) == pytest.approx(0.0, abs=1e-12)
+    assert float(found.rms_curvature) == pytest.approx(k**2 / np.sqrt(2))
+    assert float(found.nayak_parameter) == pytest.approx(1.5)
+    assert float(found.skewness) == pytest.approx(0.0, abs=1e-12)
+    assert float(found.kurtosis) == pytest.approx(1.5)
+
+
+def test_one_wave_by_differences():
+    found = fc.surfaces.describe(wave(periodic=False))
+    step, k = 0.1, 2 * np.pi * 3 / 6.4
+    seen = np.sin(k * step / 2) / (k * step / 2)  # what a difference sees of a wave
+    assert float(found.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2) * seen, rel=0.02)
+    assert float(found.rms_curvature) == pytest.approx(k**2 / np.sqrt(2) * seen**2, rel=0.05)
+
+
+def test_a_plane():
+    zero = fc.surfaces.from_array(np.zeros((20, 30)), (2.0, 0.5))
+    tilted = zero + 0.3 * zero.x - 0.4 * zero.y
+    tilted.attrs = {"units": "m"}
+    found = fc.surfaces.describe(tilted)
+    assert float(found.mean_slope_x) == pytest.approx(0.3)
+    assert float(found.mean_slope_y) == pytest.approx(-0.4)
+    assert float(found.rms_slope) == pytest.approx(0.5)
+    assert float(found.rms_curvature) == pytest.approx(0.0, abs=1e-12)
+    assert float(found.developed_area_ratio) == pytest.approx(np.sqrt(1.25))
+
+
+def test_a_paraboloid_has_its_mean_curvature():
+    x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
+    found = fc.surfaces.describe(fc.surfaces.from_array(0.5 * 0.2 * x**2 + 0.5 * 0.6 * y**2, 1.0))
+    assert float(found.rms_curvature) == pytest.approx(0.4)
+
+
+def test_rms_slope_is_that_asked_of_the_generator():
+    surface = fc.surfaces.spectral((50, 64), (1e-6, 2e-6), hurst=0.8, rms_slope=0.1, rng=1)
+    assert float(fc.surfaces.describe(surface).rms_slope) == pytest.approx(0.1, rel=1e-12)
+
+
+def test_differences_of_a_brownian_surface_are_its_increments():
+    surface = fc.surfaces.fbm((400, 400), 1e-3, hurst=0.5, rms_increment=2e-5, rng=1)
+    found = fc.surfaces.describe(surface)
+    assert float(found.rms_slope_x) == pytest.approx(0.02, rel=0.02)
+    assert float(found.rms_slope) == pytest.approx(0.02 * np.sqrt(2), rel=0.02)
+
+
+def test_against_plain_numpy_with_gaps():
+    rng = np.random.default_rng(0)
+    heights = rng.standard_normal((20, 30))
+    heights[rng.random(heights.shape) < 0.2] = np.nan
+    found = fc.surfaces.describe(fc.surfaces.from_array(heights, (0.5, 2.0)))
+    assert int(found.missing_points) == np.isnan(heights).sum()
+    centred = heights - np.nanmean(heights)
+    assert float(found.rms_height) == pytest.approx(np.sqrt(np.nanmean(centred**2)))
+    assert float(found.skewness) == pytest.approx(np.nanmean(centred**3) / np.nanmean(centred**2) ** 1.5)
+    assert float(found.rms_slope_x) == pytest.approx(
+        np.sqrt(np.nanmean((np.diff(heights, axis=1) / 2.0) ** 2))
+    )
+    assert float(found.rms_slope_y) == pytest.approx(
+        np.sqrt(np.nanmean((np.diff(heights, axis=0) / 0.5) ** 2))
+    )
+    inner = heights[1:-1, 1:-1]
+    laplacian = (heights[1:-1, 2:] - 2 * inner + heights[1:-1, :-2]) / 4.0
+    laplacian += (heights[2:, 1:-1] - 2 * inner + heights[:-2, 1:-1]) / 0.25
+    assert float(found.rms_curvature) == pytest.approx(0.5 * np.sqrt(np.nanmean(laplacian**2)))
+
+
+def test_mirrors_and_transposes():
+    heights = np.random.default_rng(1).standard_normal((12, 15))
+    base = fc.surfaces.describe(fc.surfaces.from_array(heights, (1.0, 2.0)))
+    mirror = fc.surfaces.describe(fc.surfaces.from_array(heights[::-1], (1.0, 2.0)))
+    turned = fc.surfaces.describe(fc.surfaces.from_array(heights.T, (2.0, 1.0)))
+    for name in ("rms_slope", "rms_curvature", "developed_area_ratio", "nayak_parameter"):
+        assert float(mirror[name]) == pytest.approx(float(base[name]), rel=1e-12)
+        assert float(turned[name]) == pytest.approx(float(base[name]), rel=1e-12)
+    assert float(turned.rms_slope_x) == pytest.approx(float(base.rms_slope_y), rel=1e-12)
+    assert float(mirror.mean_slope_y) == pytest.approx(-float(base.mean_slope_y), rel=1e-12)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_units_by_powers_of_two_change_no_bit(periodic):
+    heights = np.random.default_rng(1).standard_normal((12, 15))
+    base = fc.surfaces.describe(fc.surfaces.from_array(heights, (1.0, 1.5), periodic=periodic))
+    moved = fc.surfaces.describe(
+        fc.surfaces.from_array(heights * 2.0**-40, (2.0**-20, 1.5 * 2.0**-20), periodic=periodic)
+    )
+    for name in base.data_vars:
+        if name in ("run_time", "developed_area_ratio"):
+            continue
+        units = QUANTITIES[name].units
+        power = {"m": -40, "m-1": 0}.get(units, -20 if "slope" in name else 0)
+        assert float(moved[name]) == float(base[name]) * 2.0**power, name
+
+
+def test_an_offset_of_a_billion_changes_the_mean_alone():
+    heights = np.round(np.random.default_rng(1).standard_normal((12, 15)) * 64) / 64  # exact beside 1e9
+    base = fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
+    lifted = fc.surfaces.describe(fc.surfaces.from_array(heights + 1e9, 1.0))
+    for name in base.data_vars:
+        if name not in ("run_time", "mean_height"):
+            assert float(lifted[name]) == pytest.approx(float(base[name]), rel=1e-11), name
+    assert float(lifted.mean_height) == pytest.approx(1e9, rel=1e-9)
+
+
+def test_a_constant_face_has_no_skewness_and_says_why():
+    found = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), 3.0), 1.0))
+    for name in ("skewness", "kurtosis", "nayak_parameter"):
+        assert np.isnan(found[name])
+        assert "equal" in found[name].attrs["reason"]
+    for name in ("rms_height", "rms_slope", "rms_curvature", "peak_to_valley", "mean_slope_x"):
+        assert float(found[name]) == 0.0
+    assert float(found.developed_area_ratio) == 1.0
+    assert "reason" not in found.rms_slope.attrs
+
+
+def test_a_face_without_any_point_is_nan_with_a_reason():
+    found = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), np.nan), 1.0))
+    for name, variable in found.data_vars.items():
+        if name not in ("run_time", "missing_points"):
+            assert np.isnan(variable), name
+            assert variable.attrs["reason"] == "no point was observed"
+
+
+def test_isolated_points_have_heights_but_no_slopes():
+    heights = np.full((7, 7), np.nan)
+    heights[::2, ::2] = np.random.default_rng(0).random((4, 4))
+    found = fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
+    assert np.isfinite(found.rms_height)
+    assert np.isfinite(found.mean_slope_x)
+    for name in ("rms_slope", "rms_curvature", "developed_area_ratio"):
+        assert np.isnan(found[name])
+        assert "neighbouring" in found[name].attrs["reason"]
+
+
+def test_members_profiles_and_labels():
+    stack = fc.surfaces.fbm((8, 9), 1.0, hurst=0.5, rms_increment=1.0, rng=1, members=3)
+    found = fc.surfaces.describe(stack)
+    assert found.rms_height.dims == ("member",)
+    one = fc.surfaces.describe(stack.isel(member=2, drop=True))
+    assert float(found.rms_slope[2]) == float(one.rms_slope)
+    for name, variable in {**found.data_vars, **found.coords}.items():
+        assert variable.attrs["units"] == QUANTITIES[name].units
+        assert variable.attrs["long_name"]
+    profile = fc.surfaces.describe(stack.isel(member=0, y=0, drop=True))
+    assert "rms_slope_y" not in profile
+    assert float(profile.rms_slope) == float(profile.rms_slope_x)
+
+
+def test_what_is_no_surface_is_refused():
+    with pytest.raises(InvalidInput, match="DataArray"):
+        fc.surfaces.describe(np.zeros((3, 3)))
+    bad = fc.surfaces.from_array(np.zeros((4, 4)), 1.0).copy(data=np.full((4, 4), np.inf))
+    with pytest.raises(InvalidInput, match="infinite"):
+        fc.surfaces.describe(bad)

@@ -1,0 +1,194 @@
+"""Fractional Brownian surfaces: exactness, shape, units, streams, labels."""
+
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base import threads
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.surfaces import _embedding
+
+EXPONENTS = (0.01, 0.1, 0.3, 0.5, 0.75, 0.76, 0.9, 0.99)
+
+
+def fbm(shape=(24, 30), spacing=1e-3, hurst=0.7, rms_increment=1e-5, rng=5, **options):
+    return fc.surfaces.fbm(shape, spacing, hurst=hurst, rms_increment=rms_increment, rng=rng, **options)
+
+
+def error_of_variogram(shape, spacing, hurst):
+    lag, found = _embedding.embed(shape, spacing, hurst).variogram()
+    exact = lag ** (2 * hurst)
+    return np.abs(found / 2 - exact).max() / exact.max()
+
+
+@pytest.mark.parametrize("hurst", EXPONENTS)
+@pytest.mark.parametrize(
+    ("shape", "spacing"),
+    [
+        ((129, 129), (1.0, 1.0)),
+        ((3, 3), (1.0, 1.0)),
+        ((31, 97), (1.0, 1.0)),
+        ((5, 300), (2.0, 2.0)),
+        ((40, 37), (1.0, 0.3)),
+        ((13, 17), (1e-9, 1e-7)),
+        ((1, 200), (1.0, 0.1)),
+    ],
+)
+def test_implied_variogram_is_exact(shape, spacing, hurst):
+    assert error_of_variogram(shape, spacing, hurst) < 3e-15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", EXPONENTS)
+def test_implied_variogram_is_exact_for_large_surfaces(hurst):
+    embedding = _embedding.embed((2048, 2048), (1.0, 1.0), hurst)
+    lag, found = embedding.variogram()
+    assert np.abs(found / 2 - lag ** (2 * hurst)).max() < 3e-15
+    assert embedding.smallest > -1e-14
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.75, 0.9])
+@pytest.mark.parametrize(
+    ("shape", "spacing"), [((3, 4), (1.0, 1.0)), ((4, 3), (0.5, 1.5)), ((1, 9), (1.0, 2.0))]
+)
+def test_what_is_drawn_has_the_covariance_of_the_process(covariance_of, shape, spacing, hurst):
+    embedding = _embedding.embed(shape, spacing, hurst)
+    found = covariance_of(lambda stream: _pinned(_embedding.draw(embedding, stream))) / 2
+    y, x = np.meshgrid(*(np.arange(n) * s for n, s in zip(shape, embedding.step, strict=True)), indexing="ij")
+    places = np.stack([y.ravel(), x.ravel()], axis=1)
+    away = np.hypot(*places.T) ** (2 * hurst)
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) ** (2 * hurst)
+    np.testing.assert_allclose(found, 0.5 * (away[:, None] + away - apart), atol=1e-14)
+
+
+def _pinned(heights):
+    return heights - heights[0, 0]
+
+
+def test_covariance_of_the_torus_is_continuous_where_its_pieces_meet():
+    for hurst in (0.76, 0.9, 0.99):
+        model = _embedding.Stein.of(hurst)
+        r = np.array([1 - 2e-6, 1 - 1e-6, 1 + 1e-6, 1 + 2e-6])
+        value = model(r**2)
+        assert abs(value[2] - value[1]) < 1e-5
+        np.testing.assert_allclose((value[1] - value[0]), (value[3] - value[2]), rtol=1e-4)
+        assert abs(model(np.array([model.radius**2]))[0]) == 0.0
+
+
+@pytest.mark.parametrize(("hurst", "ratio"), [(0.5, 2.4142), (0.75, 2.4142), (0.8, 3.8284)])
+def test_torus_is_no_larger_than_the_next_fast_length(hurst, ratio):
+    for n in (128, 500, 1024):
+        torus = json.loads(fbm((n, n), hurst=hurst).attrs["provenance"])["torus"]
+        least = (ratio - 1) * (n - 1) + n - 1
+        assert np.floor(least) <= torus[0] <= 1.05 * least
+        assert torus[0] % 2 == 0
+
+
+def test_mean_square_increment_is_the_one_asked_for():
+    # over 400 surfaces of 32 x 32 points the mean square at lag 1 is known to about half a percent
+    heights = fbm((32, 32), 2e-3, hurst=0.5, rms_increment=3e-6, lag=8e-3, members=400).values
+    found = np.mean((heights[:, :, 4:] - heights[:, :, :-4]) ** 2)
+    assert found == pytest.approx(9e-12, rel=0.04)
+    lag_one = np.mean(np.diff(heights, axis=1) ** 2)
+    assert lag_one == pytest.approx(9e-12 / 4, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
+def test_second_differences_have_the_variance_of_the_process(hurst):
+    heights = fbm((128, 128), 1.0, hurst=hurst, rms_increment=1.0, members=60).values
+    second = heights[:, 1:-1, 2:] - 2 * heights[:, 1:-1, 1:-1] + heights[:, 1:-1, :-2]
+    assert np.mean(second**2) == pytest.approx(4 - 4**hurst, rel=0.01)
+
+
+def test_first_point_is_at_height_zero_and_members_differ():
+    heights = fbm(members=3)
+    assert heights.dims == ("member", "y", "x")
+    assert (heights.values[:, 0, 0] == 0).all()
+    assert np.abs(heights.values[0] - heights.values[1]).max() > 0
+
+
+def test_a_member_does_not_depend_on_how_many_there_are():
+    few, many = fbm(members=2), fbm(members=5)
+    np.testing.assert_array_equal(few.values, many.values[:2])
+
+
+def test_profile_and_plane_differ_in_dims_only():
+    profile = fbm(64)
+    assert profile.dims == ("x",)
+    assert profile.values[0] == 0.0
+    np.testing.assert_array_equal(profile.values, fbm((64,)).values)
+
+
+def test_same_stream_same_surface():
+    np.testing.assert_array_equal(fbm(rng=3).values, fbm(rng=np.random.default_rng(3)).values)
+    assert np.abs(fbm(rng=3).values - fbm(rng=4).values).max() > 0
+
+
+@pytest.mark.parametrize("library", ["scipy", "ducc0"])
+def test_any_number_of_threads_gives_the_same_bits(monkeypatch, library):
+    if library == "ducc0" and importlib.util.find_spec("ducc0") is None:
+        pytest.skip("ducc0 is not installed")
+    monkeypatch.setenv("FRACTALCONTACT_FFT", library)
+    surfaces = []
+    for count in (1, 2, 3):
+        with threads.limit(count):
+            surfaces.append(fbm((150, 140)).values)
+    np.testing.assert_array_equal(surfaces[0], surfaces[1])
+    np.testing.assert_array_equal(surfaces[0], surfaces[2])
+
+
+def test_transform_libraries_agree(monkeypatch):
+    pytest.importorskip("ducc0")
+    found = []
+    for library in ("scipy", "ducc0"):
+        monkeypatch.setenv("FRACTALCONTACT_FFT", library)
+        found.append(fbm().values)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-12 * np.abs(found[0]).max())
+
+
+def test_units_by_powers_of_two_change_no_bit():
+    base = fbm(spacing=(1e-3, 3e-3))
+    scaled = fbm(spacing=(1e-3 * 2.0**-30, 3e-3 * 2.0**-30), rms_increment=1e-5 * 2.0**40)
+    np.testing.assert_array_equal(scaled.values, base.values * 2.0**40)
+
+
+def test_lag_sets_the_scale():
+    base = fbm(hurst=0.5)
+    np.testing.assert_allclose(fbm(hurst=0.5, lag=4e-3).values, base.values / 2, rtol=1e-13)
+
+
+def test_labels_and_provenance():
+    surface = fbm(spacing=(1e-3, 2e-3))
+    assert surface.name == "height"
+    assert surface.attrs["units"] == "m"
+    assert "period" not in surface.x.attrs
+    np.testing.assert_allclose(surface.x.values, (np.arange(30) + 0.5) * 2e-3, rtol=1e-14)
+    entry = json.loads(surface.attrs["provenance"])
+    assert entry["random"]["entropy"] == "5"
+    assert entry["parameters"]["lag"] == 2e-3
+    assert entry["clipped_fraction"] == 0.0
+    assert 0 < entry["smallest_eigenvalue"] < 1
+
+
+def test_every_problem_is_told_at_once():
+    with pytest.raises(InvalidInput) as caught:
+        fc.surfaces.fbm((2, 5), -1.0, hurst=1.0, rms_increment=np.nan, members=0)
+    assert len(caught.value.problems) == 5
+    for word in ("shape", "spacing", "hurst", "rms_increment", "members"):
+        assert any(problem.startswith(word) for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.009, 0.995, 1.2, "a", None])
+def test_exponent_out_of_range_is_refused(hurst):
+    with pytest.raises(InvalidInput, match="hurst"):
+        fbm(hurst=hurst)
+
+
+@pytest.mark.parametrize("shape", [(5,) * 3, "ab", 2.5, (4, 5.0), ()])
+def test_wrong_shape_is_refused(shape):
+    with pytest.raises(InvalidInput, match="shape"):
+        fbm(shape)
