@@ -20,6 +20,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "crack": ["Crack"],
         "sliding": ["delta_surface"],
+        "closing": ["closure"],
         "opening": ["dilatancy"],
         "strength": ["friction"],
         "leakage": ["transmissivity"],

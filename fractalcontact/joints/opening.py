@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
-from fractalcontact.joints._checks import check_crack, check_shear, direction_coords, missing
+from fractalcontact.joints._checks import block_coords, check_crack, check_shear, direction_coords, missing
 from fractalcontact.joints._directions import Direction, several_directions
 from fractalcontact.joints._rigid import mean_slopes, separations
 
@@ -32,8 +32,11 @@ def dilatancy(
     direction: str | float | Sequence[str | float] = COMPASS,
     normal_force: float | Sequence[float] | None = None,
     bulk: str = "flat_block",
-    tolerance: float = 1e-8,
     keep: Sequence[str] = (),
+    influence: str | None = None,
+    disc_radius: str | float = "second_order",
+    hardness: float | None = None,
+    tolerance: float = 1e-8,
     progress: bool = False,
 ) -> xr.Dataset:
     """Return the dilatancy of a crack that slides.
@@ -54,10 +57,10 @@ def dilatancy(
     bulk : {"flat_block", "uniform_pressure"}
         What w_b is: the closure of the flat block under the same influence coefficients, or the mean
         settlement under uniform pressure.
-    tolerance : float
-        Of the contact solver, see `fractalcontact.contact.press`.
     keep : sequence of str
-        Maps over (direction, shear, step, y, x) to keep: "state", "pressure", "gap".
+        Maps over (direction, shear, step, y, x) to keep: "state", "pressure", "gap", "displacement".
+    influence, disc_radius, hardness, tolerance
+        As for `fractalcontact.contact.press`.
     progress : bool
         Show a bar over the shears.
 
@@ -69,7 +72,8 @@ def dilatancy(
         which is rigid_dilatancy less mean_slope times v: what is left when the oblique asymptote is taken
         away; basic_friction_angle (degree) and nominal_area (m2). With forces also, over (direction, shear,
         step): dilatancy, interface_closure, closure (m), contact_fraction, corrected_contact_fraction,
-        iterations, residual, converged; and over step: normal_force, nominal_pressure, bulk_closure.
+        mean_gap, elastic_energy, iterations, residual, converged, stop_reason; over step: normal_force,
+        nominal_pressure, bulk_closure; and the maps in `keep`. run_time (s).
 
     Raises
     ------
@@ -86,22 +90,45 @@ def dilatancy(
         shears = check_shear(shear, crack, towards, problems)
         path = None
         if normal_force is not None:
-            from fractalcontact.joints._elastic import check_plan
+            from fractalcontact.joints import _elastic
 
-            path = check_plan(problems, {"normal_force": normal_force}, bulk, keep, tolerance)
+            solver = {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
+            loads = {"normal_force": normal_force}
+            path = _elastic.check_load(problems, loads, bulk, keep, solver | {"tolerance": tolerance})
         elif len(keep):
             problems.add("keep", "maps only together with normal_force", keep)
     start = time.perf_counter()
     result = _rigid(crack, shears, towards)
+    parameters = {"crack": crack.summary(), "shear": shears, "direction": [d.name for d in towards]}
     facts: dict[str, Any] = {}
     if path is not None:
-        from fractalcontact.joints._elastic import add_elastic
-
-        facts = add_elastic(result, crack, shears, towards, path, progress=progress)
+        pressed = [_elastic.press_sheared(crack, shears, d, path, WHERE, progress) for d in towards]
+        facts = {"achieved_residual": max(float(one["residual"].max()) for one in pressed)}
+        result = _with_elastic(result, crack, pressed)
+        parameters |= path.parameters()
     result["run_time"] = time.perf_counter() - start
-    parameters = {"crack": crack.summary(), "shear": shears, "direction": [d.name for d in towards]}
-    parameters |= {} if path is None else {"normal_force": path.values, "bulk": bulk, "tolerance": tolerance}
-    return stamp(label(result), WHERE, parameters, title="dilatancy of a crack", **facts)
+    result = stamp(label(result), WHERE, parameters, title="dilatancy of a crack", **facts)
+    if path is not None:
+        result["bulk_closure"].attrs["comment"] = path.bulk_comment
+    return result
+
+
+def _with_elastic(rigid: xr.Dataset, crack: Crack, pressed: Sequence[dict[str, Array]]) -> xr.Dataset:
+    """Add what was found under force: scalars over (direction, shear, step), and maps."""
+    columns = {name: np.stack([one[name] for one in pressed]) for name in pressed[0]}
+    shared = ("normal_force", "nominal_pressure", "bulk_closure")
+    step = {name: ("step", columns.pop(name)[0, 0]) for name in shared}
+    for name in ("contact_area", "run_time"):
+        del columns[name]
+    dims = ("direction", "shear", "step", "y", "x")
+    found = {name: (dims[: values.ndim], values) for name, values in columns.items()}
+    lifted = rigid["rigid_dilatancy"].values[..., None]
+    found["dilatancy"] = (dims[:3], lifted - columns["interface_closure"])
+    coords: dict[str, Any] = {"step": np.arange(columns["closure"].shape[-1])}
+    coords |= {name: step.pop(name) for name in shared[:2]}
+    if any(values.ndim > 3 for values in columns.values()):
+        coords |= block_coords(crack, crack.layout)
+    return rigid.assign(found | step).assign_coords(coords)
 
 
 def _rigid(crack: Crack, shears: Array, towards: Sequence[Direction]) -> xr.Dataset:

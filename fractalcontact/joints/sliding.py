@@ -77,18 +77,24 @@ def delta_surface(
 
 def _planes(crack: Crack, shears: Array, towards: Direction) -> tuple[Array, float | None]:
     """Return the delta-surfaces and, where a spline was needed, the largest difference from a cubic one."""
-    layout = crack.layout
-    lower, upper = crack.faces()
+    layout, (lower, upper) = crack.layout, crack.faces()
     planes = np.empty((shears.size, *layout.cells))
     error = None
     for plane, shear in zip(planes, shears, strict=True):
+        plane[:] = delta_plane(crack, float(shear), towards, WHERE)
         shift = layout.shift(float(shear), towards.unit)
-        under = heights_under(lower, layout, shift)
-        np.subtract(under, upper, out=plane)
-        gaps = plane.size - int(np.count_nonzero(np.isfinite(plane)))
-        if gaps:
-            raise missing(WHERE, towards, float(shear), gaps)
         if not is_whole(shift) and not all(layout.wraps):
-            cubic = heights_under(lower, layout, shift, degree=3)
-            error = max(error or 0.0, float(np.abs(cubic - under).max()))
+            cubic = heights_under(lower, layout, shift, degree=3) - upper
+            error = max(error or 0.0, float(np.abs(cubic - plane).max()))
     return planes, error
+
+
+def delta_plane(crack: Crack, shear: float, towards: Direction, where: str) -> Array:
+    """Return the heights of one delta-surface, shape (y, x) of the block."""
+    lower, upper = crack.faces()
+    under = heights_under(lower, crack.layout, crack.layout.shift(shear, towards.unit))
+    plane = np.asarray(under - upper)
+    gaps = plane.size - int(np.count_nonzero(np.isfinite(plane)))
+    if gaps:
+        raise missing(where, towards, shear, gaps)
+    return plane

@@ -1,0 +1,209 @@
+"""Closure and elastic dilatancy: what is exact, what the paper orders, and what other rooms give."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+E, NU = 30e9, 0.2
+MODULUS = 15.625e9
+
+
+@pytest.fixture(scope="module")
+def crack(make_face, rough):
+    """A 48-cell block on a 96-cell face, 80 um apart, steep enough to hold the faces apart."""
+    return fc.joints.Crack(make_face(2e-4 * rough((96, 96), 11), 8e-5), young=E, poisson=NU, block=48 * 8e-5)
+
+
+FORCES = [1.0, 10.0, 100.0, 1e3]
+
+
+@pytest.mark.parametrize("options", [{}, {"influence": "square"}, {"disc_radius": "inscribed"}])
+def test_mated_faces_have_no_interface_closure(crack, options):
+    result = fc.joints.closure(crack, shear=0.0, normal_force=[0.0, *FORCES, 7.0], **options)
+    np.testing.assert_array_equal(result.interface_closure, 0.0)
+    np.testing.assert_array_equal(result.contact_fraction[0, 1:], 1.0)
+    by_closure = fc.joints.closure(crack, shear=0.0, closure=[1e-6, 3e-6], **options)
+    np.testing.assert_allclose(by_closure.interface_closure / by_closure.closure, 0.0, atol=1e-15)
+
+
+def test_bulk_is_the_rigid_square(crack):
+    result = fc.joints.closure(crack, shear=0.0, normal_force=[1e3])
+    edge = crack.block[0]
+    assert result.bulk_closure.item() == pytest.approx(1e3 / (1.15230 * MODULUS * edge), rel=0.02)
+    assert "flat block" in result.bulk_closure.attrs["comment"]
+    uniform = fc.joints.closure(crack, shear=0.0, normal_force=[1e3], bulk="uniform_pressure")
+    assert uniform.bulk_closure / result.bulk_closure == pytest.approx(0.946402 * 1.15230, rel=0.01)
+    assert "uniformly" in uniform.bulk_closure.attrs["comment"]
+
+
+def test_closure_is_the_delta_surface_pressed_by_a_flat(crack):
+    shears = [0.0, 8e-5, 2e-4]
+    result = fc.joints.closure(
+        crack, shear=shears, direction="N", nominal_pressure=[1e5, 1e7], keep=("state", "gap")
+    )
+    stiffness = fc.contact.flat_stiffness((48, 48), 8e-5, contact_modulus=MODULUS)
+    for shear in shears[1:]:
+        delta = fc.joints.delta_surface(crack, shear, "N")
+        alone = fc.contact.press(
+            delta, contact_modulus=MODULUS, nominal_pressure=[1e5, 1e7], keep=("state", "gap")
+        )
+        at = result.sel(shear=shear)
+        for name in ("closure", "normal_force", "contact_fraction", "state", "gap"):
+            np.testing.assert_array_equal(at[name], alone[name])
+        np.testing.assert_allclose(
+            at.interface_closure, alone.closure - alone.normal_force / stiffness, rtol=1e-9
+        )
+    np.testing.assert_allclose(result.normal_force / result.nominal_pressure, crack.nominal_area, rtol=1e-12)
+
+
+def test_closure_and_force_control_give_the_same_law(crack):
+    by_force = fc.joints.closure(crack, shear=1.6e-4, normal_force=FORCES, tolerance=1e-11)
+    path = by_force.closure.values[0]
+    by_closure = fc.joints.closure(crack, shear=1.6e-4, closure=path, tolerance=1e-11)
+    np.testing.assert_allclose(by_closure.normal_force[0], FORCES, rtol=1e-6)
+    np.testing.assert_array_equal(by_closure.contact_fraction, by_force.contact_fraction)
+
+
+def test_modulus_and_force_scale_together(crack):
+    stiff = fc.joints.Crack(crack.lower, young=4 * E, poisson=NU, block=crack.block)
+    soft = fc.joints.closure(crack, shear=1.6e-4, normal_force=FORCES)
+    hard = fc.joints.closure(stiff, shear=1.6e-4, normal_force=4 * np.array(FORCES))
+    np.testing.assert_array_equal(soft.closure, hard.closure)
+    np.testing.assert_array_equal(soft.interface_closure, hard.interface_closure)
+
+
+def test_orderings_of_the_paper(crack):
+    cells = np.array([1, 2, 4, 8, 14, 20])
+    result = fc.joints.dilatancy(crack, shear=cells * 8e-5, normal_force=[100.0, 1e3, 3e3])
+    over_directions = result.mean("direction")
+    area = over_directions.contact_fraction.sel(step=2).values
+    # the contact shrinks as the faces lose each other, and then levels
+    assert area[0] > area[1] > area[2] > area[3]
+    assert area[5] > 0.6 * area[3]
+    # the interface gets more compliant
+    assert (np.diff(over_directions.interface_closure.sel(step=2)[:4]) > 0).all()
+    # area and closure grow along the path, area nearly in proportion to the force
+    assert (result.interface_closure.diff("step") > 0).all()
+    assert (result.contact_fraction.diff("step") > 0).all()
+    growth = np.log(
+        over_directions.contact_fraction.sel(step=2) / over_directions.contact_fraction.sel(step=0)
+    )
+    assert (np.abs(growth / np.log(3e3 / 100) - 1) < 0.2).all()
+
+
+def test_elastic_dilatancy_stays_below_the_rigid_one_ordered_by_force(crack):
+    shear = np.arange(0, 5) * 8e-5
+    result = fc.joints.dilatancy(crack, shear=shear, direction=("E", "S"), normal_force=[10.0, 100.0, 1e3])
+    lifted = result.rigid_dilatancy.expand_dims(step=1, axis=-1)
+    curves = np.concatenate([lifted.values, result.dilatancy.values], axis=-1)
+    assert (np.diff(curves[:, 1:], axis=-1) < 0).all()
+    np.testing.assert_array_equal(curves[:, 0], 0.0)
+    assert result.dilatancy.dims == ("direction", "shear", "step")
+    assert result.normal_force.dims == ("step",)
+    np.testing.assert_allclose(result.nominal_pressure * crack.nominal_area, result.normal_force, rtol=1e-12)
+
+
+def test_dilatancy_and_closure_agree(crack):
+    both = {"shear": [8e-5, 2e-4], "normal_force": [10.0, 1e3]}
+    opening = fc.joints.dilatancy(crack, direction="S", keep=("state",), **both)
+    closing = fc.joints.closure(crack, direction="S", keep=("state",), **both)
+    expected = opening.rigid_dilatancy.values[0][:, None] - closing.interface_closure.values
+    np.testing.assert_array_equal(opening.dilatancy[0], expected)
+    np.testing.assert_array_equal(opening.state[0], closing.state)
+    assert opening.state.dims == ("direction", "shear", "step", "y", "x")
+    assert opening.state.dtype == np.int8
+
+
+def test_strength_from_the_elastic_dilatancy(crack):
+    shear = np.arange(0, 6) * 8e-5
+    opening = fc.joints.dilatancy(crack, shear=shear, direction="E", normal_force=[100.0, 1e3])
+    result = fc.joints.friction(opening, smoothing=1.6e-4)
+    assert result.shear_strength.dims == ("direction", "shear", "step")
+    phi = np.radians(result.friction_angle.values)
+    expected = np.where(phi < np.pi / 2, opening.nominal_pressure.values * np.tan(phi), np.nan)
+    np.testing.assert_allclose(result.shear_strength, expected)
+    # the harder the faces are pressed, the less they climb
+    assert (result.friction_angle.isel(step=1) <= result.friction_angle.isel(step=0) + 1e-9).all()
+
+
+def test_two_faces_that_do_not_match(make_face, rough):
+    lower = 1e-5 * rough((40, 40), 1)
+    upper = lower + 3e-6 * rough((40, 40), 2)
+    crack = fc.joints.Crack(make_face(lower, 1e-4), make_face(upper, 1e-4), young=E, poisson=NU, block=2e-3)
+    result = fc.joints.dilatancy(crack, shear=[0.0, 1e-4], direction="E", normal_force=[10.0])
+    inside = crack.layout.slices
+    assert result.initial_offset == pytest.approx((lower - upper)[inside].max())
+    assert (result.rigid_dilatancy.sel(shear=0) == 0).all()
+    assert (result.interface_closure.sel(shear=0) > 0).all()
+    np.testing.assert_array_equal(result.dilatancy.sel(shear=0), -result.interface_closure.sel(shear=0))
+
+
+def test_periodic_faces_have_no_bulk_part(make_face, rough):
+    crack = fc.joints.Crack(make_face(1e-5 * rough((32, 32), 3), 1e-4, periodic=True), young=E, poisson=NU)
+    result = fc.joints.closure(crack, shear=[0.0, 2e-4, 5e-3], nominal_pressure=[1e5, 1e6])
+    assert (result.bulk_closure == 0).all()
+    assert (result.interface_closure.sel(shear=0) == 0).all()
+    delta = fc.joints.delta_surface(crack, 5e-3)
+    alone = fc.contact.press(delta, contact_modulus=MODULUS, nominal_pressure=[1e5, 1e6])
+    np.testing.assert_array_equal(result.closure.sel(shear=5e-3), alone.closure)
+
+
+def test_block_that_is_a_period_along_one_axis_only_is_pressed_as_free(make_face, rough):
+    face = make_face(1e-5 * rough((32, 32), 3), 1e-4, periodic=(False, True))
+    crack = fc.joints.Crack(face, young=E, poisson=NU, block=(1.6e-3, 3.2e-3))
+    result = fc.joints.closure(crack, shear=[4e-3], direction="E", normal_force=[10.0])
+    assert result.bulk_closure.item() > 0
+    assert result.converged.all()
+
+
+def test_hardness_caps_the_pressure(crack):
+    soft = fc.joints.closure(
+        crack, shear=1.6e-4, normal_force=[1e3], hardness=2e9, keep=("pressure", "state")
+    )
+    hard = fc.joints.closure(crack, shear=1.6e-4, normal_force=[1e3], keep=("pressure",))
+    assert soft.pressure.max() <= 2e9 * (1 + 1e-12) < hard.pressure.max()
+    assert (soft.state == 2).any()
+    assert soft.contact_fraction > hard.contact_fraction
+
+
+def test_a_path_that_comes_back_is_elastic(crack):
+    result = fc.joints.closure(crack, shear=1.6e-4, normal_force=[10.0, 1e3, 10.0], tolerance=1e-11)
+    np.testing.assert_allclose(result.closure[0, 2], result.closure[0, 0], rtol=1e-6)
+    assert result.step.values.tolist() == [0, 1, 2]
+
+
+def test_leakage_of_a_pressed_crack(crack):
+    pressed = fc.joints.closure(crack, shear=[8e-5, 4e-4], normal_force=[10.0, 1e3], keep=("gap", "state"))
+    flow = fc.joints.transmissivity(pressed.gap)
+    assert flow.transmissivity.dims == ("shear", "step", "axis")
+    assert (flow.transmissivity.diff("step") < 0).all()
+    np.testing.assert_allclose(flow.open_fraction, 1 - (pressed.state > 0).mean(("y", "x")))
+    np.testing.assert_allclose(flow.aperture, pressed.mean_gap, rtol=1e-9)
+    # no plane conducts more than its cells side by side
+    most = (pressed.gap**3).mean(("y", "x")) / 12
+    assert (flow.transmissivity <= most).all()
+    assert flow.percolates.all()
+
+
+def test_messages(crack):
+    with pytest.raises(ValueError, match="exactly one"):
+        fc.joints.closure(crack, shear=0.0)
+    with pytest.raises(ValueError, match="exactly one"):
+        fc.joints.closure(crack, shear=0.0, closure=1e-6, normal_force=1.0)
+    with pytest.raises(ValueError, match=r"(?s)shear.*normal_force.*keep.*bulk") as caught:
+        fc.joints.closure(crack, shear=-1.0, normal_force=[-2.0], keep=("stat",), bulk="none")
+    assert len(caught.value.problems) == 4
+    with pytest.raises(ValueError, match="only together with normal_force"):
+        fc.joints.dilatancy(crack, shear=0.0, keep=("state",))
+
+
+def test_results_survive_a_file(crack, tmp_path):
+    result = fc.joints.dilatancy(
+        crack, shear=[0.0, 8e-5], normal_force=[10.0, 1e3], direction="E", keep=("state",)
+    )
+    fc.save(result, tmp_path / "dilatancy.nc")
+    back = fc.open(tmp_path / "dilatancy.nc")
+    for name, variable in result.variables.items():
+        np.testing.assert_array_equal(back[name].values, variable.values)
+        assert back[name].attrs.get("units") == variable.attrs.get("units")
