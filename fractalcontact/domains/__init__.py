@@ -11,7 +11,10 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
         "counting": ["box_counts", "box_dimension"],
+        "crossing": ["percolation"],
+        "edges": ["boundary_dimension"],
         "gliding": ["lacunarity"],
         "labelling": ["islands"],
+        "moments": ["generalised_dimensions"],
     },
 )

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fractalcontact.base.scaling import fit_line
 from fractalcontact.domains._masks import Array, Planes, together
 
 RATIOS = (2, 3)
@@ -119,15 +118,24 @@ def regression(sizes: Array, measure: Array) -> Fit:
     """Ordinary least squares of ln N on ln s; the spread is that of the slopes between neighbouring sizes."""
     if sizes.size < 2 or not np.all(measure > 0):
         return Fit(np.nan, np.nan, np.zeros(sizes.size))
-    x, y = np.log(sizes), np.log(measure)
-    line = fit_line(sizes, measure)
+    slope, spread, weights = line(np.log(sizes), np.log(measure))
+    return Fit(0.0 - float(slope), float(spread), -weights)
+
+
+def line(x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Return the least-squares slope, the spread of the slopes from point to point, and d slope / d y.
+
+    `y` has the points on its last axis; leading axes are free. Two points have no spread (NaN).
+    """
     centred = x - x.mean()
+    weights = centred / (centred @ centred)
+    slope = (y - y[..., :1]) @ weights
     steps = np.diff(x)
-    local = -np.diff(y) / steps
-    spread = (
-        float(np.sqrt(np.average((local + line.slope) ** 2, weights=steps))) if sizes.size > 2 else np.nan
-    )
-    return Fit(0.0 - line.slope, spread, -centred / (centred @ centred))
+    local = np.diff(y, axis=-1) / steps
+    if x.size < 3:
+        return slope, np.full(slope.shape, np.nan), weights
+    spread = np.sqrt((local - slope[..., None]) ** 2 @ (steps / steps.sum()))
+    return slope, spread, weights
 
 
 def steady(sizes: Array, area: Array) -> Fit:

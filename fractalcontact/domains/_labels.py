@@ -53,6 +53,12 @@ def label_plane(cells: Array, connectivity: int, periodic: Sequence[bool]) -> La
     return Labels(parts, island, shift, closes[roots])
 
 
+def sizes(labels: Labels) -> Array:
+    """Return the number of cells of every island."""
+    of_parts = np.bincount(labels.parts.ravel(), minlength=labels.island.size)[1:]
+    return np.bincount(labels.island[1:], weights=of_parts, minlength=labels.count + 1)[1:].astype(np.int64)
+
+
 def _links(parts: Array, connectivity: int, periodic: Sequence[bool]) -> list[Array]:
     """Pairs of parts that touch across a seam, with the periods from the first to the second (y, x)."""
     wrap_y, wrap_x = periodic
