@@ -14,6 +14,7 @@ from fractalcontact.plotting._units import name_of, scale_of
 if TYPE_CHECKING:
     import xarray as xr
 
+SMALL = 0.1  # of the unit of a path: a smaller load is told in a unit of its own
 LOADS = {"normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
@@ -44,6 +45,8 @@ def load_text(one: xr.Dataset, whole: xr.Dataset | None = None) -> str:
     for name, symbol in LOADS.items():
         if name in one.variables and one[name].ndim == 0:
             scale = scale_of((one if whole is None else whole)[name])
+            if abs(float(scale(one[name].values))) < SMALL:
+                scale = scale_of(one[name])
             return f"{symbol} = {float(scale(one[name].values)):.3g} {scale.unit}"
     return ""
 

@@ -84,7 +84,8 @@ def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> 
     _maps.framed(ax)
     head = "" if number is None else rf"$\bf{{{_style.letter(number)}}}$  "
     touching = 100 * float(np.mean(flags > 0)) if flags.size else 0.0
-    ax.set_title(f"{head}{name}{',  ' if name else ''}{touching:.2g} % in contact", fontsize=8.5)
+    percent = f"{touching:.0f}" if touching >= 10 else f"{touching:.2g}"
+    ax.set_title(f"{head}{name}{',  ' if name else ''}{percent} % in contact", fontsize=8.5)
 
 
 def _name(one: xr.Dataset, data: xr.Dataset, dim: str) -> str:

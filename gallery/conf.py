@@ -1,0 +1,69 @@
+"""How the site is built: sphinx-build -W -b html gallery gallery/_build/html (no network needed)."""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # the helpers of the examples stand beside this file
+# one study for all examples of the paper, computed anew by every build
+os.environ.setdefault("FRACTALCONTACT_GALLERY", tempfile.mkdtemp(prefix="fractalcontact-gallery-"))
+
+import fractalcontact
+
+project = "fractalcontact"
+author = "The fractalcontact developers"
+copyright = author
+version = release = fractalcontact.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+    "site_parts",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["_build", "GALLERY_HEADER.rst", "README.*"]
+
+# the examples stand in the source folder of the site, and their copies beneath it
+suppress_warnings = ["sphinx_gallery.duplicate_filename"]
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+autosummary_imported_members = True
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": ".",
+    "gallery_dirs": "auto_examples",
+    "filename_pattern": r"[\\/]plot_",
+    "ignore_pattern": r"(conf|site_parts|shared_study|__init__)\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "nested_sections": False,
+    "image_scrapers": ("site_parts",),
+    "reset_modules": (),
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "download_all_examples": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+    "min_reported_time": 1,
+    "copyfile_regex": r".*_study\.py",
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"fractalcontact {version}"
+html_show_sourcelink = False
+html_sidebars = {"index": [], "data_model": [], "conventions": []}
+html_theme_options = {
+    "show_prev_next": False,
+    "navbar_end": ["theme-switcher"],
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "pygments_light_style": "tango",
+}
