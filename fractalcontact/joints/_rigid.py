@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.joints._sliding import Block, Pair, heights_under
+from fractalcontact.surfaces._polynomial import slopes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -40,23 +41,9 @@ def separations(lower: Array, upper: Array, block: Block, shears: Array, unit: P
 
 
 def mean_slopes(face: Array, block: Block) -> Pair:
-    """Return the slopes (y, x) of the least-squares plane of a face; zero along an axis that wraps.
+    """Return the slopes (y, x) of the mean plane of a face; zero along an axis that wraps.
 
     Missing heights are left out.
     """
-    middle = face[tuple(start + size // 2 for start, size in zip(block.start, block.cells, strict=True))]
-    seen = np.isfinite(face)
-    heights = np.where(seen, face - middle, 0.0)
-    count = seen.sum()
-    y = np.where(seen, np.arange(block.face[0])[:, None] - (block.face[0] - 1) / 2, 0.0)
-    x = np.where(seen, np.arange(block.face[1])[None, :] - (block.face[1] - 1) / 2, 0.0)
-    y -= np.where(seen, y.sum() / count, 0.0)
-    x -= np.where(seen, x.sum() / count, 0.0)
-    yy, xx, xy = (y * y).sum(), (x * x).sum(), (x * y).sum()
-    yz, xz = (y * heights).sum(), (x * heights).sum()
-    if any(block.wraps):
-        xy = 0.0  # a periodic axis has no slope, and the other is fitted alone
-    determinant = xx * yy - xy * xy
-    slope_y = 0.0 if block.wraps[0] else (xx * yz - xy * xz) / determinant / block.spacing[0]
-    slope_x = 0.0 if block.wraps[1] else (yy * xz - xy * yz) / determinant / block.spacing[1]
-    return float(slope_y), float(slope_x)
+    found = slopes(face, block.spacing)
+    return tuple(0.0 if wraps else slope for slope, wraps in zip(found, block.wraps, strict=True))  # type: ignore[return-value]
