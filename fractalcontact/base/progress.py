@@ -8,10 +8,12 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def track(items: Iterable[T], enabled: bool, description: str, *, unit: str = "step") -> Iterable[T]:
+def track(
+    items: Iterable[T], enabled: bool, description: str, *, unit: str = "step", total: int | None = None
+) -> Iterable[T]:
     """Iterate over `items`, showing a bar on the error stream when `enabled`."""
     if not enabled:
         return items
     from tqdm import tqdm
 
-    return tqdm(items, desc=description, unit=unit, dynamic_ncols=True, delay=1.0, leave=False)
+    return tqdm(items, desc=description, unit=unit, total=total, dynamic_ncols=True, delay=1.0, leave=False)

@@ -54,8 +54,10 @@ class Scene:
 
     def options(self, table: str, stage: str, keys: Iterable[str]) -> dict[str, Any]:
         """Return the values of `keys` from a table, those of its sub-table `stage` first."""
-        common = self.table(table)
-        own = common.get(stage, {})
+        whole = self.table(table)
+        own = whole.get(stage, {})
+        # a stage may bear the name of an argument ([joint.closure]), so sub-tables are no values
+        common = {key: value for key, value in whole.items() if not isinstance(value, dict)}
         return {key: own.get(key, common.get(key)) for key in keys if key in own or key in common}
 
 

@@ -140,7 +140,7 @@ def _carry_out(
         made = ((key, future.result()) for (key, _), future in zip(missing, futures, strict=True))
     else:
         made = ((key, part()) for key, part in missing)
-    for key, result in track(made, several, stage.name, unit="part"):
+    for key, result in track(made, several, stage.name, unit="part", total=len(missing)):
         store.put(key, result)
         done[key] = result
     return job.join([result for result in done.values() if result is not None]), bool(missing)
