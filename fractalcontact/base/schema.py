@@ -34,10 +34,6 @@ _STATE = {
     "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
     "flag_meanings": "open contact yielded",
 }
-_LINEAGE = {
-    "flag_values": np.array([1, 2, 3, 4, 5], dtype=np.int8),
-    "flag_meanings": "birth death merge split same",
-}
 
 QUANTITIES: dict[str, Quantity] = {
     # coordinates of the plane and of the paths through it
@@ -157,7 +153,7 @@ QUANTITIES: dict[str, Quantity] = {
     "box_size": Quantity("1", "edge of the box in cells"),
     "box_length": Quantity("m", "edge of the box"),
     "box_count": Quantity("1", "number of boxes that meet the set"),
-    "box_measure": Quantity("1", "number of boxes that meet the set, those cut by the edge by their part inside"),
+    "box_measure": Quantity("1", "number of boxes that meet the set, by their part inside the mask"),
     "box_dimension": Quantity("1", "box dimension of the set"),
     "dust_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
     "dust_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
@@ -166,6 +162,10 @@ QUANTITIES: dict[str, Quantity] = {
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
     "lacunarity": Quantity("1", "gliding-box lacunarity"),
     "dust_lacunarity": Quantity("1", "gliding-box lacunarity of a random dust of equal coverage"),
+    "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension"),
+    "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension"),
+    "boundary_dimension_low": Quantity("1", "lower end of the interval of the dimension of the boundary"),
+    "boundary_dimension_high": Quantity("1", "upper end of the interval of the dimension of the boundary"),
     "boundary_sides": Quantity("1", "number of sides of cells on the boundary of the set"),
     "largest_share": Quantity("1", "share of the set in its largest island"),
     "singularity_strength": Quantity("1", "singularity strength alpha(q)"),

@@ -15,6 +15,8 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "edges": ["boundary_dimension"],
         "gliding": ["lacunarity"],
         "labelling": ["islands"],
+        "lineage": ["evolution"],
         "moments": ["generalised_dimensions"],
+        "summary": ["describe"],
     },
 )

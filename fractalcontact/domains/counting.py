@@ -24,14 +24,19 @@ SOURCE = (
 
 
 def box_dimension(
-    mask: xr.DataArray, *, scales: Any = None, cover: str = "minimum", valid: xr.DataArray | None = None
+    mask: xr.DataArray,
+    *,
+    scales: Any = None,
+    cover: str = "minimum",
+    periodic: bool | None = None,
+    valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
     """Box dimension of a set of cells, with its interval and with the value of a random dust beside it.
 
     Parameters
     ----------
     mask : DataArray, dims (..., y, x)
-        Boolean, or integer flags where contact means value > 0. Axes that wrap say so by their `period`.
+        Boolean, or integer flags where contact means value > 0.
     scales : sequence of int, optional
         Edges of the boxes in cells. The dimension is then the least-squares slope of ln N over ln s, all
         sizes alike. By default the sizes are the products of 2 and 3 from one cell to the geometric mean
@@ -41,6 +46,8 @@ def box_dimension(
         Which boxes: the fewest over all offsets of the grid, their mean over all offsets, or those of the
         one grid that starts at the first cell. The default call with "minimum" also looks at the mean,
         and where that is the steadier of the two lets it count as much.
+    periodic : bool, optional
+        Whether boxes go round over the edges; by default what the axes say. True is refused on a free axis.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Cells that were observed. Others are in no set; the counts are divided by the share of the boxes'
         area that was observed.
@@ -63,7 +70,7 @@ def box_dimension(
     ------
     InvalidInput
         The mask is not boolean or integer, its dims are not (..., y, x), a scale is not a whole number of
-        cells between 1 and the extent, or `cover` is unknown.
+        cells between 1 and the extent, `cover` is unknown, or `periodic` is True on a free axis.
 
     Notes
     -----
@@ -74,7 +81,7 @@ def box_dimension(
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.box_dimension") as problems:
         problems.choice("cover", cover, _covers.COVERS)
-        planes = read_mask(mask, problems, valid=valid)
+        planes = read_mask(mask, problems, valid=valid, periodic=periodic)
         sizes = _sizes(scales, planes, cover, problems)
     found = _covers.curve(planes, sizes, cover)
     dimension, half = _fit(planes, sizes, found, cover, chosen=scales is not None)
@@ -95,20 +102,25 @@ def box_dimension(
         "run_time": ((), time.perf_counter() - begin),
     }
     dataset = assemble(planes, variables, _size_coords(sizes, planes), notes=_notes(known, sizes))
-    parameters = {"mask": mask, "scales": scales, "cover": cover, "valid": valid}
+    parameters = {"mask": mask, "scales": scales, "cover": cover, "periodic": periodic, "valid": valid}
     return stamp(
         dataset, "fractalcontact.domains.box_dimension", parameters, title="Box dimension", references=SOURCE
     )
 
 
 def box_counts(
-    mask: xr.DataArray, sizes: Any = None, *, cover: str = "mean", valid: xr.DataArray | None = None
+    mask: xr.DataArray,
+    sizes: Any = None,
+    *,
+    cover: str = "mean",
+    periodic: bool | None = None,
+    valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
     """Number of boxes that meet a set, by size, before any fit.
 
     Parameters
     ----------
-    mask, cover, valid
+    mask, cover, periodic, valid
         See `box_dimension`.
     sizes : sequence of int, optional
         Edges of the boxes in cells; by default all from 1 to half the shorter side. With the cover "mean"
@@ -128,7 +140,7 @@ def box_counts(
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.box_counts") as problems:
         problems.choice("cover", cover, _covers.COVERS)
-        planes = read_mask(mask, problems, valid=valid)
+        planes = read_mask(mask, problems, valid=valid, periodic=periodic)
         every = np.arange(1, max(1, min(planes.grid.shape) // 2) + 1)
         chosen = _sizes(every if sizes is None else sizes, planes, cover, problems, "sizes")
     found = _covers.curve(planes, chosen, cover)
@@ -139,7 +151,7 @@ def box_counts(
         "run_time": ((), time.perf_counter() - begin),
     }
     dataset = assemble(planes, variables, _size_coords(chosen, planes))
-    parameters = {"mask": mask, "sizes": sizes, "cover": cover, "valid": valid}
+    parameters = {"mask": mask, "sizes": sizes, "cover": cover, "periodic": periodic, "valid": valid}
     return stamp(
         dataset, "fractalcontact.domains.box_counts", parameters, title="Box counts", references=SOURCE
     )

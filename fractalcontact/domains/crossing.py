@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,8 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
 from fractalcontact.domains import _labels
-from fractalcontact.domains._masks import Array, assemble, read_mask, together
+from fractalcontact.domains._masks import Array, Planes, assemble, read_mask
+from fractalcontact.domains.labelling import find
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,21 +61,14 @@ def percolation(
     with Problems("fractalcontact.domains.percolation") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
-    wraps = planes.grid.periodic
-    found = together(lambda cells: _labels.label_plane(cells, connectivity, wraps), planes.cells)
-    crosses = np.array([[_crosses(labels, axis, wraps[axis]) for axis in (1, 0)] for labels in found])
-    largest = np.array([_labels.sizes(labels).max(initial=0) for labels in found])
-    share = np.where(planes.occupied > 0, largest / np.maximum(planes.occupied, 1), np.nan)
+    found = across(find(planes, connectivity), planes)
     variables = {
         "coverage": planes.variable(planes.coverage),
-        "largest_share": planes.variable(share),
-        "percolates": planes.variable(crosses, "axis"),
+        "largest_share": planes.variable(found["largest_share"]),
+        "percolates": planes.variable(found["percolates"], "axis"),
         "run_time": ((), time.perf_counter() - begin),
     }
-    neighbours = "4 neighbours" if connectivity == 1 else "8 neighbours"
-    notes = {
-        "percolates": {"long_name": f"an island of the set crosses the plane along the axis ({neighbours})"}
-    }
+    notes = {"percolates": {"long_name": meaning(connectivity)}}
     dataset = assemble(planes, variables, {"axis": ("axis", np.array(AXES))}, notes=notes)
     parameters = {"mask": mask, "connectivity": connectivity, "periodic": periodic, "valid": valid}
     return stamp(
@@ -83,6 +78,23 @@ def percolation(
         title="Percolation of a set",
         references=SOURCE,
     )
+
+
+def across(found: Sequence[_labels.Labels], planes: Planes) -> dict[str, Array]:
+    """Return the share of the largest island, and whether one crosses along x and along y."""
+    largest = np.array([_labels.sizes(labels).max(initial=0) for labels in found])
+    wraps = planes.grid.periodic
+    return {
+        "largest_share": np.where(planes.occupied > 0, largest / np.maximum(planes.occupied, 1), np.nan),
+        "percolates": np.array(
+            [[_crosses(labels, axis, wraps[axis]) for axis in (1, 0)] for labels in found]
+        ),
+    }
+
+
+def meaning(connectivity: int) -> str:
+    """Say what percolates, and by which neighbours."""
+    return f"an island of the set crosses the plane along the axis ({4 * connectivity} neighbours)"
 
 
 def _crosses(labels: _labels.Labels, axis: int, wraps: bool) -> bool:

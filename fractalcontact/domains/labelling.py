@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,14 +67,11 @@ def islands(
     with Problems("fractalcontact.domains.islands") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
-    wraps = planes.grid.periodic
-    found = together(lambda cells: _labels.label_plane(cells, connectivity, wraps), planes.cells)
+    found = find(planes, connectivity)
     tables = [measure(labels, planes) for labels in found]
-    euler = together(lambda cells: _labels.euler_number(cells, connectivity, wraps), planes.cells)
     columns = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
     variables = {
-        **{name: planes.variable(values) for name, values in summary(tables, planes).items()},
-        "euler_number": planes.variable(np.array(euler, np.int64)),
+        **{name: planes.variable(values) for name, values in summary(found, planes, connectivity).items()},
         "label": planes.variable(np.array([labels.map for labels in found]), "y", "x"),
         **{name: ("island", values) for name, values in columns.items()},
         "run_time": ((), time.perf_counter() - begin),
@@ -86,18 +84,26 @@ def islands(
     )
 
 
-def summary(tables: list[dict[str, Array]], planes: Planes) -> dict[str, Array]:
-    """Return the scalars of every plane from its table."""
-    cells = [one["cells"] for one in tables]
+def summary(found: Sequence[_labels.Labels], planes: Planes, connectivity: int) -> dict[str, Array]:
+    """Return the scalars of every plane."""
+    sizes = [_labels.sizes(labels) for labels in found]
+    euler = [_labels.euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
     area = planes.grid.cell_area if planes.grid.known else np.nan
-    largest = np.array([sizes.max() if sizes.size else 0 for sizes in cells], np.int64)
-    mean = np.array([sizes.mean() if sizes.size else np.nan for sizes in cells])
+    largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
+    mean = np.array([cells.mean() if cells.size else np.nan for cells in sizes])
     return {
-        "n_islands": np.array([sizes.size for sizes in cells], np.int64),
+        "n_islands": np.array([cells.size for cells in sizes], np.int64),
         "largest_cells": largest,
         "largest_island": np.where(largest > 0, largest * area, np.nan),
         "mean_island_area": mean * area,
+        "euler_number": np.array(euler, np.int64),
     }
+
+
+def find(planes: Planes, connectivity: int) -> list[_labels.Labels]:
+    """Label every plane."""
+    wraps = planes.grid.periodic
+    return together(lambda cells: _labels.label_plane(cells, connectivity, wraps), planes.cells)
 
 
 def measure(labels: _labels.Labels, planes: Planes) -> dict[str, Array]:
