@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,17 +44,17 @@ def heights_of(
     values: Any,
     spacing: Sequence[float],
     periodic: Sequence[bool],
-    leading: Sequence[str] = (),
+    leading: Mapping[str, Any] | None = None,
 ) -> xr.DataArray:
-    """Return labelled heights; new leading dims get integer coordinates."""
+    """Return labelled heights; leading dims have the coordinates given, or integers for None."""
     import xarray as xr
 
     core = ("y", "x")[2 - len(spacing) :]
-    shape = values.shape[len(leading) :]
-    coords: dict[str, Any] = plane_coords(shape, spacing, periodic, core)
-    for name, size in zip(leading, values.shape, strict=False):
-        coords[name] = (name, np.arange(size))
-    return schema.label(xr.DataArray(values, dims=(*leading, *core), coords=coords, name="height"))
+    names = tuple(leading or {})
+    coords: dict[str, Any] = plane_coords(values.shape[len(names) :], spacing, periodic, core)
+    for (name, given), size in zip((leading or {}).items(), values.shape, strict=False):
+        coords[name] = (name, np.arange(size) if given is None else np.asarray(given))
+    return schema.label(xr.DataArray(values, dims=(*names, *core), coords=coords, name="height"))
 
 
 def make(
@@ -82,7 +82,7 @@ def make(
         made = [one(child) for child in source.spawn(members)]
         values, facts = np.stack([plane for plane, _ in made]), made[0][1]
     elapsed = time.perf_counter() - start
-    leading = () if members is None else ("member",)
+    leading = None if members is None else {"member": None}
     surface = heights_of(values, spacing, (periodic,) * len(spacing), leading)
     return provenance.stamp(
         surface,

@@ -103,9 +103,8 @@ class Embedding:
 def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
     """Return the embedding of a surface of this shape; ny = 1 makes a profile."""
     model = Stein.of(hurst)
-    diagonal = float(np.hypot((shape[0] - 1) * spacing[0], (shape[1] - 1) * spacing[1]))
-    step = (spacing[0] / diagonal, spacing[1] / diagonal)
-    torus = (_side(shape[0], step[0], model.radius), _side(shape[1], step[1], model.radius))
+    step = _in_diagonals(shape, spacing)
+    torus = torus_of(shape, spacing, hurst)
     covariance = _covariance(model, torus, step)
     axes = tuple(axis for axis, n in enumerate(covariance.shape) if n > 1)
     eigenvalues = fft.cosine(covariance, axes)
@@ -122,6 +121,19 @@ def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) ->
     amplitude = np.sqrt(eigenvalues, out=eigenvalues)
     drift = float(np.sqrt(2.0 * model.c2))
     return Embedding(shape, torus, step, amplitude, drift, smallest / largest, clipped)
+
+
+def torus_of(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> tuple[int, int]:
+    """Return how many points the torus of such a surface has along each axis."""
+    step = _in_diagonals(shape, spacing)
+    radius = Stein.of(hurst).radius
+    return _side(shape[0], step[0], radius), _side(shape[1], step[1], radius)
+
+
+def _in_diagonals(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:
+    """Return the spacing over the distance between the outermost points."""
+    diagonal = float(np.hypot((shape[0] - 1) * spacing[0], (shape[1] - 1) * spacing[1]))
+    return spacing[0] / diagonal, spacing[1] / diagonal
 
 
 def _side(n: int, step: float, radius: float) -> int:

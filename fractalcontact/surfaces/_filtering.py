@@ -116,6 +116,7 @@ def filtered_modes(
     reach_y, reach_x = _reach(band, waves_y, waves_x)
     nyquist = (np.pi / spacing[0], np.pi / spacing[1])
     modes = np.zeros((ny, waves_x.size), dtype=np.complex128)
+    numbers = modes.view(np.float64)
     mirrored = [column for column in ((0, nx // 2) if nx % 2 == 0 else (0,)) if column < reach_x]
     weights = np.repeat(half_weights(nx)[:reach_x], 2)
     weights[[2 * column + part for column in mirrored for part in (0, 1)]] = 0.0  # these are added at the end
@@ -127,11 +128,8 @@ def filtered_modes(
         own[rows] = amplitude[:, mirrored]
         doubled = np.repeat(amplitude, 2, axis=1)
         noise = rng.standard_normal(out=scratch[: len(doubled)])
-        noise *= doubled
-        modes[rows, :reach_x] = noise.view(np.complex128)
-        square = (
-            np.multiply(doubled, doubled, out=noise) if expected else np.multiply(noise, noise, out=noise)
-        )
+        drawn = np.multiply(noise, doubled, out=numbers[rows, : 2 * reach_x])
+        square = np.square(doubled if expected else drawn, out=noise)
         across[rows] = np.einsum("ij,j->i", square, weights)
         if slope:
             along[rows] = np.einsum("ij,j->i", square, slope_weights)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -72,7 +74,7 @@ def fbm(
     R times the diagonal plus the extent along each axis, R = 1 up to hurst = .75 and 2 above; for a square
     of n x n points that is 2.42 n or 3.83 n. Memory: about 5 (R = 1) or 9 (R = 2) arrays of n x n numbers.
     A torus side counts the diagonal in spacings of its own axis, so unequal spacings or a slender shape
-    cost more.
+    cost more; what does not fit into the memory of the machine is refused.
     """
     with Problems("fractalcontact.surfaces.fbm") as problems:
         sizes = _arguments.plane_shape(problems, shape)
@@ -81,8 +83,10 @@ def fbm(
         increment = problems.number("rms_increment", rms_increment, above=0)
         distance = steps[-1] if lag is None else problems.number("lag", lag, above=0)
         count = None if members is None else problems.integer("members", members, at_least=1)
-    plane = (1, *sizes)[-2:]
-    plane_steps = (1.0, *steps)[-2:]
+        plane = (1, *sizes)[-2:]
+        plane_steps = (1.0, *steps)[-2:]
+        if not problems.found:
+            _require_memory(problems, plane, plane_steps, exponent)
     embedding = _embedding.embed((plane[0], plane[1]), (plane_steps[0], plane_steps[1]), exponent)
     lag_over_diagonal = distance / (plane_steps[1] / embedding.step[1])
     scale = increment * (np.sqrt(0.5) * lag_over_diagonal**-exponent)
@@ -114,3 +118,21 @@ def fbm(
         title="Fractional Brownian surface",
         references=STEIN,
     )
+
+
+def _require_memory(problems: Problems, shape: Sequence[int], spacing: Sequence[float], hurst: float) -> None:
+    """Note a problem where the torus is larger than the machine."""
+    present = _memory()
+    torus = _embedding.torus_of((shape[0], shape[1]), (spacing[0], spacing[1]), hurst)
+    needed = 8.0 * (0.5 * torus[0] * torus[1] + shape[0] * torus[1] + shape[0] * shape[1])
+    if needed > present:
+        size = f"{torus[0]} x {torus[1]} points, {needed / 2**30:.3g} GiB"
+        problems.add("shape / spacing", f"a torus that fits into {present / 2**30:.3g} GiB of memory", size)
+
+
+def _memory() -> float:
+    """Return the bytes of memory of this machine; infinity where it does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return math.inf

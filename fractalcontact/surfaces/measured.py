@@ -60,10 +60,7 @@ def from_array(
         steps = _arguments.plane_spacing(problems, spacing, axes)
         wraps = _flags(problems, periodic, axes)
         problems.choice("units", units, UNITS)
-    surface = _arguments.heights_of(in_metres(values, units), steps, wraps, tuple(leading))
-    for name, coordinate in leading.items():
-        if coordinate is not None:
-            surface = surface.assign_coords({name: coordinate})
+    surface = _arguments.heights_of(in_metres(values, units), steps, wraps, leading)
     return provenance.stamp(
         surface,
         "fractalcontact.surfaces.from_array",
@@ -82,6 +79,10 @@ def _values(problems: Problems, heights: Any) -> tuple[Any, dict[str, Any], int]
             tuple(dims[-axes:]) == ("y", "x")[2 - axes :], "heights.dims", "(..., y, x) or (..., x)", dims
         )
         leading = {str(dim): heights.coords.get(dim) for dim in dims[:-axes]}
+        for name in leading:
+            problems.require(
+                name in schema.QUANTITIES, "heights.dims", "leading dims such as 'member', 'shear'", name
+            )
         values = heights.data
     else:
         values = heights

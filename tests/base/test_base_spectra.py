@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fractalcontact.base import spectra
+from fractalcontact.base import fft, spectra
 
 
 def plane(shape, seed=0):
@@ -134,3 +134,16 @@ def test_scaled_spectrum_has_the_height_or_slope_asked_for():
         0.8, 1e-3, 1e-3, 1e-6, rms_slope=0.1
     ).moments().rms_slope == pytest.approx(0.1)
     assert spectra.SelfAffine(0.8, 1e-3, 1e-3, 1e-6).psd(np.array([0.0, 1e9])).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("library", ["scipy", "ducc0"])
+def test_transforms_against_the_plain_sum(monkeypatch, library):
+    if library == "ducc0":
+        pytest.importorskip("ducc0")
+    monkeypatch.setenv("FRACTALCONTACT_FFT", library)
+    corner = plane((5, 4))
+    even = np.pad(corner, ((0, 3), (0, 2)), mode="reflect")
+    np.testing.assert_allclose(fft.cosine(corner, (0, 1)), np.fft.fft2(even).real[:5, :4], atol=1e-13)
+    np.testing.assert_allclose(fft.cosine(corner, (1,)), np.fft.fft(even[:5]).real[:, :4], atol=1e-13)
+    modes = plane((3, 6)) + 1j * plane((3, 6), 1)
+    np.testing.assert_allclose(fft.ifft(modes), np.fft.ifft(modes), atol=1e-15)

@@ -192,3 +192,10 @@ def test_exponent_out_of_range_is_refused(hurst):
 def test_wrong_shape_is_refused(shape):
     with pytest.raises(InvalidInput, match="shape"):
         fbm(shape)
+
+
+def test_a_torus_larger_than_the_machine_is_refused_at_once():
+    with pytest.raises(InvalidInput, match="GiB"):
+        fbm((3, 2_000_000))
+    with pytest.raises(InvalidInput, match="GiB"):
+        fbm((4096, 4096), spacing=(1.0, 1e-3))

@@ -54,6 +54,9 @@ def test_profiles_members_and_labelled_arrays():
     shear = xr.DataArray(np.zeros((2, 3, 4)), dims=("shear", "y", "x"), coords={"shear": [0.0, 1e-3]})
     surface = fc.surfaces.from_array(shear, 1.0)
     np.testing.assert_array_equal(surface.shear.values, [0.0, 1e-3])
+    assert surface.shear.attrs["units"] == "m"
+    with pytest.raises(InvalidInput, match="leading dims"):
+        fc.surfaces.from_array(shear.rename(shear="weather"), 1.0)
 
 
 def test_a_dask_array_stays_lazy():

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -49,15 +50,22 @@ def test_powers_of_two_change_no_bit(name):
     np.testing.assert_array_equal(scaled.values, made(name).values * 2.0**20)
 
 
-@pytest.mark.parametrize("name", MAKERS)
-def test_every_surface_is_clean_on_disk(name, tmp_path, compliance):
-    fc.save(made(name, members=2), tmp_path / "a.nc")
-    assert compliance(tmp_path / "a.nc") == []
+RESULTS = {
+    **{name: lambda name=name: made(name, members=2) for name in MAKERS},
+    "from_array": lambda: fc.surfaces.from_array(np.eye(5), 1e-3, periodic=True),
+    "level": lambda: fc.surfaces.level(made("fbm")),
+    "fill": lambda: fc.surfaces.fill(made("fbm").where(made("fbm").x > 2e-3)),
+    "describe": lambda: fc.surfaces.describe(made("fbm", members=2)),
+    "flat": lambda: fc.surfaces.describe(0.0 * made("fbm").assign_attrs(units="m")),
+}
 
 
-def test_statistics_are_clean_on_disk(tmp_path, compliance):
-    fc.save(fc.surfaces.describe(made("fbm", members=2)), tmp_path / "a.nc")
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_is_clean_on_disk_and_comes_back(name, tmp_path, compliance):
+    found = RESULTS[name]()
+    fc.save(found, tmp_path / "a.nc")
     assert compliance(tmp_path / "a.nc") == []
+    xr.testing.assert_identical(fc.open(tmp_path / "a.nc"), found)
 
 
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])

@@ -106,6 +106,21 @@ def test_every_mode_has_its_density(covariance_of, shape, band):
     np.testing.assert_allclose(found * scale, wanted, atol=1e-13 * wanted.max())
 
 
+def test_a_profile_falls_as_a_section_of_the_surface(covariance_of):
+    surface = _spectrum_of_profile(covariance_of, 0.7)
+    k = np.arange(1, 16)
+    np.testing.assert_allclose(surface[k] / surface[1], k ** (-1 - 2 * 0.7), rtol=1e-11)
+
+
+def _spectrum_of_profile(covariance_of, hurst):
+    def heights(stream):
+        band = Band((hurst, hurst), 0.0, 1e-6, np.inf, axes=1)
+        modes, _ = filtered_modes((1, 32), (1.0, 1.0), band, stream, slope=False, expected=False)
+        return np.fft.irfft2(modes, s=(1, 32))
+
+    return np.fft.fft(covariance_of(heights)[0]).real
+
+
 def _density(band, qy, qx):
     """Return the density written out, up to a factor."""
     mean = 2 / (1 / band.hurst[0] + 1 / band.hurst[1])
