@@ -9,12 +9,13 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.plotting._reading import nearest, table
 from fractalcontact.plotting._style import chosen
-from fractalcontact.plotting._units import name_of, scale_of
+from fractalcontact.plotting._units import name_of, scale_for, scale_of, units_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 SMALL = 0.1  # of the unit of a path: a smaller load is told in a unit of its own
+SAME = 5e-3  # loads that differ by less, relative to their size, are told as one
 LOADS = {"normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
@@ -41,13 +42,17 @@ def shear_words(data: xr.Dataset) -> tuple[str, list[str]]:
 
 
 def load_text(one: xr.Dataset, whole: xr.Dataset | None = None) -> str:
-    """Return the load of one step, `F = 30 kN` for example, in the unit that suits the whole path."""
+    """Return the load that a step has for all shears, `F = 30 kN`, in the unit that suits the whole path."""
     for name, symbol in LOADS.items():
-        if name in one.variables and one[name].ndim == 0:
-            scale = scale_of((one if whole is None else whole)[name])
-            if abs(float(scale(one[name].values))) < SMALL:
-                scale = scale_of(one[name])
-            return f"{symbol} = {float(scale(one[name].values)):.3g} {scale.unit}"
+        if name not in one.variables:
+            continue
+        values = np.atleast_1d(one[name].values).ravel()
+        if values.size == 0 or np.ptp(values) > SAME * abs(values[0]):
+            continue
+        scale = scale_of((one if whole is None else whole)[name])
+        if abs(float(scale(values[0]))) < SMALL:
+            scale = scale_for(units_of(one[name]), values[0])
+        return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}"
     return ""
 
 

@@ -37,6 +37,7 @@ STATE_COLOURS = ("#F2F0E9", "#12355B", RED)  # open, contact, yielded
 HEIGHT_MAP, FIELD_MAP, FAMILY_MAP = "cividis", "viridis", "viridis"
 FAMILY_END = 0.86  # the palest end of the map cannot be read on white
 LONGEST_KEY = 8
+WIDE = 30.0  # ratio of the numbers on an axis beyond which it is logarithmic
 
 RC: dict[Any, Any] = {
     "font.size": 9.0,
@@ -186,6 +187,13 @@ def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
     for values, setter in ((x, ax.set_xscale), (y, ax.set_yscale)):
         if values is not None and np.any(np.asarray(values, dtype=float) > 0):
             setter("log")
+
+
+def wide(values: Any) -> bool:
+    """Tell whether positive numbers spread so widely that only a logarithmic axis shows them."""
+    shown = np.asarray(values, dtype=float)
+    shown = shown[np.isfinite(shown)]
+    return bool(shown.size and shown.min() > 0 and shown.max() > WIDE * shown.min())
 
 
 def plain_ticks(ax: Axes) -> None:

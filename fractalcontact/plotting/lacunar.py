@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 SIZES = ("box_length", "box_size")
 DUST: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}
-WIDE = 30.0  # ratio of the numbers on an axis beyond which it is logarithmic
 FEW = 15  # points of a curve that are shown as points
 CURVES = 6  # of a family whose members cross their own dust
 UNSURE = 0.5  # width of an interval beyond which a point is drawn open
@@ -210,8 +209,6 @@ def _lacunarity_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any])
 
 def wide_axis(ax: Axes, places: Any) -> None:
     """Make the x axis logarithmic where positive numbers spread widely over it."""
-    shown = np.asarray(places, dtype=float)
-    shown = shown[np.isfinite(shown)]
-    if shown.size and shown.min() > 0 and shown.max() > WIDE * shown.min():
+    if _style.wide(places):
         ax.set_xscale("log")
         _style.plain_ticks(ax)

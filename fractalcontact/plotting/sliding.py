@@ -127,7 +127,14 @@ def elastic_dilatancy(
     for number, place in enumerate(marked):
         at = nearest(shear, place)
         if np.isclose(shear[at], place, rtol=1e-6, atol=0.0):
-            mark(ax, along(shear[at : at + 1]), across(opening[at : at + 1, -1]), colours[-1], number)
+            mark(
+                ax,
+                along(shear[at : at + 1]),
+                across(opening[at : at + 1, -1]),
+                colours[-1],
+                number,
+                below=True,
+            )
     title, texts = load_words(data)
     entries += [_style.line_entry(text, color=colour) for text, colour in zip(texts, colours, strict=True)]
     ax.set_xlabel(axis_label(data["shear"], along))
@@ -169,8 +176,8 @@ def friction(
         A variable is missing, or there are several directions and none is chosen.
     """
     whole = within(as_dataset(result, "friction"), reach)
-    shown = [name for name in ("friction_angle", "shear_strength") if name in whole] or ["friction_angle"]
-    by_force = "friction_angle" not in whole or "step" in whole["friction_angle"].dims
+    shown = ["friction_angle", "shear_strength"] if "shear_strength" in whole else ["friction_angle"]
+    by_force = "friction_angle" in whole and "step" in whole["friction_angle"].dims
     over = "step" if by_force else "direction"
     chosen = one_direction(whole, direction) if by_force or direction else whole
     data = result_of(chosen, "friction", (*shown, "shear"), ("shear", over))
@@ -180,12 +187,12 @@ def friction(
     for ax, name in zip(axes, shown, strict=True):
         _style.dress(ax)
         curves(ax, data, name, over, entries)
-        if name == "friction_angle" and ax.get_ylim()[1] > LOCKED:
-            ax.set_ylim(top=LOCKED)  # beyond it the faces are locked
     if "basic_friction_angle" in data:
         level = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
         axes[0].axhline(level, color=_style.BLACK, lw=0.8, ls=":")
         entries = [*entries, _style.line_entry("basic angle", color=_style.BLACK, lw=0.8, ls=":")]
+    if axes[0].get_ylim()[1] > LOCKED:
+        axes[0].set_ylim(top=LOCKED)  # beyond it the faces are locked
     _style.beside(axes[-1], entries, title=title)
     return _style.root(sheet)
 
@@ -197,6 +204,9 @@ def curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any])
     for j, entry in enumerate(entries):
         ax.plot(along(shear), across(values[:, j]), color=entry.get_color(), ls=entry.get_linestyle(),
                 marker="o" if shear.size <= FEW else "")  # fmt: skip
+    if name == "shear_strength" and _style.wide(values):
+        ax.set_yscale("log")
+        _style.plain_ticks(ax)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel(axis_label(data[name], across))
 
