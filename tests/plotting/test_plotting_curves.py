@@ -101,6 +101,17 @@ def test_friction_of_rigid_faces_has_a_curve_for_each_direction(made):
         assert holds(drawn(ax), one.shear, one.friction_angle)
 
 
+def test_locked_faces_end_the_axis_at_a_right_angle(made):
+    rubbed = made.friction(made.dilatancy(shears=[0, 1e-4, 2e-4], directions=("W",)))
+    rubbed["friction_angle"].values[0, 0] = 110.0
+    angle, strength = plotting.friction(rubbed).axes
+    assert angle.get_ylim()[1] == 90.0
+    assert angle.get_ylim()[0] < 35.0
+    assert strength.get_yscale() == "linear"
+    rubbed["shear_strength"].values[0, 0, 0] *= 1e-3
+    assert plotting.friction(rubbed).axes[1].get_yscale() == "log"
+
+
 def test_box_dimension_shows_the_dust_and_the_interval(made, closed):
     result = made.box_dimension(closed)
     by_load, by_shear = plotting.box_dimension(result).axes

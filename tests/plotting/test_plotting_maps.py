@@ -51,6 +51,24 @@ def test_maps_at_growing_shear_are_those_of_the_chosen_force(made):
     assert "10 kN" in axes[0].figure.get_suptitle()
 
 
+def test_a_force_that_all_shears_have_is_told_though_it_stands_on_each_of_them(made):
+    closed = made.closure(made.delta(made.heights(), shears=(8e-4, 1.6e-3)))
+    force = closed.normal_force.values * (1 + 1e-9 * np.arange(2)[:, None])
+    closed = closed.assign_coords(normal_force=(("shear", "step"), force))
+    figure = plotting.contact_domains(closed, normal_force=1e4)
+    assert figure.get_suptitle() == "$F$ = 10 kN"
+    force[1] *= 1.5
+    closed = closed.assign_coords(normal_force=(("shear", "step"), force))
+    assert plotting.contact_domains(closed, normal_force=1e4).get_suptitle() == ""
+
+
+def test_loads_of_a_path_share_a_unit_unless_one_is_small(made):
+    closed = made.closure(made.delta(made.heights(), shears=(8e-4,)), forces=(40.0, 4e3, 2e4))
+    titles = [ax.get_title(loc="left") for ax in plotting.contact_domains(closed).axes]
+    for title, force in zip(titles, ("40 N", "4 kN", "20 kN"), strict=True):
+        assert f"= {force}," in title
+
+
 def test_one_of_shear_and_force_must_be_chosen(made):
     closed = made.closure(made.delta(made.heights()))
     with pytest.raises(InvalidInput, match="exactly one"):
