@@ -267,3 +267,13 @@ def follow(start, stop, rows, u, r, step):  # type: ignore[no-untyped-def]
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 u[i, j] -= step * r[i, j]
+
+
+@kernel
+def pair_sum(start, stop, table, iy, ix, from_y, from_x, value, out):  # type: ignore[no-untyped-def]
+    """Sum of table[distance to source] * value over the sources, for every node."""
+    for k in range(start, stop):
+        total = 0.0
+        for m in range(value.size):
+            total += table[abs(iy[k] - from_y[m]), abs(ix[k] - from_x[m])] * value[m]
+        out[k] = total

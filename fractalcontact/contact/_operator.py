@@ -66,7 +66,7 @@ class FreeOperator:
     def apply(self, pressure: Array) -> Array:
         """Return the settlement under `pressure`."""
         self.transforms += 1
-        return fft.convolve(pressure, self.symbol, self.padded)
+        return np.ascontiguousarray(fft.convolve(pressure, self.symbol, self.padded))
 
 
 def padded_length(n: int) -> int:

@@ -80,7 +80,7 @@ class Step:
 
 def solve_path(path: Path) -> Iterator[Step]:
     """Yield the steps of a path as they are solved."""
-    solver = _flat_steps if path.body.influence != "" and not path.gap.any() else _rough_steps
+    solver = _rough_steps if path.gap.any() else _flat_steps
     yield from solver(path)
 
 
@@ -140,15 +140,8 @@ def _eliminator(problem: Problem):  # type: ignore[no-untyped-def]
 
 
 def _descender(problem: Problem, tolerance: float):  # type: ignore[no-untyped-def]
-    from fractalcontact.contact._descent import Control, Descent
+    from fractalcontact.contact._descent import Control
+    from fractalcontact.contact._fast import Fast
 
-    descent = Descent(problem)
-    last: list[Array | None] = [None]
-
-    def advance(total: float | None, closure: float | None) -> Solution:
-        start = np.ones(problem.body.shape) if last[0] is None else last[0]
-        solution = descent.solve(start, Control(total, closure), tolerance)
-        last[0] = solution.pressure
-        return solution
-
-    return advance
+    fast = Fast(problem, tolerance)
+    return lambda total, closure: fast.step(Control(total, closure))

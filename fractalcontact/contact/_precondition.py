@@ -31,7 +31,8 @@ from fractalcontact.contact._problem import Body
 Array = np.ndarray[Any, np.dtype[Any]]
 
 BIN = 4  # nodes along the edge of a bin, for equal spacings
-FADE = 0.03
+REACH = 0.65  # decay length of the kernel, in bins
+FADE = 0.04
 MARGIN = 8  # a free body has n/MARGIN more nodes for the extension beyond its edges
 
 
@@ -50,7 +51,10 @@ class Preconditioner:
             fft.wavenumbers(self.bins[0], edge[0])[:, None],
             fft.wavenumbers(self.bins[1], edge[1], real=True)[None, :],
         )
-        self.smooth = np.exp(-0.5 * np.sqrt(edge[0] * edge[1]) * q).astype(kind)
+        self.smooth = np.exp(-REACH * np.sqrt(edge[0] * edge[1]) * q).astype(kind)
+        q[0, 0] = np.inf
+        self.compliance = (2.0 / q).astype(kind) if body.periodic else None
+        self.self_compliance = float(np.sqrt(body.spacing[0] * body.spacing[1])) / 2
         extent = np.sqrt(self.plane[0] * body.spacing[0] * self.plane[1] * body.spacing[1])
         # of a flat block under a rigid flat; a periodic body has no stiffness of its own for the mean
         self.mean_stiffness = 1.0 / float(extent)
@@ -83,6 +87,18 @@ class Preconditioner:
         in_bands(_kernels.collect, self.bins[0], size, *grid, pressed, self.sums)
         weight *= self.sums
         return pressed, self.spread(weight)
+
+    def mean_settlement(self) -> float:
+        """Sum, over the set, of the settlement under unit pressure on the set, roughly (periodic bodies)."""
+        if self.compliance is None:
+            return float("inf")
+        modes = fft.rfft2(self.counts)
+        modes *= self.compliance
+        settled = fft.irfft2(modes, self.bins, overwrite=True) / (self.rows * self.columns)
+        count = float(self.counts.sum())
+        size = self.plane[0] * self.plane[1]
+        alone = self.self_compliance * count * (1.0 - count / size)
+        return float(np.sum(np.sum(self.counts * settled, axis=1), dtype=np.float64)) + alone
 
     def whole(self, gap: Array) -> Array:
         """Precondition a gap that is free on the whole of the body."""

@@ -8,7 +8,6 @@ therefore leaves every number of the computation as it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,10 +55,10 @@ class Problem:
     gap: Array
     cap: float = np.inf
 
-    @cached_property
-    def mean_gap(self) -> float:
-        """Mean gap at first touch."""
-        return serial_mean(self.gap)
+    @property
+    def local(self) -> float:
+        """Nominal pressure times grid spacing for unit sum of pressure: a length the error is measured in."""
+        return float(np.sqrt(self.body.spacing[0] * self.body.spacing[1])) / self.gap.size
 
 
 @dataclass

@@ -1,0 +1,207 @@
+"""The fast method along a path: on which nodes each step is solved, from where, and in which precision.
+
+A periodic body is solved on its plane. A free body touches only where the gap at first touch is less than
+the closure, for its settlement is positive everywhere: few such nodes are solved by sums over pairs, more of
+them on the window that holds them. Under force control the closure is not known before; solving on too few
+nodes overestimates it, so that what it finds either verifies the nodes or names all that are needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.contact._descent import Control, Descent
+from fractalcontact.contact._nested import cold_start, plane_descent
+from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
+from fractalcontact.contact._problem import Body, Problem, Solution
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Window = tuple[slice, slice]
+
+SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
+SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
+GREATEST_REACH = 2.0  # extrapolation along the path, in steps
+FEW_NODES = 1500  # candidates up to which sums over pairs are faster than transforms
+FIRST_NODES = 256  # candidates to begin with
+WHOLE = 0.75  # part of the extent from which a window is not worth having
+ROOM = 1.1  # window for this much more than the expected closure
+
+
+class Fast:
+    """Solver of one problem, kept along a path."""
+
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        self.problem, self.tolerance = problem, tolerance
+        self.known: list[tuple[float, float, Array]] = []  # the last two steps: control, closure, pressure
+        self.plane: Plane | None = None
+        self.spent = (0, 0)
+
+    def step(self, control: Control) -> Solution:
+        """Solve one step of the path."""
+        self.spent = (0, 0)
+        if self.problem.body.periodic:
+            solution = self.on_plane(control, (slice(None), slice(None)), self.guess(control))
+        else:
+            solution = self.on_nodes(control) or self.on_window(control)
+        self.known = [*self.known[-1:], (control.value, solution.closure, solution.pressure)]
+        return replace(solution, iterations=self.spent[0], transforms=self.spent[1])
+
+    def count(self, solution: Solution) -> Solution:
+        """Add up the work of the attempts of a step."""
+        self.spent = (self.spent[0] + solution.iterations, self.spent[1] + solution.transforms)
+        return solution
+
+    def guess(self, control: Control) -> Array | None:
+        """Pressure extrapolated from the last two steps, linearly in the logarithm of the control."""
+        if not self.known:
+            return None
+        value, _, pressure = self.known[-1]
+        if len(self.known) == 2 and self.known[0][0] != value:
+            reach = np.log(control.value / value) / np.log(value / self.known[0][0])
+            if abs(reach) <= GREATEST_REACH:
+                return np.maximum(pressure + reach * (pressure - self.known[0][2]), 0.0)
+        return pressure * (control.value / value)
+
+    def expected_closure(self, control: Control) -> float | None:
+        """Closure given, or extrapolated as a power of the force."""
+        if control.closure is not None:
+            return control.closure
+        if not self.known:
+            return None
+        value, closure, _ = self.known[-1]
+        power = 1.0
+        if len(self.known) == 2 and self.known[0][0] != value:
+            power = np.log(closure / self.known[0][1]) / np.log(value / self.known[0][0])
+        return float(closure * (control.value / value) ** min(max(power, 0.0), 1.0))
+
+    # few nodes
+
+    def on_nodes(self, control: Control) -> Solution | None:
+        """Solve by sums over pairs; None where there are too many candidates."""
+        gap = self.problem.gap.ravel()
+        self.ordered = getattr(self, "ordered", None) if hasattr(self, "ordered") else np.sort(gap)
+        closure = self.expected_closure(control)
+        room = 1.0 if control.closure is not None else ROOM
+        count = FIRST_NODES if closure is None else self.candidates(closure * room)
+        start = self.guess(control)
+        while 0 < (count := min(max(count, 1), gap.size)) <= FEW_NODES:
+            chosen = np.flatnonzero(gap <= self.ordered[count - 1])
+            solution = self.count(self.solve_nodes(chosen, control, start))
+            if control.closure is not None or self.candidates(solution.closure) <= chosen.size:
+                return self.embedded(solution, chosen)
+            start = self.embedded_pressure(solution, chosen)
+            count = min(self.candidates(solution.closure), 4 * chosen.size)
+        return None
+
+    def candidates(self, closure: float) -> int:
+        """Nodes whose gap at first touch is below a closure."""
+        return int(np.searchsorted(self.ordered, closure))
+
+    def solve_nodes(self, chosen: Array, control: Control, start: Array | None) -> Solution:
+        """Solve on the nodes `chosen` alone."""
+        body, nx = self.problem.body, self.problem.body.shape[1]
+        if not hasattr(self, "tables"):
+            self.tables = (body.table(), stiffness_table(body))
+        iy, ix = chosen // nx, chosen % nx
+        operator, precondition = PairSum(self.tables[0], iy, ix), NodePreconditioner(self.tables[1], iy, ix)
+        gap = self.problem.gap.reshape(1, -1)[:, chosen]
+        first = np.ones(gap.shape) if start is None else start.reshape(1, -1)[:, chosen]
+        descent = Descent(gap, self.problem.cap, operator, precondition, self.problem.local, np.float64)
+        return descent.solve(first if first.any() else np.ones(gap.shape), control, self.tolerance)
+
+    def embedded_pressure(self, solution: Solution, chosen: Array) -> Array:
+        """Pressure on the whole extent."""
+        pressure = np.zeros(self.problem.body.shape)
+        pressure.ravel()[chosen] = solution.pressure.ravel()
+        return pressure
+
+    def embedded(self, solution: Solution, chosen: Array) -> Solution:
+        """Solution on the whole extent, with the settlement everywhere."""
+        return self.everywhere(replace(solution, pressure=self.embedded_pressure(solution, chosen)))
+
+    def everywhere(self, solution: Solution) -> Solution:
+        """Settlement on the whole extent."""
+        if not hasattr(self, "operator"):
+            self.operator = self.problem.body.operator()
+        self.spent = (self.spent[0], self.spent[1] + 1)
+        return replace(solution, settlement=self.operator.apply(solution.pressure))
+
+    # a window of the plane
+
+    def on_window(self, control: Control) -> Solution:
+        """Solve on the window that holds every candidate."""
+        start, closure = self.guess(control), self.expected_closure(control)
+        if start is None:
+            start, expected = cold_start(self.problem, control, np.float64)
+            closure = expected if closure is None else closure
+        window = self.window(ROOM * float(closure or 0.0))
+        while True:
+            solution = self.on_plane(control, window, start)
+            if window == (slice(None), slice(None)):
+                return solution
+            outside = np.ones(self.problem.body.shape, dtype=bool)
+            outside[window] = False
+            pressure = np.zeros(self.problem.body.shape)
+            pressure[window] = solution.pressure
+            if control.closure is not None or not (self.problem.gap[outside] < solution.closure).any():
+                return self.everywhere(replace(solution, pressure=pressure))
+            start, window = pressure, self.window(solution.closure)
+
+    def window(self, closure: float) -> Window:
+        """Box of the nodes whose gap is below `closure`, with some room; the whole where it is not much less."""
+        near = self.problem.gap < closure
+        box = []
+        for axis, n in enumerate(near.shape):
+            hit = np.flatnonzero(near.any(axis=1 - axis))
+            first, last = (int(hit[0]), int(hit[-1]) + 1) if hit.size else (0, n)
+            step = max(1, n // 16)
+            box.append(slice(first // step * step, min(n, -(-last // step) * step)))
+        size = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
+        if size > WHOLE * near.size or min(s.stop - s.start for s in box) < 3:
+            return slice(None), slice(None)
+        return box[0], box[1]
+
+    def on_plane(self, control: Control, window: Window, start: Array | None) -> Solution:
+        """Solve on a window of the plane."""
+        if start is None:
+            start = cold_start(self.problem, control, np.float32)[0]
+        if self.plane is None or self.plane.window != window:
+            self.plane = Plane(self.problem, window)
+        return self.count(self.plane.solve(start[window], control, self.tolerance))
+
+
+class Plane:
+    """The iteration on a window of the plane, first in single and then in double precision."""
+
+    def __init__(self, problem: Problem, window: Window) -> None:
+        self.window = window
+        gap = problem.gap[window]
+        body = replace(problem.body, shape=(gap.shape[0], gap.shape[1]))
+        self.part = Problem(body, gap, problem.cap)
+        self.local = problem.local
+        self.single: Descent | None = None
+        self.double: Descent | None = None
+
+    def solve(self, start: Array, control: Control, tolerance: float) -> Solution:
+        """Solve from `start`."""
+        before = (0, 0)
+        if self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
+            self.single = self.single or self.descent(np.float32)
+            rough = self.single.solve(start, control, SINGLE_ENOUGH, certify=False)
+            start, before = rough.pressure, (rough.iterations, rough.transforms)
+        self.double = self.double or self.descent(np.float64)
+        solution = self.double.solve(start, control, tolerance)
+        return replace(
+            solution,
+            iterations=solution.iterations + before[0],
+            transforms=solution.transforms + before[1],
+        )
+
+    def descent(self, kind: Any) -> Descent:
+        """Return the iteration in one precision."""
+        descent = plane_descent(self.part, kind)
+        descent.local = self.local
+        return descent

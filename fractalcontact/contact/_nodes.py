@@ -1,0 +1,77 @@
+"""The fast method for few nodes: a contact of up to some thousand candidates, without any transform.
+
+A rough free body that is lightly pressed touches at a few dozen nodes scattered over the whole face. Then
+sums over pairs of nodes are cheaper than transforms of planes, by two orders of magnitude for some ten nodes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.jit import in_bands
+from fractalcontact.contact import _kernels
+from fractalcontact.contact._operator import Wavenumbers
+from fractalcontact.contact._problem import Body
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class PairSum:
+    """Sums a table of influence over pairs of nodes (iy, ix)."""
+
+    def __init__(self, table: Array, iy: Array, ix: Array) -> None:
+        self.table, self.iy, self.ix = table, iy, ix
+        self.transforms = 0
+
+    def apply(self, value: Array) -> Array:
+        """Sum over all nodes of table[distance] times value, for every node."""
+        sources = np.flatnonzero(value)
+        flat = value.reshape(-1)
+        out = np.zeros_like(flat)
+        in_bands(
+            _kernels.pair_sum,
+            flat.size,
+            flat.size * sources.size,
+            self.table,
+            self.iy,
+            self.ix,
+            self.iy[sources],
+            self.ix[sources],
+            flat[sources],
+            out,
+        )
+        return out.reshape(value.shape)
+
+
+class NodePreconditioner:
+    """|q|/2 between the nodes of a set, without extension: contacts this small are nearly separate."""
+
+    def __init__(self, table: Array, iy: Array, ix: Array) -> None:
+        self.pairs = PairSum(table, iy, ix)
+        self.rows, self.columns, self.bins = 1, iy.size, (1, 1)
+        self.mask = np.zeros((1, iy.size), dtype=np.bool_)
+        self.x = np.zeros((1, iy.size))
+        self.sums, self.counts, self.nothing = (np.zeros(self.bins) for _ in range(3))
+        self.transforms = 0
+
+    def apply(self) -> tuple[Array, Array]:
+        """Pressure for the gap in x on the set in mask."""
+        self.x[~self.mask] = 0.0
+        return self.pairs.apply(self.x), self.nothing
+
+    def mean_settlement(self) -> float:
+        """Infinite: the mean needs no help."""
+        return float("inf")
+
+
+def stiffness_table(body: Body) -> Array:
+    """Kernel of |q|/2 in space, at offsets (i, j) up to the shape of the body."""
+    ny, nx = body.shape
+    plane = (2 * ny, 2 * nx)
+    impulse = np.zeros(plane)
+    impulse[0, 0] = 1.0
+    extent = float(np.sqrt(ny * body.spacing[0] * nx * body.spacing[1]))
+    waves = Wavenumbers(plane, body.spacing)
+    return np.ascontiguousarray(waves.apply(impulse, 0.5, invert=False, mean=1.0 / extent)[:ny, :nx])
