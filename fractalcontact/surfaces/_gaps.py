@@ -32,12 +32,17 @@ def filled(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -
     values[missing] = 0.0
     rows = _bending(missing, spacing, periodic)
     unknown = rows[:, missing.ravel()].tocsc()
-    right = unknown.T @ (rows @ values.ravel())
-    solved = splu(
-        (unknown.T @ unknown).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-    ).solve(-right)
+    # positive definite: no pivoting, which would only fill the factors
+    factors = splu(
+        (unknown.T @ unknown).tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    for _ in range(2):  # the second pass takes out what rounding left in the first
+        values[missing] -= factors.solve(unknown.T @ (rows @ values.ravel()))
     result = heights.copy()
-    result[missing] = reference + scale * solved
+    result[missing] = reference + scale * values[missing]
     return result
 
 

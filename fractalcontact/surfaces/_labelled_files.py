@@ -20,13 +20,16 @@ if TYPE_CHECKING:
 
 def read_netcdf(
     path: Path, channel: str | None, units: str | None, spacing: Sequence[float] | None, problems: Problems
-) -> xr.DataArray:
-    """Return `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x) in metres."""
+) -> tuple[xr.DataArray, str | None]:
+    """Return `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x) in metres.
+
+    The unit that the file states comes second.
+    """
     array = _variable(netcdf.open(path), channel, problems, path.name)
     if array is None:
         import xarray as xr
 
-        return xr.DataArray(np.zeros((3, 3)), dims=("y", "x"))
+        return xr.DataArray(np.zeros((3, 3)), dims=("y", "x")), None
     core = [dim for dim in ("y", "x") if dim in array.dims]
     array = array.transpose(..., *core)
     stated = array.attrs.get("units")
@@ -40,7 +43,8 @@ def read_netcdf(
     array.attrs["units"] = "m"
     array = _coordinates(array, core, spacing)
     check_surface(array, problems, str(array.name), finite=False, smallest=2, leading=True, profile=True)
-    return array.drop_vars([name for name in array.coords if name not in QUANTITIES]).rename("height")
+    array = array.drop_vars([name for name in array.coords if name not in QUANTITIES])
+    return array.rename("height"), stated
 
 
 def _variable(content: Any, channel: str | None, problems: Problems, name: str) -> xr.DataArray | None:

@@ -190,6 +190,10 @@ def read(
     else:
         found = _table(source, suffix, units, steps, first_row) if table else None
         surface, facts, microscope = found or _instrument(source, channel, units, steps)
+    stated = facts["stated_unit"]
+    if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
+        message = f"{source.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
+        warnings.warn(message, ScaleWarning, stacklevel=2)
     axes = 2 if "y" in surface.dims else 1
     extent = tuple(
         n * _step(surface, dim) for dim, n in zip(surface.dims[-axes:], surface.shape[-axes:], strict=True)
@@ -250,10 +254,6 @@ def _instrument(
             )
             raise UnreadableFile("fractalcontact.surfaces.read", [message]) from None
         raise
-    stated = reading.facts["stated_unit"]
-    if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
-        message = f"{path.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
-        warnings.warn(message, ScaleWarning, stacklevel=3)
     periodic = (reading.periodic,) * len(reading.spacing)
     return (
         _arguments.heights_of(reading.heights, reading.spacing, periodic),
@@ -269,9 +269,11 @@ def _netcdf(
 
     with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
         problems.require(not isinstance(channel, int), "channel", "the name of a variable", channel)
-        surface = read_netcdf(path, None if channel is None else str(channel), units, spacing, problems)
+        surface, stated = read_netcdf(
+            path, None if channel is None else str(channel), units, spacing, problems
+        )
     before = surface.attrs.get("provenance")
-    facts = {"stated_unit": surface.attrs.get("units"), "before": json.loads(before) if before else None}
+    facts = {"stated_unit": stated, "before": json.loads(before) if before else None}
     return schema.label(surface), facts, False
 
 

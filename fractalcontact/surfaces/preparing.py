@@ -77,7 +77,7 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:
     at_most : float
         Largest fraction of missing points that is accepted. What is filled was not measured: beyond a
         small part, crop the surface or use a method that bears gaps. Time and memory grow with the
-        largest gap, about 10 s and 1 GB for one of 300 x 300 points.
+        largest gap: about 2 s for one of 300 x 300 points, 10 s and 1.5 GiB for 600 x 600.
 
     Returns
     -------

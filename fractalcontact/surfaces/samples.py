@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,10 +52,12 @@ def _crack() -> xr.DataArray:
 
 
 def _land() -> xr.DataArray:
-    from fractalcontact.surfaces.measured import from_array
     from matplotlib import cbook
 
-    with cbook.get_sample_data("jacksboro_fault_dem.npz") as file:
+    from fractalcontact.surfaces.measured import from_array
+
+    content: Any = cbook.get_sample_data("jacksboro_fault_dem.npz")
+    with content as file:
         heights = np.asarray(file["elevation"], dtype=np.float64)
         step_y, step_x = float(file["dy"]), float(file["dx"])
         latitude = np.deg2rad(0.5 * (float(file["ymin"]) + float(file["ymax"])))
@@ -65,7 +67,7 @@ def _land() -> xr.DataArray:
 
 
 def _metres_per_degree(latitude: float) -> tuple[float, float]:
-    """Return the length of one degree of latitude and of longitude on the WGS 84 ellipsoid (latitude in rad)."""
+    """Return the length of a degree of latitude and one of longitude (WGS 84; latitude in rad)."""
     major, flattening = 6378137.0, 1.0 / 298.257223563
     eccentricity = flattening * (2.0 - flattening)
     squeezed = 1.0 - eccentricity * np.sin(latitude) ** 2

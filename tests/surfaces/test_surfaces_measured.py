@@ -160,6 +160,9 @@ def test_foreign_netcdf_is_turned_and_converted(tmp_path):
     assert surface.name == "height"
     np.testing.assert_allclose(surface.values, HEIGHTS[::-1], rtol=1e-15)
     np.testing.assert_allclose(surface.y.values, [0.0, 2e-3, 4e-3], rtol=1e-15)
+    with pytest.warns(ScaleWarning, match="states 'um'"):
+        again = fc.surfaces.read(tmp_path / "a.nc", units="mm")
+    np.testing.assert_allclose(again.values, 1e3 * surface.values, rtol=1e-15)
 
 
 def test_netcdf_tree_and_variable_by_name(tmp_path):

@@ -142,6 +142,14 @@ def test_fill_continues_a_plane_exactly():
     np.testing.assert_allclose(fc.surfaces.fill(holed).values, plane.values, atol=1e-13)
 
 
+def test_a_large_gap_in_a_plane_is_filled_to_rounding():
+    zero = fc.surfaces.from_array(np.zeros((170, 170)), 1.0)
+    plane = _metres(zero + 3.0 * zero.x - 7.0 * zero.y)
+    holed = plane.copy(deep=True)
+    holed.values[10:160, 10:160] = np.nan
+    np.testing.assert_allclose(fc.surfaces.fill(holed, at_most=0.8).values, plane.values, atol=1e-10)
+
+
 def test_fill_minimises_the_bending_energy():
     # dense least squares over the filled points, with every second difference written out
     surface = with_gaps(rough((7, 8), (1.0, 0.5)), 0.2, seed=2)
