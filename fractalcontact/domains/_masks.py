@@ -26,6 +26,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 S = TypeVar("S")
 R = TypeVar("R")
 
+TAKEN = ("axis", "box_size", "island", "moment_order")  # dims that results add
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
 
 
@@ -108,6 +109,9 @@ def read_mask(
         return stand_in
     if tuple(mask.dims[-2:]) != CORE_DIMS or min(mask.shape, default=0) < 1:
         problems.add(argument, EXPECTED + ", none of them empty", f"sizes {dict(mask.sizes)}")
+        return stand_in
+    if set(TAKEN) & set(mask.dims):
+        problems.add(f"{argument}.dims", f"leading dims other than {', '.join(TAKEN)}", mask.dims)
         return stand_in
     grid = _grid(mask, problems, argument)
     wraps = resolve_periodic(periodic, grid, problems, "periodic")

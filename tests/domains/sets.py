@@ -1,0 +1,87 @@
+"""Sets whose dimension is known, and masks made of them."""
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.grid import plane_coords
+
+GENERATORS = {
+    "carpet": np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]]),
+    "cantor_dust": np.array([[1, 0, 1], [0, 0, 0], [1, 0, 1]]),
+    "vicsek": np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]),
+    "gasket": np.array([[1, 0], [1, 1]]),
+}
+DIMENSION = {name: np.log(g.sum()) / np.log(len(g)) for name, g in GENERATORS.items()}
+DIMENSION["koch"] = np.log(4) / np.log(3)
+
+
+def as_mask(cells, spacing=(1e-3, 1e-3), periodic=(False, False), dims=None):
+    """Label an array of cells, (..., y, x), as a mask on a plane from the origin."""
+    cells = np.asarray(cells) > 0
+    dims = dims or ("step", "y", "x")[-cells.ndim :]
+    return xr.DataArray(cells, dims=dims, coords=plane_coords(cells.shape[-2:], spacing, periodic))
+
+
+def base(name):
+    return len(GENERATORS[name])
+
+
+def lattice_set(name, level):
+    """Build a self-similar set cell by cell, base^level cells a side."""
+    cells = np.ones((1, 1), int)
+    for _ in range(level):
+        cells = np.kron(GENERATORS[name], cells)
+    return cells
+
+
+def random_lattice_set(keep, base, level, rng):
+    """Build a random self-similar set: `keep` of the base^2 parts of every part, drawn anew each time."""
+    cells = np.ones((1, 1), bool)
+    for _ in range(level):
+        n = len(cells)
+        rank = rng.random((n, n, base * base)).argsort(-1).argsort(-1)
+        parts = (rank < keep).reshape(n, n, base, base) & cells[:, :, None, None]
+        cells = parts.transpose(0, 2, 1, 3).reshape(n * base, n * base)
+    return cells
+
+
+def placed(cells, n, rng):
+    """Put a set anywhere into an n x n plane."""
+    plane = np.zeros((n, n), bool)
+    y, x = (int(rng.integers(0, n - edge + 1)) for edge in cells.shape)
+    plane[y : y + cells.shape[0], x : x + cells.shape[1]] = cells
+    return plane
+
+
+def koch_raster(n, rng, level=9):
+    """Mark the cells that the Koch curve passes, turned and placed at random."""
+    points = np.array([0, 1], complex)
+    for _ in range(level):
+        third = (points[1:] - points[:-1]) / 3
+        peak = points[:-1] + third * (1 + np.exp(1j * np.pi / 3))
+        parts = np.stack([points[:-1], points[:-1] + third, peak, points[:-1] + 2 * third], 1)
+        points = np.append(parts.ravel(), points[-1])
+    points = points * np.exp(2j * np.pi * rng.random())
+    width = max(np.ptp(points.real), np.ptp(points.imag))
+    points = points * (n * (0.5 + 0.4 * rng.random()) / width)
+    points = points - points.real.min() - 1j * points.imag.min()
+    points = (
+        points
+        + rng.random() * (n - 1 - np.ptp(points.real))
+        + 1j * rng.random() * (n - 1 - np.ptp(points.imag))
+    )
+    plane = np.zeros((n, n), bool)
+    plane[np.floor(points.imag).astype(int), np.floor(points.real).astype(int)] = True
+    return plane
+
+
+def level_set(n, hurst, coverage, rng, cutoff=0.25):
+    """Return the highest part of a band-limited periodic self-affine surface."""
+    q = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.rfftfreq(n)[None])
+    amplitude = np.where((q > 0) & (q < cutoff), np.maximum(q, 1 / n) ** (-1 - hurst), 0)
+    heights = np.fft.irfft2(amplitude * np.fft.rfft2(rng.standard_normal((n, n))), s=(n, n))
+    return heights > np.quantile(heights, 1 - coverage)
+
+
+def random_dust(n, cells, rng):
+    return (rng.permutation(n * n) < cells).reshape(n, n)

@@ -1,0 +1,353 @@
+"""Box counts and the box dimension: sets of known dimension, slow counts, the null, the limits."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from domains.sets import (
+    DIMENSION,
+    GENERATORS,
+    as_mask,
+    base,
+    koch_raster,
+    lattice_set,
+    level_set,
+    placed,
+    random_dust,
+    random_lattice_set,
+)
+
+import fractalcontact as fc
+from fractalcontact.domains import _dust
+from fractalcontact.domains._covers import default_sizes
+
+SIDE = {"carpet": 5, "cantor_dust": 5, "vicsek": 5, "gasket": 8}
+
+
+def parts_of_axis(n, size, offset, wraps):
+    """Cut an axis into boxes (start, stop) by the grid of one offset."""
+    if wraps:
+        whole = [(offset + k * size, offset + (k + 1) * size) for k in range(n // size)]
+        return whole + ([(offset + n // size * size, offset + n)] if n % size else [])
+    starts = range(offset - size, n, size)
+    return [(max(s, 0), min(s + size, n)) for s in starts if min(s + size, n) > max(s, 0)]
+
+
+def slow_minimum(cells, size, wraps):
+    """Count boxes offset by offset: the fewest whole boxes, and the smallest measure."""
+    ny, nx = cells.shape
+
+    def met(box_y, box_x):
+        return cells[np.ix_(np.arange(*box_y) % ny, np.arange(*box_x) % nx)].any()
+
+    def beside(boxes, k, wrap):
+        if len(boxes) == 1:
+            return []
+        near = [k - 1, k + 1]
+        return [boxes[i % len(boxes)] for i in near if wrap or 0 <= i < len(boxes)]
+
+    counts, measures = [], []
+    for offset_y in range(size):
+        for offset_x in range(size):
+            rows = parts_of_axis(ny, size, offset_y, wraps[0])
+            columns = parts_of_axis(nx, size, offset_x, wraps[1])
+            count = measure = 0
+            for p, row in enumerate(rows):
+                for q, column in enumerate(columns):
+                    if met(row, column):
+                        on_y = any(met(other, column) for other in beside(rows, p, wraps[0]))
+                        on_x = any(met(row, other) for other in beside(columns, q, wraps[1]))
+                        height = row[1] - row[0] if on_y else size
+                        width = column[1] - column[0] if on_x else size
+                        count += 1
+                        measure += height * width
+            counts.append(count)
+            measures.append(measure)
+    return min(counts), min(measures) / size**2, np.mean(counts)
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
+def test_fewest_boxes_against_every_offset_one_by_one(wraps):
+    rng = np.random.default_rng(1)
+    for shape in ((7, 9), (12, 12), (5, 13)):
+        cells = rng.random(shape) < rng.random()
+        sizes = [1, 2, 3, 4, 5, 8, 14]
+        result = fc.domains.box_counts(as_mask(cells, periodic=wraps), sizes, cover="minimum")
+        slow = np.array([slow_minimum(cells, size, wraps) for size in sizes])
+        assert np.array_equal(result.box_count, slow[:, 0])
+        assert result.box_measure.values == pytest.approx(slow[:, 1], rel=1e-15)
+
+
+def test_mean_boxes_against_every_offset_one_by_one():
+    rng = np.random.default_rng(2)
+    for shape in ((11, 9), (8, 14)):
+        cells = rng.random(shape) < 0.2
+        result = fc.domains.box_counts(as_mask(cells), [1, 2, 3, 4])
+        slow = [slow_minimum(cells, size, (False, False))[2] for size in (1, 2, 3, 4)]
+        assert result.box_count.values == pytest.approx(slow, rel=1e-14)
+
+
+def test_mean_boxes_go_round_a_periodic_plane():
+    rng = np.random.default_rng(3)
+    cells = rng.random((12, 12)) < 0.1
+    sizes = [1, 2, 3, 4, 6]
+    result = fc.domains.box_counts(as_mask(cells, periodic=(True, True)), sizes)
+    slow = [slow_minimum(cells, size, (True, True))[2] for size in sizes]
+    assert result.box_count.values == pytest.approx(slow, rel=1e-14)
+    moved = fc.domains.box_counts(as_mask(np.roll(cells, (5, 7), (0, 1)), periodic=(True, True)), sizes)
+    assert np.array_equal(moved.box_measure, result.box_measure)
+
+
+def test_aligned_boxes_are_blocks_of_the_first_grid():
+    cells = np.random.default_rng(4).random((21, 34)) < 0.05
+    sizes = [1, 2, 3, 4, 6, 8, 16, 32]
+    result = fc.domains.box_counts(as_mask(cells), sizes, cover="aligned")
+    for size, count in zip(sizes, result.box_count.values, strict=True):
+        padded = np.zeros((-(-21 // size) * size, -(-34 // size) * size), bool)
+        padded[:21, :34] = cells
+        blocks = padded.reshape(padded.shape[0] // size, size, padded.shape[1] // size, size)
+        assert count == np.count_nonzero(blocks.any((1, 3)))
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_lattice_sets_on_their_own_grid_are_exact(name):
+    level, ratio = SIDE[name], base(name)
+    scales = [ratio**k for k in range(level + 1)]
+    for cover in ("minimum", "aligned"):
+        result = fc.domains.box_dimension(as_mask(lattice_set(name, level)), scales=scales, cover=cover)
+        kept = int(GENERATORS[name].sum())
+        assert np.array_equal(result.box_count, [kept ** (level - k) for k in range(level + 1)])
+        assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-13)
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_lattice_sets_placed_anywhere_are_exact_on_their_own_ladder(name):
+    level, ratio = SIDE[name], base(name)
+    plane = placed(lattice_set(name, level), 1024, np.random.default_rng(5))
+    result = fc.domains.box_dimension(as_mask(plane), scales=[ratio**k for k in range(level + 1)])
+    assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed"),
+    [("carpet", 0.08), ("cantor_dust", 0.12), ("vicsek", 0.08), ("gasket", 0.08), ("koch", 0.03)],
+)
+def test_default_call_finds_the_dimension_and_its_interval_holds_it(name, allowed):
+    rng = np.random.default_rng(6)
+    for _ in range(2):
+        plane = koch_raster(1024, rng) if name == "koch" else placed(lattice_set(name, SIDE[name]), 1024, rng)
+        result = fc.domains.box_dimension(as_mask(plane))
+        assert abs(float(result.box_dimension) - DIMENSION[name]) <= allowed
+        assert float(result.ci_low) <= DIMENSION[name] <= float(result.ci_high)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cover", ["minimum", "mean"])
+@pytest.mark.parametrize("n", [250, 512, 729, 1024])
+def test_interval_holds_the_dimension_of_fractals_placed_anywhere(n, cover):
+    rng = np.random.default_rng(n)
+    inside = []
+    for _ in range(10):
+        level, halvings = (4, 7) if n < 256 else (5, 8)
+        planes = {
+            DIMENSION["koch"]: koch_raster(n, rng),
+            np.log(8) / np.log(3): placed(random_lattice_set(8, 3, level, rng), n, rng),
+            np.log(6) / np.log(3): placed(random_lattice_set(6, 3, level, rng), n, rng),
+            np.log(3) / np.log(2): placed(random_lattice_set(3, 2, halvings - 1, rng), n, rng),
+        }
+        planes |= {
+            DIMENSION[name]: placed(lattice_set(name, SIDE[name] - (n < 256)), n, rng) for name in GENERATORS
+        }
+        for dimension, plane in planes.items():
+            result = fc.domains.box_dimension(as_mask(plane), cover=cover)
+            inside.append(float(result.ci_low) <= dimension <= float(result.ci_high))
+    assert np.mean(inside) >= 0.95
+
+
+@pytest.mark.parametrize(
+    "shape", [(3, 3), (4, 4), (9, 9), (27, 27), (100, 37), (250, 250), (509, 509), (64, 128)]
+)
+@pytest.mark.parametrize("wraps", [False, True])
+def test_cell_row_column_and_full_mask_are_exact_wherever_they_lie(shape, wraps):
+    ny, nx = shape
+    for y, x in ((0, 0), (ny // 2, nx // 3), (ny - 1, nx - 1)):
+        planes = np.zeros((4, ny, nx), bool)
+        planes[0, y, x] = planes[1, y] = planes[2, :, x] = planes[3] = True
+        result = fc.domains.box_dimension(as_mask(planes, periodic=(wraps, wraps)))
+        assert result.box_dimension.values.tolist() == [0.0, 1.0, 1.0, 2.0]
+        if min(shape) >= 4:
+            assert (result.ci_high - result.ci_low).values == pytest.approx(np.zeros(4), abs=1e-13)
+        else:
+            assert np.isnan(result.ci_low).all()
+
+
+def test_mean_cover_is_exact_in_the_same_limits():
+    planes = np.zeros((4, 100, 37), bool)
+    planes[0, 99, 0] = planes[1, 0] = planes[2, :, 5] = planes[3] = True
+    result = fc.domains.box_dimension(as_mask(planes), cover="mean")
+    assert result.box_dimension.values == pytest.approx([0, 1, 1, 2], abs=1e-14)
+
+
+def test_two_cells_far_apart_are_two_points():
+    cells = np.zeros((64, 64), bool)
+    cells[0, 3] = cells[63, 60] = True
+    assert float(fc.domains.box_dimension(as_mask(cells)).box_dimension) == pytest.approx(0, abs=1e-12)
+
+
+def test_empty_planes_are_nan_with_the_reason_and_leave_the_others_alone():
+    planes = np.zeros((3, 20, 20), bool)
+    planes[1] = True
+    result = fc.domains.box_dimension(as_mask(planes))
+    assert np.isnan(result.box_dimension.values[[0, 2]]).all()
+    assert float(result.box_dimension[1]) == 2
+    assert "empty (2 planes)" in result.box_dimension.attrs["comment"]
+    assert np.isnan(result.dust_dimension[0])
+    assert not result.differs_from_dust.values.any()
+
+
+def test_mask_of_one_or_two_cells_says_why_it_has_no_dimension():
+    for shape in ((1, 1), (1, 40)):
+        mask = xr.DataArray(np.ones(shape, bool), dims=("y", "x"))
+        result = fc.domains.box_dimension(mask)
+        assert np.isnan(result.box_dimension)
+        assert "too narrow" in result.box_dimension.attrs["comment"]
+
+
+def test_stack_equals_its_planes():
+    rng = np.random.default_rng(7)
+    planes = np.array([level_set(48, 0.8, c, rng) for c in (0.05, 0.2, 0.5)]).reshape(1, 3, 48, 48)
+    stack = fc.domains.box_dimension(as_mask(planes, dims=("seed", "step", "y", "x")))
+    assert stack.box_count.dims == ("seed", "step", "box_size")
+    for k in range(3):
+        alone = fc.domains.box_dimension(as_mask(planes[0, k]))
+        for name in ("box_dimension", "ci_low", "dust_dimension", "dust_spread", "box_measure"):
+            assert np.array_equal(stack[name].values[0, k], alone[name].values)
+
+
+def test_transposing_and_mirroring_change_nothing():
+    cells = level_set(60, 0.5, 0.2, np.random.default_rng(8))
+    want = fc.domains.box_dimension(as_mask(cells)).box_measure.values
+    for other in (cells.T, cells[::-1], cells[:, ::-1]):
+        assert np.array_equal(fc.domains.box_dimension(as_mask(other)).box_measure.values, want)
+
+
+def test_unit_of_length_changes_only_the_length_of_the_boxes():
+    cells = level_set(48, 0.5, 0.2, np.random.default_rng(9))
+    one, other = (fc.domains.box_dimension(as_mask(cells, (s, 4 * s))) for s in (1.0, 2.0**-30))
+    assert np.array_equal(one.box_dimension, other.box_dimension)
+    assert np.array_equal(one.box_length, other.box_length * 2.0**30)
+    assert float(one.box_length[0]) == 2.0  # the side of a square as large as a cell of 1 m x 4 m
+
+
+def test_counts_do_not_depend_on_the_number_of_threads():
+    from fractalcontact.base.threads import limit
+
+    planes = np.array([level_set(64, 0.5, c, np.random.default_rng(10)) for c in (0.1, 0.4)])
+    results = []
+    for threads in (1, 4):
+        with limit(threads):
+            results.append(fc.domains.box_dimension(as_mask(planes)).drop_vars("run_time"))
+    assert results[0].identical(results[1].assign_attrs(results[0].attrs))
+
+
+def test_dust_probability_against_exact_fractions():
+    from fractions import Fraction
+    from math import comb
+
+    rng = np.random.default_rng(11)
+    for _ in range(300):
+        observed = int(rng.integers(2, 4000))
+        cells, region = (int(rng.integers(0, min(observed, top) + 1)) for top in (observed, 60))
+        exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
+        assert _dust.missed(cells, observed, np.array(region)) == pytest.approx(exact, rel=1e-11, abs=1e-14)
+
+
+def test_dust_counts_and_their_spread_against_dusts():
+    rng = np.random.default_rng(12)
+    planes = np.array([random_dust(64, 200, rng) for _ in range(400)])
+    scales = [1, 2, 4, 8, 16]
+    result = fc.domains.box_dimension(as_mask(planes), scales=scales, cover="aligned")
+    measured = result.box_count.values
+    error = measured.std(0) / 20
+    assert np.all(np.abs(measured.mean(0) - result.dust_count.values[0]) <= 4 * error + 1e-4)
+    assert float(result.dust_spread[0]) == pytest.approx(result.box_dimension.values.std(), rel=0.15)
+    assert float(result.dust_dimension[0]) == pytest.approx(
+        result.box_dimension.values.mean(), abs=4 * float(result.dust_spread[0]) / 20
+    )
+
+
+def test_dust_of_one_cell_and_of_all_cells():
+    planes = np.zeros((2, 50, 50), bool)
+    planes[0, 7, 7] = planes[1] = True
+    result = fc.domains.box_dimension(as_mask(planes))
+    assert result.dust_dimension.values == pytest.approx([0, 2], abs=1e-12)
+
+
+@pytest.mark.parametrize("coverage", [0.003, 0.02, 0.06, 0.2, 0.4])
+def test_islands_tell_themselves_from_a_dust(coverage):
+    rng = np.random.default_rng(13)
+    for hurst in (0.3, 0.8):
+        result = fc.domains.box_dimension(as_mask(level_set(256, hurst, coverage, rng)))
+        assert bool(result.differs_from_dust)
+        if coverage < 0.1:
+            assert float(result.box_dimension) > float(result.dust_dimension) + 5 * float(result.dust_spread)
+
+
+def test_dusts_are_hardly_ever_taken_for_more():
+    rng = np.random.default_rng(14)
+    for cells in (2, 5, 20, 100, 800, 2000, 3900):
+        planes = np.array([random_dust(64, cells, rng) for _ in range(100)])
+        assert fc.domains.box_dimension(as_mask(planes)).differs_from_dust.values.mean() <= 0.02
+
+
+def test_unobserved_cells_are_in_no_set_and_leave_full_planes_full():
+    rng = np.random.default_rng(15)
+    valid = rng.random((60, 60)) < 0.8
+    valid[20:35, 30:50] = False
+    observed = as_mask(valid)
+    for cover in ("minimum", "mean"):
+        full = fc.domains.box_dimension(as_mask(np.ones((60, 60))), valid=observed, cover=cover)
+        assert float(full.box_dimension) == pytest.approx(2.0, abs=1e-12)
+        assert float(full.coverage) == 1.0
+        assert float(full.dust_dimension) == pytest.approx(2.0, abs=1e-12)
+    cells = level_set(60, 0.8, 0.3, rng)
+    one = fc.domains.box_dimension(as_mask(cells), valid=observed)
+    other = fc.domains.box_dimension(as_mask(cells | ~valid), valid=observed)
+    assert one.box_measure.identical(other.box_measure)
+
+
+def test_gaps_shift_the_dimension_little():
+    rng = np.random.default_rng(16)
+    cells = level_set(256, 0.5, 0.3, rng)
+    whole = fc.domains.box_dimension(as_mask(cells))
+    gappy = fc.domains.box_dimension(as_mask(cells), valid=as_mask(rng.random((256, 256)) < 0.9))
+    assert float(gappy.box_dimension) == pytest.approx(float(whole.box_dimension), abs=0.06)
+    assert bool(gappy.differs_from_dust)
+    dust = fc.domains.box_dimension(
+        as_mask(random_dust(256, 3000, rng)), valid=as_mask(rng.random((256, 256)) < 0.9)
+    )
+    assert not bool(dust.differs_from_dust)
+
+
+def test_default_sizes_follow_their_rule():
+    assert default_sizes((1024, 1024)).tolist() == [1, 2, 3, 4, 6, 8, 9, 12, 16, 18, 24, 27, 32]
+    assert default_sizes((250, 250)).tolist() == [1, 2, 3, 4, 6, 8, 9, 12]
+    assert default_sizes((3, 100)).tolist() == [1, 2, 3]
+
+
+def test_windows_and_labels():
+    result = fc.domains.box_dimension(as_mask(lattice_set("carpet", 3)), scales=[9, 1, 3, 3])
+    assert result.box_size.values.tolist() == [1, 3, 9]
+    assert (float(result.scale_min), float(result.scale_max)) == (1, 9)
+    assert result.scale_min.attrs["units"] == "1"
+    assert result.box_length.attrs["units"] == "m"
+    assert result.box_length.values == pytest.approx([1e-3, 3e-3, 9e-3])
+    assert "standard deviations" in result.ci_low.attrs["long_name"]
+
+
+def test_wrong_calls_list_everything():
+    mask = as_mask(np.ones((8, 8)))
+    with pytest.raises(fc.base.errors.InvalidInput) as caught:
+        fc.domains.box_dimension(mask, scales=[0, 2.5, 99], cover="most", periodic=True)
+    text = str(caught.value)
+    for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "whole numbers"):
+        assert word in text

@@ -1,0 +1,164 @@
+"""Gliding-box lacunarity: closed forms, the covariance identity, gaps, the limits."""
+
+import numpy as np
+import pytest
+from domains.sets import as_mask, lattice_set, level_set
+
+import fractalcontact as fc
+
+ROUND = (True, True)
+
+
+def slow(cells, size, wraps):
+    """Glide the box by an array of windows."""
+    ny, nx = cells.shape
+    grown = np.pad(cells.astype(float), [(0, size if wrap else 0) for wrap in wraps], mode="wrap")
+    mass = np.lib.stride_tricks.sliding_window_view(grown, (size, size)).sum((-1, -2))
+    mass = mass[: ny if wraps[0] else None, : nx if wraps[1] else None]
+    return (mass**2).mean() / mass.mean() ** 2
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, False), (False, True), ROUND])
+def test_against_windows_taken_one_by_one(wraps):
+    cells = np.random.default_rng(1).random((30, 23)) < 0.2
+    sizes = [1, 2, 3, 7, 16, 23]
+    result = fc.domains.lacunarity(as_mask(cells, periodic=wraps), sizes)
+    assert result.lacunarity.values == pytest.approx([slow(cells, s, wraps) for s in sizes], rel=1e-14)
+
+
+def test_one_cell_in_the_middle():
+    cells = np.zeros((65, 65))
+    cells[32, 32] = 1
+    result = fc.domains.lacunarity(as_mask(cells), [1, 2, 4, 8])
+    assert result.lacunarity.values == pytest.approx(
+        [((65 - r + 1) / r) ** 2 for r in (1, 2, 4, 8)], rel=1e-15
+    )
+
+
+def test_lattice_of_cells():
+    cells = np.zeros((64, 64))
+    cells[::8, ::8] = 1
+    result = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), [1, 2, 4, 8, 16])
+    assert result.lacunarity.values.tolist() == [64, 16, 4, 1, 1]
+
+
+def test_chequerboard():
+    cells = np.indices((64, 64)).sum(0) % 2
+    result = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), [1, 2, 3, 4, 5])
+    assert result.lacunarity.values == pytest.approx([2, 1, 1 + 3**-4, 1, 1 + 5**-4], rel=1e-15)
+
+
+def test_carpet_and_cantor_dust():
+    carpet = fc.domains.lacunarity(as_mask(lattice_set("carpet", 5)), [1, 3, 9, 27, 81])
+    want = [1.80203247, 1.43750747, 1.28133107, 1.16769101, 1.07433212]
+    assert carpet.lacunarity.values == pytest.approx(want, abs=6e-9)
+    assert float(carpet.lacunarity[0]) == pytest.approx((9 / 8) ** 5, rel=1e-15)
+    dust = fc.domains.lacunarity(as_mask(lattice_set("cantor_dust", 5), periodic=ROUND), [1, 3, 9, 27])
+    assert dust.lacunarity.values == pytest.approx(
+        [57.66503906, 12.11366272, 4.95758057, 2.49047852], abs=6e-9
+    )
+
+
+def test_bernoulli_cells_and_the_dust_beside_them():
+    cells = np.random.default_rng(2).random((512, 512)) < 0.05
+    result = fc.domains.lacunarity(as_mask(cells), [1, 2, 4, 8, 16, 32])
+    assert result.lacunarity.values == pytest.approx([20, 5.75, 2.1875, 1.2969, 1.0742, 1.0186], rel=0.02)
+    p = cells.mean()
+    want = [1 + (1 - p) / (p * r**2) for r in (1, 2, 4, 8, 16, 32)]
+    assert result.dust_lacunarity.values == pytest.approx(want, rel=1e-12)
+
+
+def test_one_cell_box_gives_one_over_coverage_and_full_planes_one():
+    planes = np.array([level_set(40, 0.5, c, np.random.default_rng(3)) for c in (0.1, 0.5, 0.9)])
+    planes[2] = True
+    result = fc.domains.lacunarity(as_mask(planes))
+    assert result.lacunarity.values[:, 0] == pytest.approx(1 / planes.mean((1, 2)), rel=1e-15)
+    assert np.all(result.lacunarity.values[2] == 1)
+    assert np.all(result.dust_lacunarity.values[2] == 1)
+
+
+def test_covariance_identity_on_the_torus():
+    cells = level_set(48, 0.6, 0.3, np.random.default_rng(4))[:, :40]
+    mask = as_mask(cells, periodic=ROUND)
+    power = np.abs(np.fft.fft2(cells)) ** 2
+    covariance = np.fft.ifft2(power).real / cells.size
+    for r in (2, 5, 19, 40):
+        u = np.arange(-r + 1, r)
+        weight = np.outer(r - np.abs(u), r - np.abs(u))
+        pairs = covariance[np.ix_(u % 48, u % 40)]
+        want = (weight * pairs).sum() / (cells.mean() * r**2) ** 2
+        assert float(fc.domains.lacunarity(mask, [r]).lacunarity[0]) == pytest.approx(want, rel=1e-13)
+
+
+@pytest.mark.parametrize("library", ["scipy", "default"])
+def test_many_sizes_by_one_transform_equal_sizes_one_by_one(library, monkeypatch):
+    if library == "scipy":
+        monkeypatch.setenv("FRACTALCONTACT_FFT", "scipy")
+    cells = np.random.default_rng(5).random((45, 36)) < 0.1
+    mask = as_mask(cells, periodic=ROUND)
+    every = fc.domains.lacunarity(mask, np.arange(1, 37)).lacunarity.values
+    single = [float(fc.domains.lacunarity(mask, [r]).lacunarity[0]) for r in range(1, 37)]
+    assert np.array_equal(every, single)
+
+
+def test_large_boxes_do_not_overflow(monkeypatch):
+    from fractalcontact.domains import _gliding
+
+    cells = np.random.default_rng(6).random((40, 40)) < 0.4
+    mask = as_mask(cells, periodic=ROUND)
+    whole = fc.domains.lacunarity(mask, np.arange(1, 41)).lacunarity.values
+    monkeypatch.setattr(_gliding, "EXACT", 1000)  # as if the sums were too large for integers
+    assert fc.domains.lacunarity(mask, np.arange(1, 41)).lacunarity.values == pytest.approx(whole, rel=1e-13)
+    some = fc.domains.lacunarity(mask, [1, 20, 40]).lacunarity.values
+    assert some == pytest.approx(whole[[0, 19, 39]], rel=1e-13)
+
+
+def test_only_wholly_observed_boxes_count():
+    rng = np.random.default_rng(7)
+    cells, valid = rng.random((40, 30)) < 0.3, rng.random((40, 30)) < 0.97
+    result = fc.domains.lacunarity(as_mask(cells), [1, 2, 4, 30], valid=as_mask(valid))
+    for place, r in enumerate((1, 2, 4)):
+        windows = np.lib.stride_tricks.sliding_window_view
+        mass = windows((cells & valid).astype(float), (r, r)).sum((-1, -2))
+        seen = windows(valid, (r, r)).all((-1, -2))
+        want = (mass[seen] ** 2).mean() / mass[seen].mean() ** 2
+        assert float(result.lacunarity[place]) == pytest.approx(want, rel=1e-14)
+    assert np.isnan(result.lacunarity[3])
+    assert "wholly observed" in result.lacunarity.attrs["comment"]
+    assert float(result.coverage) == pytest.approx(cells[valid].mean())
+
+
+def test_valid_everywhere_changes_nothing_even_round_the_edges():
+    cells = np.random.default_rng(8).random((2, 20, 24)) < 0.3
+    mask = as_mask(cells, periodic=ROUND)
+    everywhere = as_mask(np.ones((20, 24)), periodic=ROUND)
+    one, other = fc.domains.lacunarity(mask), fc.domains.lacunarity(mask, valid=everywhere)
+    assert one.lacunarity.identical(other.lacunarity)
+
+
+def test_empty_planes_are_nan_with_the_reason():
+    planes = np.zeros((2, 16, 16))
+    planes[1, 3, 3] = 1
+    result = fc.domains.lacunarity(as_mask(planes))
+    assert np.isnan(result.lacunarity.values[0]).all()
+    assert np.isfinite(result.lacunarity.values[1]).all()
+    assert "empty (1 planes)" in result.lacunarity.attrs["comment"]
+
+
+def test_contact_like_islands_are_more_lacunar_than_dust_and_less_so_with_load():
+    planes = [level_set(256, 0.8, c, np.random.default_rng(10)) for c in (0.02, 0.06, 0.18)]
+    result = fc.domains.lacunarity(as_mask(np.array(planes)), [2, 4, 8, 16])
+    assert np.all(result.lacunarity.values > 2 * result.dust_lacunarity.values)
+    assert np.all(np.diff(result.lacunarity.values, axis=0) < 0)
+    assert np.all(np.diff(result.lacunarity.values, axis=1) < 0)
+
+
+def test_a_periodic_axis_may_be_called_free_and_a_free_one_not_periodic():
+    cells = np.random.default_rng(11).random((20, 20)) < 0.3
+    free = fc.domains.lacunarity(as_mask(cells), [5])
+    called_free = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), [5], periodic=False)
+    assert float(free.lacunarity[0]) == float(called_free.lacunarity[0])
+    with pytest.raises(ValueError, match="periodic: expected periodic axes"):
+        fc.domains.lacunarity(as_mask(cells), [5], periodic=True)
+    with pytest.raises(ValueError, match="box_sizes: expected a finite number >= 1 and <= 20"):
+        fc.domains.lacunarity(as_mask(cells), [21])

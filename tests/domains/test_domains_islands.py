@@ -1,0 +1,221 @@
+"""Islands and percolation: hand-made planes, other libraries, slow graphs, what rolling must not change."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from domains.sets import as_mask, level_set
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from skimage import measure
+
+import fractalcontact as fc
+
+
+def slow_labels(cells, connectivity, wraps):
+    """Number the islands through a graph of all neighbours."""
+    ny, nx = cells.shape
+    number = np.arange(ny * nx).reshape(ny, nx)
+    steps = [(0, 1), (1, 0), (1, 1), (1, -1)][: 2 * connectivity]
+    links = []
+    for y, x in np.argwhere(cells):
+        for down, right in steps:
+            row, column = y + down, x + right
+            if (
+                (wraps[0] or 0 <= row < ny)
+                and (wraps[1] or 0 <= column < nx)
+                and cells[row % ny, column % nx]
+            ):
+                links.append((number[y, x], number[row % ny, column % nx]))
+    links = np.array(links, int).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(links)), links.T), shape=(ny * nx, ny * nx))
+    return connected_components(graph, directed=False)[1].reshape(ny, nx)
+
+
+@pytest.mark.parametrize("connectivity", [1, 2])
+def test_free_planes_against_another_library(connectivity):
+    rng = np.random.default_rng(1)
+    for _ in range(6):
+        cells = rng.random((20, 17)) < rng.random()
+        result = fc.domains.islands(as_mask(cells, (2.0, 3.0)), connectivity=connectivity)
+        assert int(result.n_islands) == measure.label(cells, connectivity=connectivity).max()
+        assert int(result.euler_number) == measure.euler_number(cells, connectivity=connectivity)
+        for region in measure.regionprops(result.label.values):
+            island = result.isel(island=region.label - 1)
+            assert int(island.island_label) == region.label
+            assert int(island.cells) == region.area
+            assert float(island.area) == 6 * region.area
+            centroid = (np.array(region.centroid) + 0.5) * (2, 3)
+            assert [float(island.centroid_y), float(island.centroid_x)] == pytest.approx(centroid)
+            box = [float(island[name]) for name in ("y_min", "x_min", "y_max", "x_max")]
+            assert box == pytest.approx(np.array(region.bbox) * (2, 3, 2, 3))
+
+
+@pytest.mark.parametrize("connectivity", [1, 2])
+@pytest.mark.parametrize("wraps", [(True, True), (True, False), (False, True)])
+def test_periodic_planes_against_a_graph_and_against_their_own_shift(connectivity, wraps):
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        cells = rng.random((20, 17)) < rng.uniform(0.2, 0.7)
+        result = fc.domains.islands(as_mask(cells, (2.0, 3.0), wraps), connectivity=connectivity)
+        slow = slow_labels(cells, connectivity, wraps)
+        pairs = np.unique(np.stack([slow[cells], result.label.values[cells]]), axis=1).shape[1]
+        assert pairs == int(result.n_islands) == len(np.unique(slow[cells]))
+        shift = (7 * wraps[0], 5 * wraps[1])
+        rolled = as_mask(np.roll(cells, shift, (0, 1)), (2.0, 3.0), wraps)
+        moved = fc.domains.islands(rolled, connectivity=connectivity)
+        assert int(moved.euler_number) == int(result.euler_number)
+        for name in ("area", "perimeter"):
+            assert np.array_equal(np.sort(result[name]), np.sort(moved[name]))
+        one, other = (
+            sorted(zip(*columns(r, where), strict=True)) for r, where in ((result, shift), (moved, (0, 0)))
+        )
+        assert np.array(one) == pytest.approx(np.array(other), nan_ok=True)
+
+
+def columns(result, shift):
+    """Return what a shift of the plane must not change of the islands, after shifting their centroids."""
+    centre_x = np.nan_to_num((result.centroid_x.values + 3 * shift[1]) % 51, nan=-1).round(9)
+    centre_y = np.nan_to_num((result.centroid_y.values + 2 * shift[0]) % 40, nan=-1).round(9)
+    width, height = result.x_max - result.x_min, result.y_max - result.y_min
+    return result.area.values, centre_x, centre_y, width.values, height.values
+
+
+def test_island_over_the_edges_keeps_its_centroid_and_box():
+    cells = np.zeros((8, 10), bool)
+    cells[np.ix_([7, 0], [9, 0, 1])] = True
+    result = fc.domains.islands(as_mask(cells, (1.0, 2.0), (True, True))).isel(island=0)
+    assert (float(result.centroid_y), float(result.centroid_x)) == (0.0, 1.0)
+    assert [float(result[n]) for n in ("y_min", "y_max", "x_min", "x_max")] == [7, 9, 18, 24]
+    assert float(result.perimeter) == 2 * (2 * 1 + 3 * 2)
+
+
+def test_island_round_the_period_spans_it_and_has_no_centroid_there():
+    cells = np.zeros((9, 6), bool)
+    cells[4] = True
+    result = fc.domains.islands(as_mask(cells, (1.0, 1.0), (True, True))).isel(island=0)
+    assert np.isnan(result.centroid_x)
+    assert float(result.centroid_y) == 4.5
+    assert (float(result.x_min), float(result.x_max), float(result.perimeter)) == (0, 6, 12)
+
+
+def test_table_of_a_stack_says_where_every_island_is():
+    planes = np.zeros((2, 3, 6, 6), bool)
+    planes[0, 1, 2, 2] = planes[1, 2, 0, 0] = planes[1, 2, 4, 4:6] = True
+    mask = as_mask(planes, dims=("seed", "step", "y", "x")).assign_coords(
+        step=[10, 20, 30], closure=("step", [1.0, 2, 3])
+    )
+    result = fc.domains.islands(mask)
+    assert result.n_islands.values.tolist() == [[0, 1, 0], [0, 0, 2]]
+    assert result.island_step.values.tolist() == [20, 30, 30]
+    assert result.island_seed.values.tolist() == [0, 1, 1]
+    assert result.cells.values.tolist() == [1, 1, 2]
+    assert result.largest_cells.values.tolist() == [[0, 1, 0], [0, 0, 2]]
+    assert float(result.mean_island_area[1, 2]) == pytest.approx(1.5e-6)
+    assert np.isnan(result.largest_island[0, 0])
+    assert result.closure.values.tolist() == [1, 2, 3]
+    for name in ("label", "area", "island_step", "island_label"):
+        assert result[name].attrs["long_name"]
+
+
+def test_masks_without_coordinates_have_cells_and_no_metres():
+    mask = xr.DataArray(np.eye(5, dtype=bool), dims=("y", "x"))
+    result = fc.domains.islands(mask, connectivity=2)
+    assert result.cells.values.tolist() == [5]
+    assert np.isnan(result.area).all()
+    assert np.isnan(result.largest_island)
+    assert "no coordinates" in result.largest_island.attrs["comment"]
+    assert int(fc.domains.islands(mask, connectivity=1).n_islands) == 5
+    assert (
+        int(fc.domains.islands(xr.where(mask, 1, 0).roll(x=1), connectivity=2, periodic=True).n_islands) == 1
+    )
+
+
+def test_unobserved_cells_are_in_no_island():
+    valid = np.ones((5, 5), bool)
+    valid[2] = False
+    assert int(fc.domains.islands(as_mask(np.ones((5, 5))), valid=as_mask(valid)).n_islands) == 2
+
+
+def test_euler_number_counts_holes_and_handles():
+    ring = np.ones((5, 5), bool)
+    ring[2, 2] = False
+    assert int(fc.domains.islands(as_mask(ring)).euler_number) == 0
+    full = np.ones((5, 5), bool)
+    assert int(fc.domains.islands(as_mask(full)).euler_number) == 1
+    assert int(fc.domains.islands(as_mask(full, periodic=(True, True))).euler_number) == 0  # a torus
+
+
+def test_percolation_of_plain_shapes():
+    row, gap = np.zeros((9, 9), bool), np.zeros((9, 9), bool)
+    row[4] = gap[4] = True
+    gap[4, 4] = False
+    for wraps in ((False, False), (True, True)):
+        result = fc.domains.percolation(as_mask(np.array([row, row.T, gap, row & False]), periodic=wraps))
+        assert result.percolates.values.tolist() == [
+            [True, False],
+            [False, True],
+            [False, False],
+            [False, False],
+        ]
+    assert result.axis.values.tolist() == ["x", "y"]
+    assert result.largest_share.values[:3].tolist() == [1, 1, 1]
+    assert np.isnan(result.largest_share[3])
+
+
+def test_percolation_names_and_minds_the_neighbours():
+    diagonal = as_mask(np.eye(7))
+    assert not fc.domains.percolation(diagonal).percolates.any()
+    result = fc.domains.percolation(diagonal, connectivity=2)
+    assert result.percolates.all()
+    assert "8 neighbours" in result.percolates.attrs["long_name"]
+
+
+def test_touching_both_ends_is_not_going_round():
+    cells = np.zeros((9, 9), bool)
+    cells[0:4, 2] = cells[6:, 2] = True
+    assert not fc.domains.percolation(as_mask(cells, periodic=(True, True))).percolates.any()
+
+
+@pytest.mark.parametrize(("turns_y", "turns_x"), [(1, 2), (2, 1), (3, 2), (1, 6)])
+def test_spirals_go_round_both_ways(turns_y, turns_x):
+    n = 60
+    cells = np.zeros((n, n), bool)
+    along = np.arange(n * max(turns_y, turns_x) * 4)
+    y, x = (np.floor(along * turns / along.size * n).astype(int) for turns in (turns_y, turns_x))
+    cells[y % n, x % n] = True
+    result = fc.domains.percolation(as_mask(cells, periodic=(True, True)), connectivity=2)
+    assert result.percolates.all()
+    assert int(fc.domains.islands(as_mask(cells, periodic=(True, True)), connectivity=2).n_islands) == 1
+
+
+def test_crossing_with_four_neighbours_shuts_off_the_complement_with_eight():
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        cells = rng.random((12, 12)) < 0.55
+        across = fc.domains.percolation(as_mask(cells)).percolates.values[0]
+        shut = not fc.domains.percolation(as_mask(~cells), connectivity=2).percolates.values[1]
+        assert across == shut
+
+
+def test_site_percolation_sets_in_at_its_threshold():
+    rng = np.random.default_rng(4)
+    shares = [
+        np.mean(
+            [fc.domains.percolation(as_mask(rng.random((128, 128)) < p)).percolates[0] for _ in range(10)]
+        )
+        for p in (0.55, 0.64)
+    ]
+    assert shares == [0, 1]
+
+
+def test_largest_island_grows_with_load():
+    planes = np.array([level_set(64, 0.8, c, np.random.default_rng(5)) for c in (0.05, 0.2, 0.6)])
+    result = fc.domains.islands(as_mask(planes, periodic=(True, True)))
+    assert np.all(np.diff(result.largest_cells.values) > 0)
+
+
+def test_wrong_calls_list_everything():
+    with pytest.raises(ValueError) as caught:
+        fc.domains.islands(as_mask(np.ones((5, 5))).astype(float), connectivity=3)
+    assert "connectivity" in str(caught.value)
+    assert "compare numbers first" in str(caught.value)

@@ -1,0 +1,156 @@
+"""What a mask may be, what its results carry, and what is lean about the room."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from domains.sets import as_mask, level_set
+
+import fractalcontact as fc
+from fractalcontact.base.schema import QUANTITIES
+
+FUNCTIONS = {
+    "box_counts": fc.domains.box_counts,
+    "box_dimension": fc.domains.box_dimension,
+    "boundary_dimension": fc.domains.boundary_dimension,
+    "describe": fc.domains.describe,
+    "evolution": fc.domains.evolution,
+    "generalised_dimensions": fc.domains.generalised_dimensions,
+    "islands": fc.domains.islands,
+    "lacunarity": fc.domains.lacunarity,
+    "percolation": fc.domains.percolation,
+}
+
+
+@pytest.fixture(scope="module")
+def mask():
+    planes = np.array([level_set(32, 0.7, c, np.random.default_rng(1)) for c in (0.1, 0.3)])
+    coords = {
+        "step": [0, 1],
+        "closure": ("step", [1e-6, 2e-6]),
+        "temperature": ("step", [1.0, 2.0]),
+        "shear": 1e-3,
+    }
+    return as_mask(planes, periodic=(True, False)).assign_coords(coords)
+
+
+def test_the_room_offers_what_is_tested_here():
+    assert set(fc.domains.__all__) == set(FUNCTIONS)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_flags_and_booleans_say_the_same(name, mask):
+    want = FUNCTIONS[name](mask).drop_vars("run_time")
+    yielded = xr.where(mask, 2, 0).astype(np.int8).assign_coords(mask.coords)
+    for other in (mask.astype(np.int8), mask.astype(np.uint8), mask.astype(np.int64), yielded):
+        got = FUNCTIONS[name](other).drop_vars("run_time")
+        assert want.identical(got.assign_attrs(want.attrs))
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_results_keep_the_leading_dims_and_known_coordinates(name, mask):
+    result = FUNCTIONS[name](mask)
+    assert result.closure.values.tolist() == [1e-6, 2e-6]
+    assert float(result.shear) == 1e-3
+    assert "temperature" not in result.coords
+    for variable in result.data_vars.values():
+        assert variable.ndim == 0 or variable.dims[0] in ("step", "island")
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_results_are_labelled_and_stamped(name, mask):
+    result = FUNCTIONS[name](mask)
+    for key, variable in result.variables.items():
+        assert variable.attrs["long_name"]
+        if variable.dtype.kind != "U":
+            assert variable.attrs["units"] == ("1" if key.startswith("scale_") else QUANTITIES[key].units)
+    assert json.loads(result.attrs["provenance"])["call"] == f"fractalcontact.domains.{name}"
+    assert "/" not in result.attrs["history"].split()[-1]
+    assert float(result.run_time) >= 0
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_results_come_back_from_a_file_and_are_compliant(name, mask, tmp_path, compliance):
+    result = FUNCTIONS[name](mask)
+    path = fc.save(result, tmp_path / f"{name}.nc")
+    xr.testing.assert_identical(fc.open(path), result)
+    assert compliance(path) == []
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_masks_that_are_none_are_refused_by_name(name, mask):
+    numbers = mask * 1.5
+    wrong = [
+        (np.ones((4, 4), bool), "mask: expected a boolean DataArray"),
+        (mask.transpose("step", "x", "y"), r"dims \(..., y, x\)"),
+        (mask.isel(x=slice(0, 0)), "none of them empty"),
+        (mask.astype("U1"), "mask: expected"),
+    ]
+    if name != "generalised_dimensions":
+        wrong += [(numbers, "compare numbers first"), (numbers.where(False), "compare numbers first")]
+    for bad, words in wrong:
+        with pytest.raises(ValueError, match=words):
+            FUNCTIONS[name](bad)
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "generalised_dimensions"])
+def test_what_was_not_observed_makes_no_difference(name, mask):
+    valid = as_mask(np.random.default_rng(2).random((32, 32)) < 0.9, periodic=(True, False))
+    one = FUNCTIONS[name](mask & valid, valid=valid).drop_vars("run_time")
+    other = FUNCTIONS[name](mask | ~valid, valid=valid).drop_vars("run_time")
+    assert one.identical(other.assign_attrs(one.attrs))
+    each = FUNCTIONS[name](mask, valid=valid.expand_dims(step=mask.step)).drop_vars("run_time")
+    assert one.identical(each.assign_attrs(one.attrs))
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "generalised_dimensions"])
+def test_valid_must_fit_the_mask(name, mask):
+    for bad in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32), bool)):
+        with pytest.raises(ValueError, match="valid: expected"):
+            FUNCTIONS[name](mask, valid=bad)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_input_is_left_as_it_was(name, mask):
+    before = mask.copy(deep=True)
+    FUNCTIONS[name](mask)
+    assert before.identical(mask)
+    assert mask.x.attrs == before.x.attrs
+
+
+@pytest.mark.parametrize("shape", [(2, 1, 1), (2, 2, 2), (2, 3, 3), (2, 1, 50), (2, 7, 11)])
+@pytest.mark.parametrize("filling", ["empty", "one", "full"])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_tiny_empty_and_full_masks_give_their_limits_or_nan(name, shape, filling):
+    cells = np.full(shape, filling == "full")
+    cells[:, 0, 0] |= filling == "one"
+    for wraps in (None, True):
+        options = {} if name == "generalised_dimensions" else {"periodic": wraps}
+        result = FUNCTIONS[name](xr.DataArray(cells, dims=("step", "y", "x")), **options)
+        for variable in result.data_vars.values():
+            if variable.dtype.kind == "f":
+                assert not np.isinf(variable.values).any()
+
+
+def test_coordinates_of_one_axis_alone_are_refused():
+    mask = xr.DataArray(np.ones((4, 4), bool), dims=("y", "x"), coords={"x": np.arange(4.0)})
+    with pytest.raises(ValueError, match="mask.y: expected a coordinate"):
+        fc.domains.islands(mask)
+
+
+def test_leading_dims_must_not_take_the_names_of_results():
+    mask = xr.DataArray(np.ones((2, 4, 4), bool), dims=("box_size", "y", "x"))
+    with pytest.raises(ValueError, match="mask.dims"):
+        fc.domains.box_dimension(mask)
+
+
+def test_importing_the_room_loads_nothing_heavy():
+    code = (
+        "import sys, fractalcontact.domains; fractalcontact.domains.box_dimension;"
+        "heavy = {'numba', 'xarray', 'matplotlib', 'skimage', 'dask', 'netCDF4'} & set(sys.modules);"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
