@@ -24,5 +24,6 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "opening": ["dilatancy"],
         "strength": ["friction"],
         "leakage": ["transmissivity"],
+        "matching": ["register"],
     },
 )

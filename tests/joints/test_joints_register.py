@@ -1,0 +1,227 @@
+"""Mated position: known shifts, turns and tilts are found again; a measured pair is matched."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+S = 3e-4
+
+
+def moved_pair(rough, shift, *, noise=0.0, seed=3, angle=0.0, size=120):
+    """Return lower and upper heights; moving the upper face by `shift` cells (y, x) mates them.
+
+    Made on a larger periodic plane, band-limited, and cut out of its middle.
+    """
+    n = size + 100
+    plane = 1e-3 * rough((n, n), seed)
+    q = 2 * np.pi * np.fft.fftfreq(n)
+    modes = np.fft.fft2(plane) * np.exp(1j * (q[:, None] * shift[0] + q[None, :] * shift[1]))
+    upper = np.fft.ifft2(modes).real
+    cut = slice(50, 50 + size)
+    if angle:
+        from scipy.ndimage import map_coordinates
+
+        y, x = np.indices((n, n)) - (n - 1) / 2
+        turn = np.radians(angle)
+        places = np.cos(turn) * y + np.sin(turn) * x, -np.sin(turn) * y + np.cos(turn) * x
+        upper = map_coordinates(upper, np.stack(places) + (n - 1) / 2, order=5, mode="grid-wrap")
+    rng = np.random.default_rng(seed + 1)
+    return plane[cut, cut], upper[cut, cut] + 5e-4 + noise * 1e-3 * rng.standard_normal((size, size))
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (1.3, -2.7), (0.5, 0.5), (-17.25, 9.0), (25.0, 30.4)])
+def test_a_known_shift_is_found(make_face, rough, shift):
+    lower, upper = moved_pair(rough, shift)
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    assert result.shift_y / S == pytest.approx(shift[0], abs=2e-3)
+    assert result.shift_x / S == pytest.approx(shift[1], abs=2e-3)
+    assert result.rotation == pytest.approx(0, abs=5e-3)
+    assert result.converged
+    # the mean aperture stays what was measured over the common part
+    seen = np.isfinite(result.height.values)
+    assert np.nanmean(result.aperture) == pytest.approx(5e-4, abs=2e-6)
+    np.testing.assert_allclose((result.height - lower).values[seen], 5e-4, atol=8e-5)
+    assert result.correlation > 0.999
+
+
+def test_a_whole_shift_moves_heights_and_leaves_out_what_was_not_seen(make_face, rough):
+    lower, upper = moved_pair(rough, (4.0, -3.0))
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    np.testing.assert_allclose(result.height[5:-1, 1:-4], lower[5:-1, 1:-4] + 5e-4, atol=1e-6)
+    assert np.isnan(result.height[:4]).all()
+    assert np.isnan(result.height[:, -3:]).all()
+    assert result.common_fraction == pytest.approx(116 * 117 / 120**2, abs=0.02)
+
+
+@pytest.mark.parametrize("angle", [0.7, -3.0])
+def test_a_known_turn_is_found(make_face, rough, angle):
+    lower, upper = moved_pair(rough, (0.0, 0.0), angle=angle)
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    assert result.rotation == pytest.approx(angle, abs=0.01)
+    assert np.hypot(result.shift_x, result.shift_y) < 0.02 * S
+    still = fc.joints.register(make_face(lower, S), make_face(upper, S), rotation=False)
+    assert still.rotation == 0
+    assert still.mismatch > 3 * result.mismatch
+
+
+def test_turning_is_anticlockwise(make_face):
+    # a hump east of the middle of the lower face, north of it on the upper: it must turn clockwise
+    y, x = np.indices((61, 61)) - 30.0
+    hump = lambda v, u: np.exp(-((y - v) ** 2 + (x - u) ** 2) / 60)  # noqa: E731
+    turn = np.radians(4)
+    lower = hump(0, 18) - hump(0, -18) + 0.5 * hump(18, 0)
+    c, s = np.cos(turn), np.sin(turn)
+    upper = hump(18 * s, 18 * c) - hump(-18 * s, -18 * c) + 0.5 * hump(18 * c, -18 * s)
+    result = fc.joints.register(make_face(lower), make_face(upper))
+    assert result.rotation == pytest.approx(-4, abs=0.02)
+
+
+def test_tilt_is_taken_out(make_face, rough):
+    lower, upper = moved_pair(rough, (2.4, 0.0))
+    y, x = np.indices(lower.shape) * S
+    result = fc.joints.register(make_face(lower, S), make_face(upper + 0.05 * x - 0.02 * y, S))
+    assert result.tilt_x == pytest.approx(-0.05, abs=1e-4)
+    assert result.tilt_y == pytest.approx(0.02, abs=1e-4)
+    assert result.mismatch < 1e-5
+    left = fc.joints.register(make_face(lower, S), make_face(upper + 2e-3 * x, S), tilt=False)
+    assert left.tilt_x == 0
+    assert left.mismatch == pytest.approx(2e-3 * 120 * S / np.sqrt(12), rel=0.1)
+
+
+def test_different_extents_and_origins(make_face, rough):
+    lower, upper = moved_pair(rough, (1.5, -2.0))
+    cut = upper[10:100, 20:110]
+    result = fc.joints.register(make_face(lower, S), make_face(cut, S, origin=(10 * S, 20 * S)))
+    assert result.shift_y / S == pytest.approx(1.5, abs=2e-3)
+    assert result.shift_x / S == pytest.approx(-2.0, abs=2e-3)
+    assert result.height.shape == lower.shape
+
+
+def test_missing_heights_and_damage(make_face, rough):
+    lower, upper = moved_pair(rough, (3.3, 1.6), noise=0.01)
+    lower[30:45, 60:70] = np.nan
+    upper[80:90, 10:25] = np.nan
+    upper[50:62, 20:40] -= 2e-3  # a piece broken out
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    assert result.shift_y / S == pytest.approx(3.3, abs=0.02)
+    assert result.shift_x / S == pytest.approx(1.6, abs=0.02)
+    assert np.isnan(result.aperture.values[30:45, 60:70]).all()
+    assert np.isnan(result.height.values[84:93, 13:25]).all()
+
+
+def test_units_of_height_do_not_matter(make_face, rough):
+    lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02)
+    one = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    two = fc.joints.register(make_face(lower * 2.0**30, S), make_face(upper * 2.0**30, S))
+    assert two.shift_x == one.shift_x
+    assert two.rotation == one.rotation
+    np.testing.assert_array_equal(two.height, one.height * 2.0**30)
+
+
+def test_a_registered_pair_makes_a_crack(make_face, rough):
+    lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02)
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    crack = fc.joints.Crack(make_face(lower, S), result.height, young=60e9, poisson=0.2, block=80 * S)
+    opening = fc.joints.dilatancy(crack, shear=[0.0, S, 4 * S])
+    assert np.isfinite(opening.rigid_dilatancy).all()
+
+
+def test_messages(make_face, rough):
+    lower, upper = moved_pair(rough, (0.0, 0.0))
+    x = np.indices(lower.shape)[1] * 1.0
+    for bad in (np.zeros_like(lower), 0.1 * x, np.sin(0.3 * x)):
+        with pytest.raises(ValueError, match="fixes the position"):
+            fc.joints.register(make_face(bad), make_face(bad))
+    with pytest.raises(ValueError, match=r"upper.y.*spacing"):
+        fc.joints.register(make_face(lower, S), make_face(upper, 2 * S))
+    with pytest.raises(ValueError, match="rotation"):
+        fc.joints.register(make_face(lower, (S, 2 * S)), make_face(upper, (S, 2 * S)))
+    with pytest.raises(ValueError, match="lower"):
+        fc.joints.register(make_face(lower[:5], S), 3)
+    with pytest.raises(ValueError, match="upper: expected heights"):
+        fc.joints.register(make_face(lower, S), make_face(upper * np.nan, S))
+
+
+def test_unequal_spacings_without_rotation(make_face, rough):
+    lower, upper = moved_pair(rough, (1.5, -2.0))
+    result = fc.joints.register(make_face(lower, (S, 2 * S)), make_face(upper, (S, 2 * S)), rotation=False)
+    assert result.shift_y / S == pytest.approx(1.5, abs=2e-3)
+    assert result.shift_x / (2 * S) == pytest.approx(-2.0, abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["white", "patches"])
+def test_standard_errors_are_honest(make_face, rough, kind):
+    from scipy.ndimage import gaussian_filter
+
+    scores = []
+    for seed in range(60):
+        lower, upper = moved_pair(rough, (1.5, -2.0), seed=seed, noise=0.05 * (kind == "white"), size=100)
+        if kind == "patches":
+            noise = gaussian_filter(np.random.default_rng(seed).standard_normal(upper.shape), 3.0)
+            upper = upper + 2e-4 * noise / noise.std()
+        result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+        scores.append((result.shift_y.item() - 1.5 * S) / result.shift_y_error.item())
+        scores.append((result.shift_x.item() + 2.0 * S) / result.shift_x_error.item())
+        scores.append(result.rotation.item() / result.rotation_error.item())
+    # the spread of a score of unit variance over 180 of them is 5 %
+    assert 0.8 < np.std(scores) < 1.25
+    assert abs(np.mean(scores)) < 0.3
+
+
+# the measured pair
+
+DATA = os.environ.get("FRACTALCONTACT_DATA", "")
+measured = pytest.mark.skipif(not DATA, reason="FRACTALCONTACT_DATA is not set")
+
+
+@pytest.fixture(scope="module")
+def gneiss(make_face):
+    faces = {}
+    for name in ("side_a", "side_b", "aperture"):
+        stem = Path(DATA) / f"freiberg_gneiss_{name}"
+        spacing = json.loads(stem.with_suffix(".json").read_text())["dx"]
+        faces[name] = make_face(np.load(stem.with_suffix(".npy")), spacing)
+    return faces
+
+
+@measured
+def test_gneiss_pair_is_mated(gneiss):
+    lower, upper = gneiss["side_a"], gneiss["side_b"]
+    result = fc.joints.register(lower, upper)
+    before = np.nanstd(upper - lower)
+    seen = np.isfinite((upper - lower).values)
+    correlation = np.corrcoef(lower.values[seen], upper.values[seen])[0, 1]
+    assert result.converged
+    assert result.mismatch < before
+    assert result.correlation > correlation
+    assert result.correlation == pytest.approx(0.98, abs=0.005)
+    # one frame already: less than two points and half a degree
+    assert max(abs(result.shift_x), abs(result.shift_y)) < 2 * S
+    assert abs(result.rotation) < 0.5
+    assert np.nanmean(result.aperture) == pytest.approx(0.637e-3, rel=0.03)
+
+
+@measured
+def test_gneiss_pair_goes_through_the_whole_study(gneiss):
+    lower = fc.surfaces.fill(gneiss["side_a"])
+    found = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
+    crack = fc.joints.Crack(lower, found.height, young=60e9, poisson=0.2, block=0.045)
+    shear = [0.0, 3e-4, 1.5e-3]
+    opening = fc.joints.dilatancy(crack, shear=shear, direction=("E", "W"), normal_force=[1e3, 1e4])
+    closing = fc.joints.closure(crack, shear=shear, normal_force=[1e3, 1e4], keep=("gap",))
+    flow = fc.joints.transmissivity(closing.gap)
+    strength = fc.joints.friction(opening)
+    for result in (opening, closing, flow):
+        for name, variable in result.data_vars.items():
+            if variable.dtype.kind == "f":
+                assert np.isfinite(variable).all(), name
+    assert np.isfinite(strength.friction_angle).all()
+    assert (opening.dilatancy < opening.rigid_dilatancy).all()
+    assert (flow.hydraulic_aperture > 0).all()
+    assert flow.percolates.all()
