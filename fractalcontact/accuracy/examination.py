@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -124,9 +124,17 @@ def _sane(name: str, result: xr.Dataset, seconds: float) -> Finding:
 
 
 def _explained(result: xr.Dataset, quantity: str) -> bool:
-    """Whether the attributes of the variable, or of the result, say why a number is missing."""
-    attributes: Mapping[str, Any] = {**result.attrs, **result[quantity].attrs}
-    return any("reason" in str(key) or "not_given" in str(key) for key in attributes)
+    """Whether the result says why a number is missing: at the number itself, or once for all it holds."""
+    attributes = [
+        result[quantity].attrs,
+        result.attrs,
+        *(variable.attrs for variable in result.variables.values()),
+    ]
+    return any(
+        "reason" in str(key) or "not_given" in str(key) or (key == "comment" and "NaN" in str(value))
+        for one in attributes
+        for key, value in one.items()
+    )
 
 
 def _described(surface: xr.DataArray) -> xr.Dataset:

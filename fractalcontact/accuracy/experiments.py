@@ -151,7 +151,7 @@ def _variogram_error(members: list[xr.DataArray], n: float) -> float:
 def _exponents(method: str, members: list[xr.DataArray]) -> list[float]:
     from fractalcontact import dimensions as room
 
-    return [float(room.estimate(member, [method])["hurst"]) for member in members]
+    return [room.estimate(member, [method])["hurst"].item() for member in members]
 
 
 def _exponent_error(exponents: list[float], _: float) -> float:

@@ -1,11 +1,13 @@
 """What a scene may say: its tables, their keys, and the words of `[want]`.
 
-The keys are argument names of the public functions. Those of a generator are read from its signature when
-the scene is checked, so that they stand in one place.
+The keys of a scene are the argument names of the public functions, read from their signatures, so that each
+name stands in one place.
 """
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Mapping
 
 READING = ("read", "sample", "channel", "units", "spacing", "level", "fill")
@@ -13,39 +15,58 @@ GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
 SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
 
 MATERIAL = ("young", "poisson", "basic_friction_angle", "hardness")
-JOINT = ("block", "direction", "shear", "normal_force", "nominal_pressure", "register")
-CONTACT = (
-    "contact_modulus",
-    "closure",
-    "normal_force",
-    "nominal_pressure",
-    "boundary",
-    "influence",
-    "disc_radius",
-    "hardness",
-    "tolerance",
-    "method",
-)
+LOADS = ("closure", "normal_force", "nominal_pressure")
+SLIDING = ("block", "register")
 
-# the sub-table [joint.<stage>] gives one stage values of its own
-JOINT_STAGES: Mapping[str, tuple[str, ...]] = {
-    "delta_surface": ("shear", "direction"),
-    "closure": ("shear", "direction", "closure", "normal_force", "nominal_pressure"),
-    "rigid_dilatancy": ("shear", "direction"),
-    "elastic_dilatancy": ("shear", "direction", "normal_force"),
-    "friction": ("smoothing",),
-    "decorrelation_length": ("shear", "direction"),
-    "transmissivity": ("viscosity",),
+# stage and the function it calls; [joint.<stage>] and [domains.<stage>] give one stage values of its own
+JOINT_STAGES: Mapping[str, str] = {
+    "delta_surface": "delta_surface",
+    "closure": "closure",
+    "rigid_dilatancy": "dilatancy",
+    "elastic_dilatancy": "dilatancy",
+    "friction": "friction",
+    "decorrelation_length": "decorrelation_length",
+    "transmissivity": "transmissivity",
 }
-DOMAIN_STAGES: Mapping[str, tuple[str, ...]] = {
-    "box_dimension": ("scales", "cover"),
-    "lacunarity": ("box_sizes",),
-    "islands": ("connectivity",),
-    "boundary_dimension": (),
-    "percolation": (),
-    "describe": (),
-    "evolution": (),
+DOMAIN_STAGES: Mapping[str, str] = {
+    name: name
+    for name in (
+        "box_dimension",
+        "lacunarity",
+        "islands",
+        "boundary_dimension",
+        "percolation",
+        "describe",
+        "evolution",
+    )
 }
+# arguments that the scene gives in another way: faces and maps, what to keep, the material, the bars
+_GIVEN = {"surface", "crack", "mask", "valid", "gap", "dilatancy", "keep", "progress", "basic_friction_angle"}
+_RIGID = ("shear", "direction")
+
+
+def arguments(room: str, function: str) -> tuple[list[str], set[str]]:
+    """Return the arguments of a public function that a scene may give, and those that it must."""
+    signature = inspect.signature(getattr(importlib.import_module(f"fractalcontact.{room}"), function))
+    known = {key: value for key, value in signature.parameters.items() if key not in _GIVEN}
+    return list(known), {key for key, value in known.items() if value.default is value.empty}
+
+
+def stage_keys(room: str, stage: str) -> tuple[str, ...]:
+    """Return the keys that one stage of the joint or of the domains may have."""
+    if stage == "rigid_dilatancy":
+        return _RIGID
+    function = (JOINT_STAGES if room == "joints" else DOMAIN_STAGES)[stage]
+    return tuple(arguments(room, function)[0])
+
+
+def joint_keys() -> tuple[str, ...]:
+    """Return the keys of `[joint]`: those of all its stages, the block and whether to register the faces."""
+    keys = [*SLIDING]
+    for stage in JOINT_STAGES:
+        keys += [key for key in stage_keys("joints", stage) if key not in keys]
+    return tuple(keys)
+
 
 WANTED: Mapping[str, tuple[str, ...]] = {
     "surfaces": ("height", "describe"),
@@ -54,7 +75,6 @@ WANTED: Mapping[str, tuple[str, ...]] = {
     "domains": tuple(DOMAIN_STAGES),
     "keep": ("state", "pressure", "gap"),
 }
-DIMENSION_OPTIONS = ("scales", "noise")
 TABLES = ("title", "surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 
 # bounds of the plain numbers of a scene: (above, at_least, below)

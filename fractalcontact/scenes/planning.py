@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from fractalcontact.base.text import table
+from fractalcontact.scenes.grammar import LOADS
 
 if TYPE_CHECKING:
     from fractalcontact.scenes.reading import Scene
@@ -175,10 +176,10 @@ def check_loads(scene: Scene, problems: list[str]) -> None:
         room, _, name = stage.name.partition("/")
         if room != "joints":
             continue
-        given = scene.options("joint", name, ("shear", "closure", "normal_force", "nominal_pressure"))
+        given = scene.options("joint", name, ("shear", *LOADS))
         if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in given:
             problems.append(f"joint.shear: expected a value for {name}, got none")
         if name == "elastic_dilatancy" and "normal_force" not in given:
             problems.append(f"joint.normal_force: expected a value for {name}, got none")
-        if name == "closure" and not {"closure", "normal_force", "nominal_pressure"} & set(given):
+        if name == "closure" and not set(LOADS) & set(given):
             problems.append("joint.closure: expected a closure, normal_force or nominal_pressure, got none")

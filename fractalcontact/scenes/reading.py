@@ -137,10 +137,16 @@ def _check(scene: Scene, problems: Problems) -> None:
     if "upper" in scene.tables:
         _check_surface(scene.table("upper"), "upper", problems)
     _known_keys(scene.table("material"), grammar.MATERIAL, "material", problems)
-    _known_keys(scene.table("contact"), grammar.CONTACT, "contact", problems)
-    _known_keys(scene.table("dimensions"), grammar.DIMENSION_OPTIONS, "dimensions", problems)
-    _check_stages(scene.table("joint"), "joint", grammar.JOINT, grammar.JOINT_STAGES, problems)
-    _check_stages(scene.table("domains"), "domains", (), grammar.DOMAIN_STAGES, problems)
+    for name, (room, function) in {
+        "contact": ("contact", "press"),
+        "dimensions": ("dimensions", "estimate"),
+    }.items():
+        if name in scene.tables:
+            _known_keys(scene.table(name), grammar.arguments(room, function)[0], name, problems)
+    if "joint" in scene.tables:
+        _check_stages(scene.table("joint"), "joint", grammar.joint_keys(), grammar.JOINT_STAGES, problems)
+    if "domains" in scene.tables:
+        _check_stages(scene.table("domains"), "domains", (), grammar.DOMAIN_STAGES, problems)
     _check_wanted(scene, problems)
     for name in ("surface", "upper", "material", "contact", "joint"):
         _check_numbers(scene.table(name), name, problems)
@@ -153,7 +159,7 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         return
     if ways == ["generate"]:
         generator = problems.choice(f"{name}.generate", table["generate"], grammar.GENERATORS)
-        keys, required = _arguments(generator)
+        keys, required = grammar.arguments("surfaces", generator)
         _known_keys(table, (*keys, "generate", "level"), name, problems)
         for key in sorted(required - set(table)):
             problems.add(f"{name}.{key}", f"a value for {generator}", "none")
@@ -161,16 +167,6 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         _known_keys(table, grammar.READING, name, problems)
         if ways == ["sample"]:
             problems.choice(f"{name}.sample", table["sample"], grammar.SAMPLES)
-
-
-def _arguments(generator: str) -> tuple[list[str], set[str]]:
-    """Return all arguments of a generator and those without a default."""
-    import inspect
-
-    from fractalcontact import surfaces
-
-    signature = inspect.signature(getattr(surfaces, generator)).parameters
-    return list(signature), {key for key, value in signature.items() if value.default is value.empty}
 
 
 def _check_stages(
@@ -183,7 +179,8 @@ def _check_stages(
     tables = {key: value for key, value in table.items() if isinstance(value, dict) and key in stages}
     _known_keys({k: v for k, v in table.items() if k not in tables}, common, name, problems, also=stages)
     for stage, own in tables.items():
-        _known_keys(own, stages[stage], f"{name}.{stage}", problems)
+        keys = grammar.stage_keys("joints" if name == "joint" else name, stage)
+        _known_keys(own, keys, f"{name}.{stage}", problems)
         _check_numbers(own, f"{name}.{stage}", problems)
 
 
@@ -207,7 +204,7 @@ def _check_wanted(scene: Scene, problems: Problems) -> None:
     if scene.wanted("contact"):
         given = scene.table("contact")
         problems.require(
-            sum(key in given for key in ("closure", "normal_force", "nominal_pressure")) == 1,
+            sum(key in given for key in grammar.LOADS) == 1,
             "contact",
             "exactly one of closure, normal_force, nominal_pressure",
             sorted(given) or "none",

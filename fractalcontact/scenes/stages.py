@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
 from fractalcontact.scenes.planning import check_loads
 from fractalcontact.scenes.reading import Scene, Table
 
@@ -200,50 +201,39 @@ def _press(faces: xr.Dataset, options: dict[str, Any], keep: tuple[str, ...]) ->
 
 
 def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
-    from fractalcontact.scenes.grammar import JOINT_STAGES
-
     if name == "faces":
         registers = bool(scene.table("joint").get("register", False))
         return Work(
             (partial(_upper_face, scene.table("upper"), scene.folder, results["surfaces"], registers),)
         )
+    options = scene.options("joint", name, stage_keys("joints", name))
     if name == "friction":
-        return Work(
-            (partial(_friction, results[stage.needs[0]], scene.options("joint", name, JOINT_STAGES[name])),)
-        )
+        return Work((partial(_call, "joints", name, results[stage.needs[0]], **options),))
     if name == "transmissivity":
-        gap = results["joints/closure"]["gap"]
-        return Work(
-            (partial(_call, "joints", name, gap, **scene.options("joint", name, JOINT_STAGES[name])),)
-        )
+        return Work((partial(_call, "joints", name, results["joints/closure"]["gap"], **options),))
     crack = _crack(scene, results)
-    options = scene.options("joint", name, JOINT_STAGES[name])
+    if name in ("closure", "elastic_dilatancy") and "hardness" in scene.table("material"):
+        options.setdefault("hardness", scene.table("material")["hardness"])
     if name == "closure":
-        return _closure_work(crack, options, stage.keep)
+        return _closure_work(crack, options, scene.table("joint").get("closure", {}), stage.keep)
     if name == "elastic_dilatancy":
         directions = options.pop("direction", ("E", "N", "W", "S"))
         directions = [directions] if isinstance(directions, str) else list(directions)
-        return Work(
-            tuple(
-                partial(_call, "joints", "dilatancy", crack, direction=[word], **options)
-                for word in directions
-            ),
-            along="direction",
+        parts = (
+            partial(_call, "joints", "dilatancy", crack, direction=[word], **options) for word in directions
         )
-    function = {"rigid_dilatancy": "dilatancy"}.get(name, name)
-    return Work((partial(_call, "joints", function, crack, **options),))
+        return Work(tuple(parts), along="direction")
+    return Work((partial(_call, "joints", JOINT_STAGES[name], crack, **options),))
 
 
-def _closure_work(crack: Crack, options: dict[str, Any], keep: tuple[str, ...]) -> Work:
-    loads = [key for key in ("closure", "normal_force", "nominal_pressure") if key in options]
+def _closure_work(crack: Crack, options: dict[str, Any], own: Table, keep: tuple[str, ...]) -> Work:
+    given = [key for key in LOADS if key in options]
     # a load of the stage itself goes before one that the whole joint has
-    chosen = {loads[0]: options[loads[0]]} if loads else {}
-    shears = options["shear"] if isinstance(options["shear"], list) else [options["shear"]]
-    direction = options.get("direction", "E")
-    parts = [
-        partial(_call, "joints", "closure", crack, shear=[v], direction=direction, keep=keep, **chosen)
-        for v in shears
-    ]
+    chosen = next((key for key in given if key in own), given[0])
+    options = {key: value for key, value in options.items() if key not in LOADS or key == chosen}
+    shears = options.pop("shear")
+    shears = shears if isinstance(shears, list) else [shears]
+    parts = (partial(_call, "joints", "closure", crack, shear=[v], keep=keep, **options) for v in shears)
     return Work(tuple(parts), along="shear")
 
 
@@ -254,15 +244,9 @@ def _upper_face(table: Table, folder: Path, lower: xr.Dataset, registers: bool) 
     return face.rename("height").to_dataset()
 
 
-def _friction(dilatancy: xr.Dataset, options: dict[str, Any]) -> xr.Dataset:
-    return _call("joints", "friction", dilatancy, **options)
-
-
 def _domain_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
-    from fractalcontact.scenes.grammar import DOMAIN_STAGES
-
     state = results[stage.needs[0]]["state"]
-    options = scene.options("domains", name, DOMAIN_STAGES[name])
+    options = scene.options("domains", name, stage_keys("domains", name))
     return Work((partial(_call, "domains", name, state, **options),))
 
 

@@ -34,11 +34,13 @@ def test_an_examination_can_fail():
 
 def scaled(array, power):
     factor = 2.0**power
-    new = array.assign_coords(
-        {dim: (dim, array[dim].values * factor, {k: v * factor if k == "period" else v for k, v in array[dim].attrs.items()})
-         for dim in ("y", "x")}
-    )  # fmt: skip
-    return new.copy(data=new.values * factor) if new.dtype.kind == "f" else new
+    axes = {}
+    for dim in ("y", "x"):
+        attributes = {
+            key: value * factor if key == "period" else value for key, value in array[dim].attrs.items()
+        }
+        axes[dim] = (dim, array[dim].values * factor, attributes)
+    return array.assign_coords(axes).copy(data=array.values * factor)
 
 
 def numbers(result, names):
