@@ -98,7 +98,9 @@ QUANTITIES: dict[str, Quantity] = {
     "covering_length": Quantity("m", "length of the polygon through the profile"),
     "vertical_scale": Quantity("1", "factor on the heights"),
     "variation": Quantity("m2", "volume of the height variation over the scale, per length"),
-    "local_slope": Quantity("1", "local slope in log-log scale"),
+    "local_slope": Quantity(
+        "1", "local slope in log-log scale", {"comment": "NaN where a value is not positive, or stands alone"}
+    ),
     # contact
     "closure": Quantity("m", "closure from first touch"),
     "normal_force": Quantity("N", "normal force"),

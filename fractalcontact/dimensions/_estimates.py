@@ -1,0 +1,95 @@
+"""What every estimator returns, and how exponents outside the range of fractals are reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+CONSTANT = "a constant height has no Hurst exponent"
+_NOISE = 1e-9  # rounding of a slope
+NORMAL = 1.959963984540054  # 97.5 % of the normal distribution
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Hurst exponent of one face by one method.
+
+    Attributes
+    ----------
+    hurst : float
+        As fitted; `limited` brings it into 0 ... 1.
+    standard_error, low, high : float
+        NaN where they would not be honest; `not_given` then tells why.
+    scale_min, scale_max : float
+        Window of the fit in m.
+    increment : float
+        Rms height increment over one x spacing, m.
+    noise : float
+        Rms height of white noise, m.
+    misfit : float
+        Departure from the model in standard deviations.
+    window, not_given, note : str
+        How the window was chosen, why there is no interval, and anything else to know.
+    fitted : float
+        The exponent before it was limited.
+    """
+
+    hurst: float
+    standard_error: float = np.nan
+    low: float = np.nan
+    high: float = np.nan
+    scale_min: float = np.nan
+    scale_max: float = np.nan
+    increment: float = np.nan
+    noise: float = np.nan
+    misfit: float = np.nan
+    window: str = ""
+    not_given: str = ""
+    note: str = ""
+    fitted: float = np.nan
+
+    def limited(self) -> Estimate:
+        """Limit the exponent and its interval to 0 ... 1, and say so."""
+        hurst = float(np.clip(self.hurst, 0.0, 1.0))
+        note = self.note
+        if self.hurst > 1.0 + _NOISE:
+            note = _join(note, f"fitted {self.hurst:.3f}: smoother than a fractal surface, limited to 1")
+        elif self.hurst < -_NOISE:
+            note = _join(note, f"fitted {self.hurst:.3f}: rougher than a fractal surface, limited to 0")
+        return replace(
+            self,
+            hurst=hurst,
+            low=float(np.clip(self.low, 0.0, 1.0)),
+            high=float(np.clip(self.high, 0.0, 1.0)),
+            note=note,
+            fitted=self.hurst,
+        )
+
+    def topothesy(self, spacing: float) -> float:
+        """Return the lag at which the rms increment equals the lag, in m; NaN at H = 1."""
+        if not (self.increment > 0 and self.hurst < 1.0):
+            return float("nan")
+        # in logarithms: close to H = 1 the power is huge or tiny
+        length = np.log(spacing) + np.log(self.increment / spacing) / (1.0 - self.hurst)
+        return float(np.exp(length)) if abs(length) < 690.0 else float("nan")
+
+
+def normal_interval(hurst: float, error: float) -> tuple[float, float]:
+    """Return the 95 % interval of a normal estimate."""
+    return hurst - NORMAL * error, hurst + NORMAL * error
+
+
+def undefined(reason: str) -> Estimate:
+    """Return an estimate that does not exist."""
+    return Estimate(np.nan, not_given=reason, note=reason)
+
+
+def plane() -> Estimate:
+    """Return the limit that a plane is."""
+    reason = "a plane: the limit H = 1, without scatter to make an interval from"
+    return Estimate(1.0, not_given=reason, note=reason)
+
+
+def _join(*parts: str) -> str:
+    return "; ".join(part for part in parts if part)

@@ -1,0 +1,157 @@
+"""The exact likelihood of a profile: Gaussian increments with their full covariance.
+
+The increments between successive observed points are Gaussian with a covariance that follows from the
+variogram, whatever the gaps. A tilt of the profile is a mean proportional to the gaps and is taken out
+(restricted likelihood: Patterson and Thompson 1971, Biometrika 58). Long profiles are cut into chunks of
+`CHUNK` points, which are taken as independent; each has a tilt of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.jit import use_threads
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+CHUNK = 256
+SMALLEST = 8  # observed points
+_LOW, _HIGH = 1e-3, 0.999
+_QUIET, _LOUD = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
+_QUANTILE = 3.841458820694124  # 95 % of chi square with one degree of freedom
+
+
+@dataclass(frozen=True)
+class ProfileFit:
+    """Estimate of H; the interval is that of the profile likelihood, inside (0, 1)."""
+
+    hurst: float
+    standard_error: float
+    low: float
+    high: float
+    increment: float
+    noise: float
+
+
+class Increments:
+    """The increments of one profile in chunks of equal length.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,)
+        NaN where nothing was observed.
+    chunk : int
+        Most points of one chunk; chunks are equally long.
+    """
+
+    def __init__(self, heights: Array, chunk: int = CHUNK) -> None:
+        places = np.flatnonzero(np.isfinite(heights))
+        size = places.size // -(-places.size // chunk)
+        starts = np.arange(0, places.size - size + 1, size)
+        self.places = places[starts[:, None] + np.arange(size)]
+        self.jumps = np.diff(heights[self.places], axis=1)
+        self.gaps = np.diff(self.places, axis=1)
+        self.regular = bool((self.gaps == 1).all())
+        self.freedom = self.jumps.size - len(self.jumps)
+
+    def solve(self, hurst: float, noise: float) -> tuple[float, float]:
+        """Return the deviance and the mean square of the whitened increments.
+
+        The covariance is that of unit increments over one spacing, plus `noise` on the heights.
+        """
+        from fractalcontact.dimensions._kernels import whiten
+
+        columns = np.stack([self.jumps, self.gaps], axis=-1)
+        places = self.places
+        if self.regular:
+            # one factor for all chunks: the jumps of each are a column of their own
+            columns = np.concatenate([self.jumps.T, np.ones((self.jumps.shape[1], 1))], axis=1)[None]
+            places = places[:1]
+        covariances = _covariance(places, hurst, noise)
+        logs = np.empty(len(places))
+        use_threads()
+        whiten(covariances, columns, logs)
+        if self.regular:
+            jumps, gaps = columns[0, :, :-1].T, np.broadcast_to(columns[0, :, -1], self.jumps.shape)
+            logs = np.repeat(logs, len(self.jumps))
+        else:
+            jumps, gaps = columns[..., 0], columns[..., 1]
+        own = np.sum(gaps * gaps, axis=1)
+        squares = np.sum(jumps * jumps, axis=1) - np.sum(jumps * gaps, axis=1) ** 2 / own
+        amplitude = float(np.sum(squares)) / self.freedom
+        return float(np.sum(logs + np.log(own)) + self.freedom * np.log(amplitude)), amplitude
+
+
+def _covariance(places: Array, hurst: float, noise: float) -> Array:
+    distance = np.abs(places[:, :, None] - places[:, None, :]).astype(float)
+    rise = -0.5 * distance ** (2.0 * hurst)
+    if noise:
+        rise += noise * np.eye(places.shape[1])
+    return np.ascontiguousarray(rise[:, 1:, 1:] - rise[:, 1:, :-1] - rise[:, :-1, 1:] + rise[:, :-1, :-1])
+
+
+def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> ProfileFit:
+    """Fit H, the amplitude and, if asked, white noise on the heights.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,)
+        At least `SMALLEST` finite values that do not lie on a straight line.
+    noise : bool
+        Fit white noise too, with a variance up to 100 times the mean square increment.
+    chunk : int
+        Most points taken together.
+    """
+    increments = Increments(heights, chunk)
+    found: dict[float, tuple[float, float, float]] = {}
+
+    def best(hurst: float) -> tuple[float, float, float]:
+        hurst = float(hurst)
+        if hurst not in found:
+            found[hurst] = _best_noise(increments, hurst) if noise else (*increments.solve(hurst, 0.0), 0.0)
+        return found[hurst]
+
+    hurst = _minimum(lambda h: best(h)[0], _LOW, _HIGH)
+    least, amplitude, level = best(hurst)
+    low = _crossing(lambda h: best(h)[0] - least - _QUANTILE, hurst, _LOW, 0.0)
+    high = _crossing(lambda h: best(h)[0] - least - _QUANTILE, hurst, _HIGH, 1.0)
+    return ProfileFit(
+        hurst, _curvature(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
+    )
+
+
+def _best_noise(increments: Increments, hurst: float) -> tuple[float, float, float]:
+    """Return deviance, amplitude and noise at the best noise for one exponent."""
+    level = float(np.exp(_minimum(lambda t: increments.solve(hurst, np.exp(t))[0], _QUIET, _LOUD, 1e-3)))
+    with_noise, without = increments.solve(hurst, level), increments.solve(hurst, 0.0)
+    return (*with_noise, level) if with_noise[0] < without[0] else (*without, 0.0)
+
+
+def _minimum(function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5) -> float:
+    from scipy.optimize import minimize_scalar
+
+    # a coarse look first: the bounded search alone may settle in a side valley
+    grid = np.linspace(low, high, 9)
+    k = int(np.argmin([function(g) for g in grid]))
+    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, 8)])
+    return float(minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
+
+
+def _crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
+    from scipy.optimize import brentq
+
+    if function(limit) < 0:
+        return beyond
+    return float(brentq(function, inside, limit, xtol=1e-5))
+
+
+def _curvature(best: Callable[[float], tuple[float, float, float]], hurst: float) -> float:
+    """Return the standard error from the second difference of the deviance."""
+    step = min(0.02, 0.5 * (hurst - 0.5 * _LOW), 0.5 * (1.0 - hurst))
+    middle, left, right = (best(h)[0] for h in (hurst, hurst - step, hurst + step))
+    bend = (left - 2.0 * middle + right) / step**2
+    return float(np.sqrt(2.0 / bend)) if bend > 0 else float("nan")

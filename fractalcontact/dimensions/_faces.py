@@ -1,0 +1,182 @@
+"""From a labelled surface to plain arrays in scaled units, one face at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.grid import Grid, check_surface
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fractalcontact.base.checks import Problems
+
+Array = np.ndarray[Any, np.dtype[Any]]
+ROUNDING = 1e-12  # of the range of heights
+SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
+
+
+@dataclass
+class Face:
+    """One face or profile, its heights about a level of their own and in a power of two of a metre.
+
+    Attributes
+    ----------
+    source : DataArray
+        Dims (y, x), or (x,).
+    grid : Grid
+    level, unit : float
+        `heights` are (source - level) / unit, once they have been asked for.
+    """
+
+    source: xr.DataArray
+    grid: Grid
+    level: float = 0.0
+    unit: float = 1.0
+    _heights: Array | None = None
+    _flat: bool | None = None
+
+    @property
+    def heights(self) -> Array:
+        """Scaled heights, shape (ny, nx); a profile has one row. NaN where nothing was observed."""
+        if self._heights is None:
+            raw = self.raw
+            low, high = float(raw.min()), float(raw.max())
+            if np.isnan(low):
+                low, high = float(np.nanmin(raw)), float(np.nanmax(raw))
+            self.level = low
+            self.unit = float(np.ldexp(1.0, np.frexp(high - low)[1])) if high > low else 1.0
+            self._heights = raw - low
+            self._heights *= 1.0 / self.unit
+        return self._heights
+
+    @property
+    def raw(self) -> Array:
+        """Heights in m, shape (ny, nx)."""
+        return np.asarray(self.source.values, dtype=np.float64).reshape(self.shape)
+
+    @property
+    def is_lazy(self) -> bool:
+        """The heights are not in memory yet."""
+        return self._heights is None and is_lazy(self.source)
+
+    @property
+    def axes(self) -> int:
+        """2 for a surface, 1 for a profile."""
+        return len(self.grid.shape)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(ny, nx), with ny = 1 for a profile."""
+        return (1, *self.grid.shape)[-2:]  # type: ignore[return-value]
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """(dy, dx) in metres; dy = dx for a profile."""
+        return self.grid.spacing[0], self.grid.spacing[-1]
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Which axes wrap; y of a profile does not."""
+        return (False, *self.grid.periodic)[-2:]  # type: ignore[return-value]
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """Spacings over that of x."""
+        return tuple(step / self.grid.spacing[-1] for step in self.grid.spacing)
+
+    @property
+    def complete(self) -> bool:
+        """No height is missing."""
+        return bool(np.isfinite(self.raw.min()))
+
+    @property
+    def is_constant(self) -> bool:
+        """All observed heights are the same."""
+        return bool(np.nanmax(self.raw) == np.nanmin(self.raw))
+
+    @property
+    def is_plane(self) -> bool:
+        """All observed heights lie on a plane, but for rounding."""
+        if self._flat is None:
+            heights = self.heights
+            # a few rows and columns that bend spare the search for a plane
+            bends = [
+                np.diff(part, 2) for part in (heights[:: 1 + heights.shape[0] // 16], heights[:, ::64].T)
+            ]
+            bent = any(np.nanmax(np.abs(bend), initial=0.0) > 1e3 * ROUNDING for bend in bends)
+            self._flat = not bent and self._departure() <= ROUNDING
+        return self._flat
+
+    def _departure(self) -> float:
+        """Largest distance from the plane of least squares, in scaled height."""
+        seen = np.isfinite(self.heights)
+        y, x = (place.astype(float) for place in np.nonzero(seen))
+        columns = np.stack([np.ones(x.size), x, y][: 1 + self.axes], axis=1) / max(self.shape)
+        q = np.linalg.qr(columns)[0]
+        rest = self.heights[seen] - self.heights[seen].mean()
+        return float(np.abs(rest - q @ (q.T @ rest)).max())
+
+    @property
+    def points(self) -> int:
+        """Number of observed heights."""
+        return self.raw.size if self.complete else int(np.count_nonzero(np.isfinite(self.raw)))
+
+    def slabs(self, reach: int) -> Iterator[tuple[Array, int]]:
+        """Yield heights in m with up to `reach` rows beyond a slab's own, and the number of its own."""
+        if not self.is_lazy or self.axes == 1:
+            yield np.ascontiguousarray(self.raw), self.shape[0]
+            return
+        ny, nx = self.shape
+        rows = max(SLAB // nx, 4 * reach, 1)
+        for start in range(0, ny, rows):
+            part = self.source.isel(y=slice(start, start + rows + reach)).values
+            yield np.ascontiguousarray(part, dtype=np.float64), min(rows, ny - start)
+
+
+def is_lazy(array: xr.DataArray) -> bool:
+    """Tell whether the heights are not in memory yet (dask)."""
+    return array.chunks is not None
+
+
+def read_faces(
+    surface: Any, problems: Problems, *, smallest: int = 3, gaps: bool = True, leading: bool = True
+) -> list[Face]:
+    """Check a surface and split it along its leading dims.
+
+    Returns
+    -------
+    list of Face
+        In the order of the leading dims flattened; empty if something is wrong.
+    """
+    before = len(problems.found)
+    grid = check_surface(surface, problems, finite=False, smallest=smallest, leading=leading, profile=True)
+    if len(problems.found) > before:
+        return []
+    if not is_lazy(surface):
+        _check_heights(surface.values, grid, problems, gaps)
+    if len(problems.found) > before:
+        return []
+    core = surface.dims[surface.ndim - len(grid.shape) :]
+    outer = [dim for dim in surface.dims if dim not in core]
+    places = np.ndindex(*(surface.sizes[dim] for dim in outer))
+    return [Face(surface.isel(dict(zip(outer, place, strict=True))), grid) for place in places]
+
+
+def _check_heights(heights: Array, grid: Grid, problems: Problems, gaps: bool) -> None:
+    if heights.size == 0:
+        problems.add("surface", "at least one face", f"shape {heights.shape}")
+        return
+    if np.isfinite(heights.min()) and np.isfinite(heights.max()):
+        return
+    problems.require(
+        not np.isinf(heights).any(), "surface", "heights that are finite or NaN", "infinite heights"
+    )
+    if not gaps:
+        problems.finite("surface", heights, remedy="see fractalcontact.surfaces.fill")
+    elif not np.isfinite(heights).reshape(-1, int(np.prod(grid.shape))).any(axis=1).all():
+        problems.add("surface", "observed heights", "nothing but NaN")

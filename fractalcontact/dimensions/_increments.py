@@ -1,0 +1,192 @@
+"""The closed-form estimator: how increments over 4 and 2 spacings compare with increments over one.
+
+For a fractional Brownian surface the mean square increment over m spacings is m^2H times that over one, for
+first and for second differences alike. Second differences keep the rate 1/n for every H < 1; first
+differences lose less where H is small (Zhu and Stein 2002, J. Agric. Biol. Environ. Stat. 7; Chan and Wood
+2000, Ann. Stat. 28). H is the slope of a line through the logarithms, each axis with a level of its own;
+their exact covariance, at a pilot estimate, weighs them and gives the standard error. One pass over the
+heights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.jit import use_threads
+from fractalcontact.dimensions._pairs import (
+    LAGS,
+    Overlap,
+    complete_overlap,
+    covariance_of_logs,
+    gapped_overlap,
+)
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+FIRST_BELOW = 0.45  # first differences where the pilot estimate is below, second differences above
+REACH = 2 * LAGS[-1]  # rows that a slab borrows from the next, in steps
+SMALLEST = 6  # points along an axis
+_NODES = np.linspace(0.02, 0.98, 25)
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Mean squares of the twelve increments of `_kernels.increment_sums`, and how many there were.
+
+    `observed` tells where heights were observed, or is None if everywhere.
+    """
+
+    means: Array
+    counts: Array
+    shape: tuple[int, ...]
+    step: int
+    observed: Array | None
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """Estimate of H with its standard error; `increment` is the rms first difference over one x spacing."""
+
+    hurst: float
+    standard_error: float
+    order: int
+    increment: float
+
+
+def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: int = 1) -> Moments:
+    """Collect the mean squares from slabs of rows.
+
+    Parameters
+    ----------
+    slabs : iterable of (heights, rows)
+        Consecutive rows of a face, each slab with up to `REACH` * `step` rows of the next; `rows` is how
+        many of its rows increments start from. A profile is a face of one row.
+    shape : (ny, nx) or (nx,)
+    step : int
+        Shortest lag in spacings.
+    """
+    from fractalcontact.dimensions._kernels import increment_sums
+
+    use_threads()
+    rows_of_sums, counts, masks = [], np.zeros(12, dtype=np.int64), []
+    for heights, rows in slabs:
+        sums = np.zeros((rows, 12))
+        increment_sums(heights, rows, step, sums)
+        number = _complete_counts(heights.shape, rows, step)
+        mask = None
+        if np.isnan(sums).any():
+            sums, number = _gapped_sums(heights, rows, step)
+            mask = np.isfinite(heights[:rows])
+        rows_of_sums.append(sums)
+        counts += number
+        masks.append(mask)
+    # added up one row after the other, so that neither slabs nor threads change a bit
+    total = np.cumsum(np.concatenate(rows_of_sums), axis=0)[-1]
+    means = np.divide(total, counts, out=np.full(12, np.nan), where=counts > 0)
+    observed = None
+    if any(mask is not None for mask in masks):
+        whole = (np.ones((len(sums), shape[-1]), dtype=bool) for sums in rows_of_sums)
+        observed = np.concatenate(
+            [one if mask is None else mask for mask, one in zip(masks, whole, strict=True)]
+        )
+    return Moments(means, counts, shape, step, observed)
+
+
+def closed_form(
+    moments: Moments, steps: tuple[float, ...], *, lags: int = 3, error: bool = True
+) -> ClosedForm:
+    """Estimate H; NaN where the increments vanish.
+
+    Parameters
+    ----------
+    moments : Moments
+    steps : (dy/dx, 1), or (1,) for a profile
+    lags : 2 or 3
+        How many of the lags are used.
+    error : bool
+        Where points are missing, False saves the time for the standard error, and weighs as if complete.
+    """
+    hurst, deviation = _estimate(moments, steps, 2, 0.5, lags, error=False)
+    order = 2
+    if np.isfinite(hurst):
+        order = 1 if hurst < FIRST_BELOW else 2
+        hurst, deviation = _estimate(moments, steps, order, hurst, lags, error=error)
+    reference = moments.means[0] if order == 1 else moments.means[3] / (4.0 - 4.0 ** min(hurst, 0.999))
+    increment = np.sqrt(reference) * float(moments.step) ** -hurst
+    return ClosedForm(hurst, deviation, order, float(increment))
+
+
+def _estimate(
+    moments: Moments, steps: tuple[float, ...], order: int, near: float, lags: int, *, error: bool
+) -> tuple[float, float]:
+    """Return H and its standard error, weighing as for a face of exponent `near`."""
+    axes = len(steps)
+    columns = np.array(
+        [3 * (order - 1) + i + 6 * (axes == 2 and axis == 0) for axis in range(axes) for i in range(3)]
+    )
+    means = moments.means[columns]
+    usable = np.isfinite(means) & (means > 0) & (np.arange(3 * axes) % 3 < lags)
+    design = np.zeros((3 * axes, axes + 1))
+    for axis in range(axes):
+        design[3 * axis : 3 * axis + 3, axis] = 1.0
+    design[:, axes] = np.tile(2.0 * np.log(LAGS), axes)
+    for axis in range(axes):
+        own = slice(3 * axis, 3 * axis + 3)
+        usable[own] &= np.count_nonzero(usable[own]) > 1
+    if not usable.any():
+        return np.nan, np.nan
+    if moments.observed is None or not error:
+        table = _table(moments.shape, steps, order, moments.step)
+        place = np.interp(near, _NODES, np.arange(_NODES.size))
+        low = min(int(place), _NODES.size - 2)
+        covariance = table[low] + (place - low) * (table[low + 1] - table[low])
+    else:
+        overlap = gapped_overlap(moments.observed, order, axes, moments.step)
+        covariance = covariance_of_logs(near, steps, order, overlap, moments.step)
+    return _slope(design[usable], np.log(means[usable]), covariance[np.ix_(usable, usable)])
+
+
+def _slope(design: Array, values: Array, covariance: Array) -> tuple[float, float]:
+    """Return the last coefficient by generalised least squares, and its standard error."""
+    design = design[:, np.any(design != 0, axis=0)]
+    weighted = np.linalg.solve(covariance, design)
+    inverse = np.linalg.inv(design.T @ weighted)
+    return float((inverse @ (weighted.T @ values))[-1]), float(np.sqrt(inverse[-1, -1]))
+
+
+@lru_cache(maxsize=32)
+def _table(shape: tuple[int, ...], steps: tuple[float, ...], order: int, step: int) -> Array:
+    """Tabulate the covariance of the logarithms over `_NODES`: (nodes, kinds, kinds)."""
+    overlap: Overlap = complete_overlap(shape, order, step)
+    return np.stack([covariance_of_logs(h, steps, order, overlap, step) for h in _NODES])
+
+
+def _complete_counts(shape: tuple[int, ...], rows: int, step: int) -> Array:
+    ny, nx = shape
+    reach = [step * k for k in (1, 2, 4, 2, 4, 8)]
+    return np.array([rows * max(nx - k, 0) for k in reach] + [max(min(rows, ny - k), 0) * nx for k in reach])
+
+
+def _gapped_sums(heights: Array, rows: int, step: int) -> tuple[Array, Array]:
+    """Do what `increment_sums` does where some heights are NaN."""
+    sums, counts = np.zeros((rows, 12)), np.zeros(12, dtype=np.int64)
+    column = 0
+    for axis in (1, 0):
+        for order in (1, 2):
+            for lag in LAGS:
+                reach = lag * step
+                if heights.shape[axis] > order * reach:
+                    jump = heights
+                    for _ in range(order):
+                        n = jump.shape[axis]
+                        jump = jump.take(range(reach, n), axis) - jump.take(range(n - reach), axis)
+                    jump = jump[:rows]
+                    sums[: len(jump), column] = np.nansum(jump * jump, axis=1)
+                    counts[column] = np.count_nonzero(~np.isnan(jump))
+                column += 1
+    return sums, counts

@@ -1,0 +1,226 @@
+"""Loops over heights, and nothing else."""
+
+from __future__ import annotations
+
+from math import log
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.jit import parallel_kernel, prange
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@parallel_kernel
+def increment_sums(heights: Array, rows: int, step: int, sums: Array) -> None:
+    """Sum squared increments that start in each of the first `rows` rows; a NaN makes a NaN.
+
+    Columns of `sums` (rows, 12): along x the first differences over 1, 2 and 4 `step`, then the second
+    differences over 1, 2 and 4 `step`; the same six along y.
+    """
+    ny, nx = heights.shape
+    p, q, r = step, 2 * step, 4 * step
+    for j in prange(rows):
+        row = heights[j]
+        inner = max(nx - 2 * r, 0)
+        a = b = c = d = e = f = 0.0
+        for i in range(inner):
+            u, v, w = row[i + p] - row[i], row[i + q] - row[i], row[i + r] - row[i]
+            a += u * u
+            b += v * v
+            c += w * w
+            u, v, w = (
+                (row[i + q] - row[i + p]) - u,
+                (row[i + r] - row[i + q]) - v,
+                (row[i + 2 * r] - row[i + r]) - w,
+            )
+            d += u * u
+            e += v * v
+            f += w * w
+        for i in range(inner, nx - p):
+            u = row[i + p] - row[i]
+            a += u * u
+            if i + q < nx:
+                v = row[i + q] - row[i]
+                b += v * v
+                u = (row[i + q] - row[i + p]) - u
+                d += u * u
+                if i + r < nx:
+                    w = row[i + r] - row[i]
+                    c += w * w
+                    v = (row[i + r] - row[i + q]) - v
+                    e += v * v
+        sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3], sums[j, 4], sums[j, 5] = a, b, c, d, e, f
+        a = b = c = d = e = f = 0.0
+        if j + 2 * r < ny:
+            on, up, high, top = heights[j + p], heights[j + q], heights[j + r], heights[j + 2 * r]
+            for i in range(nx):
+                u, v, w = on[i] - row[i], up[i] - row[i], high[i] - row[i]
+                a += u * u
+                b += v * v
+                c += w * w
+                u, v, w = (up[i] - on[i]) - u, (high[i] - up[i]) - v, (top[i] - high[i]) - w
+                d += u * u
+                e += v * v
+                f += w * w
+        elif j + p < ny:
+            on, up, high = heights[j + p], heights[min(j + q, ny - 1)], heights[min(j + r, ny - 1)]
+            for i in range(nx):
+                u = on[i] - row[i]
+                a += u * u
+                if j + q < ny:
+                    v = up[i] - row[i]
+                    b += v * v
+                    u = (up[i] - on[i]) - u
+                    d += u * u
+                    if j + r < ny:
+                        w = high[i] - row[i]
+                        c += w * w
+                        v = (high[i] - up[i]) - v
+                        e += v * v
+        sums[j, 6], sums[j, 7], sums[j, 8], sums[j, 9], sums[j, 10], sums[j, 11] = a, b, c, d, e, f
+
+
+@parallel_kernel
+def whiten(covariances: Array, columns: Array, log_determinants: Array) -> None:
+    """Factor each covariance (chunks, n, n) in place and solve for its columns (chunks, n, k) in place.
+
+    With covariance = U' U, columns become U'^-1 columns. Only the upper triangle is used. The updates run
+    along rows, so that they need no reordered sums. A chunk that is not positive definite gets NaN.
+    """
+    chunks, n, k = columns.shape
+    for c in prange(chunks):
+        total = 0.0
+        for p in range(n):
+            pivot = covariances[c, p, p]
+            if not pivot > 0.0:
+                total = float("nan")
+                break
+            root = pivot**0.5
+            total += 2.0 * log(root)
+            for j in range(p, n):
+                covariances[c, p, j] /= root
+            for m in range(k):
+                columns[c, p, m] /= root
+            for i in range(p + 1, n):
+                factor = covariances[c, p, i]
+                for j in range(i, n):
+                    covariances[c, i, j] -= factor * covariances[c, p, j]
+                for m in range(k):
+                    columns[c, i, m] -= factor * columns[c, p, m]
+        log_determinants[c] = total
+
+
+@parallel_kernel
+def pair_sums(
+    heights: Array, rows: int, columns: Array, offsets: Array, kind: int, sums: Array, counts: Array
+) -> None:
+    """Sum increments from the first `rows` rows and the columns from columns[0] up to columns[1].
+
+    `offsets` (k, 2) are steps in y (not negative) and x. `kind` 0 sums squares of first differences, 1
+    their absolute values, 2 squares of second differences. `sums` and `counts` are (rows, k); an increment
+    with a NaN in it is left out.
+    """
+    ny, nx = heights.shape
+    for j in prange(rows):
+        for k in range(offsets.shape[0]):
+            dy, dx = offsets[k, 0], offsets[k, 1]
+            reach = 2 if kind == 2 else 1
+            total = 0.0
+            number = 0
+            if j + reach * dy < ny:
+                first = max(columns[0], -reach * dx)
+                last = min(columns[1], nx - reach * dx)
+                row, on = heights[j], heights[j + dy]
+                beyond = heights[j + reach * dy]
+                for i in range(first, last):
+                    v = on[i + dx] - row[i]
+                    if kind == 2:
+                        v = (beyond[i + 2 * dx] - on[i + dx]) - v
+                    if v == v:
+                        total += abs(v) if kind == 1 else v * v
+                        number += 1
+            sums[j, k] = total
+            counts[j, k] = number
+
+
+@parallel_kernel
+def prism_sums(
+    heights: Array,
+    step_y: int,
+    step_x: int,
+    length_y: float,
+    length_x: float,
+    sums: Array,
+    counts: Array,
+) -> None:
+    """Sum area over plan area of the four triangles on every cell of step_y x step_x points.
+
+    The apex is the mean of the corners. `sums` and `counts` are (rows,), rows = ny - step_y; a cell with a
+    NaN corner is left out.
+    """
+    nx = heights.shape[1]
+    for j in prange(sums.size):
+        low, high = heights[j], heights[j + step_y]
+        total = 0.0
+        number = 0
+        for i in range(nx - step_x):
+            a, b, c, d = low[i], low[i + step_x], high[i], high[i + step_x]
+            south, north, west, east = (
+                (b - a) / length_x,
+                (d - c) / length_x,
+                (c - a) / length_y,
+                (d - b) / length_y,
+            )
+            # gradient across each triangle: from the middle of its edge to the apex
+            rise = 0.5 * (west + east)
+            run = 0.5 * (south + north)
+            area = (
+                (1.0 + south * south + rise * rise) ** 0.5
+                + (1.0 + north * north + rise * rise) ** 0.5
+                + (1.0 + west * west + run * run) ** 0.5
+                + (1.0 + east * east + run * run) ** 0.5
+            )
+            if area == area:
+                total += 0.25 * area
+                number += 1
+        sums[j] = total
+        counts[j] = number
+
+
+@parallel_kernel
+def roughness_sums(
+    heights: Array, size_y: int, size_x: int, rows: Array, columns: Array, sums: Array, counts: Array
+) -> None:
+    """Sum the rms deviation from its own plane over windows that start at `rows` and `columns`.
+
+    `sums` and `counts` are (rows.size,); a window with a NaN in it is left out.
+    """
+    squares_x = size_y * size_x * (size_x * size_x - 1.0) / 12.0
+    squares_y = size_x * size_y * (size_y * size_y - 1.0) / 12.0
+    number = size_y * size_x
+    for r in prange(rows.size):
+        for c in range(columns.size):
+            j0, i0 = rows[r], columns[c]
+            mean = 0.0
+            for j in range(j0, j0 + size_y):
+                for i in range(i0, i0 + size_x):
+                    mean += heights[j, i]
+            mean /= number
+            square = along_x = along_y = 0.0
+            for j in range(j0, j0 + size_y):
+                y = j - j0 - 0.5 * (size_y - 1)
+                line = 0.0
+                for i in range(i0, i0 + size_x):
+                    v = heights[j, i] - mean
+                    square += v * v
+                    line += v
+                    along_x += v * (i - i0 - 0.5 * (size_x - 1))
+                along_y += y * line
+            square -= along_x * along_x / squares_x
+            if size_y > 1:
+                square -= along_y * along_y / squares_y
+            if square == square:
+                sums[r] += (max(square, 0.0) / number) ** 0.5
+                counts[r] += 1

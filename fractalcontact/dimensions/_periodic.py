@@ -1,0 +1,114 @@
+"""A power law fitted to the modes of a periodic face, and the band in which it holds.
+
+The modes of a periodic Gaussian face are independent, and the face has no shorter waves than its grid
+carries: no window, no aliasing, no edges. What must be found is the band: where the spectrum is cut off,
+and where it bends into a plateau.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.spectra import periodogram, radial_wavenumber
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_CLIFF = 1e-3  # a fall of the mean power by this factor between neighbouring rings is a cut-off
+_PENALTY = 6.0  # fall of the deviance that a plateau must bring
+LEAST_MODES = 12
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Power and wavenumber (in steps of the widest axis) of the modes, and how often each counts."""
+
+    power: Array
+    wavenumber: Array
+    weights: Array
+    axes: int
+
+    def inside(self, low: float, high: float) -> Modes:
+        """Keep the modes with low <= wavenumber <= high."""
+        kept = (self.wavenumber >= low) & (self.wavenumber <= high)
+        return Modes(self.power[kept], self.wavenumber[kept], self.weights[kept], self.axes)
+
+
+def modes(heights: Array, steps: tuple[float, ...]) -> Modes:
+    """Return the modes of a periodic face, the mean left out.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (ny, nx) or (nx,)
+    steps : (dy/dx, 1) or (1,)
+    """
+    power, columns = periodogram(heights - heights.mean(), steps)
+    unit = 2.0 * np.pi / max(n * step for n, step in zip(heights.shape, steps, strict=True))
+    radius = (radial_wavenumber(heights.shape, steps) / unit).ravel()
+    weights = np.broadcast_to(columns, power.shape).ravel()
+    kept = radius > 0
+    return Modes(power.ravel()[kept], radius[kept], weights[kept], len(steps))
+
+
+def band(modes: Modes) -> tuple[float, float]:
+    """Return the lowest and the highest wavenumber of the power law.
+
+    Cut-offs are cliffs between rings, and the ring beside a cliff is left out. A plateau is what the
+    likelihood of power law with plateau finds, if it is much better than that of the power law alone.
+    """
+    ring = np.rint(modes.wavenumber).astype(int)
+    counts = np.bincount(ring, modes.weights)
+    total = np.bincount(ring, modes.weights * modes.power)
+    rings = np.flatnonzero(counts > 0)
+    counts, mean = counts[rings], total[rings] / counts[rings]
+    first, last = _cliffs(mean)
+    low = -np.inf if first == 0 else rings[first] + 0.5
+    high = np.inf if last == mean.size - 1 else rings[last] - 0.5
+    chosen = slice(first, last + 1)
+    bend = _plateau(rings[chosen].astype(float), mean[chosen], counts[chosen], modes.axes)
+    return (max(low, bend), high)
+
+
+def power_law(modes: Modes, hurst: float) -> Array:
+    """Return the power for unit amplitude."""
+    return np.asarray(modes.wavenumber ** (-modes.axes - 2.0 * hurst))
+
+
+def _cliffs(mean: Array) -> tuple[int, int]:
+    """Return the first and the last ring of the band around the strongest one."""
+    top = int(np.argmax(mean))
+    above = np.flatnonzero(mean[top + 1 :] < _CLIFF * mean[top:-1])
+    below = np.flatnonzero(mean[:top] < _CLIFF * mean[top])
+    return (int(below[-1]) + 1 if below.size else 0), (top + int(above[0]) if above.size else mean.size - 1)
+
+
+def _plateau(q: Array, mean: Array, counts: Array, axes: int) -> float:
+    """Return the wavenumber above which the power law holds; -inf if it holds from the first ring."""
+    best, corner = np.inf, -np.inf
+    for i in range(max(1, int(0.6 * q.size))):
+        deviance = _deviance(np.maximum(q, q[i]) / q[i], mean, counts, axes)
+        if deviance < best - (_PENALTY if i <= 1 or corner == -np.inf else 0.0):
+            best, corner = deviance, (-np.inf if i == 0 else q[i] + 0.5)
+    return corner
+
+
+def _deviance(q: Array, mean: Array, counts: Array, axes: int) -> float:
+    """Return the deviance of mean = A q^-s at the best A and s, by scoring on the rings."""
+    logs = np.log(q)
+    centred = logs - np.sum(counts * logs) / np.sum(counts)
+    spread = float(np.sum(counts * centred**2))
+    if spread <= 0:
+        return np.inf
+    slope = axes + 1.0
+    for _ in range(50):
+        scaled = mean * q**slope
+        level = float(np.sum(counts * scaled) / np.sum(counts))
+        step = -float(np.sum(counts * centred * (scaled / level - 1.0))) / spread
+        slope += float(np.clip(step, -1.0, 1.0))
+        if abs(step) < 1e-9:
+            break
+    scaled = mean * q**slope
+    level = float(np.sum(counts * scaled) / np.sum(counts))
+    return float(np.sum(counts) * np.log(level) - slope * np.sum(counts * logs))

@@ -1,0 +1,305 @@
+"""The curve behind each method, with its local slope, before any fit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.scaling import local_slope
+from fractalcontact.dimensions import _measures
+from fractalcontact.dimensions._faces import read_faces
+from fractalcontact.dimensions._tables import finish, stack
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
+    """Return the radially averaged power spectral density.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x) for a profile, complete.
+    window : "auto", "hann" or None
+        Taper of the free axes. "auto" is "hann" on free axes and None on periodic ones; None leaves free axes
+        untapered too, and their edges then show as a tail q^-3. A plane is taken off unless both axes are
+        periodic, then only the mean.
+    tile : int, optional
+        Average the spectra of square tiles with this edge in points, overlapping by half (Welch 1967): for
+        surfaces that do not fit in memory, or for a smoother curve. Default: the whole face.
+
+    Returns
+    -------
+    Dataset over `wavenumber` (rad m-1)
+        `power_spectral_density` (m4; `profile_power_spectral_density`, m3, of a profile), `mode_count`,
+        `local_slope` (over a factor of two in wavenumber), and `wavelength` beside the wavenumber. Rings as
+        wide as the step of the wavenumbers, up to the smaller Nyquist wavenumber.
+
+    Raises
+    ------
+    InvalidInput
+        Heights are missing, an axis is not uniform, a tile does not fit.
+
+    Notes
+    -----
+    Convention: C(q) = dx dy |Z(q)|^2 / (nx ny), so that its integral over dqx dqy / (2 pi)^2 is the mean
+    square height; see `fractalcontact.base.spectra`. For a self-affine surface C falls as q^(-2 - 2 H), for
+    a profile as q^(-1 - 2 H).
+
+    References
+    ----------
+    Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
+    """
+    with Problems("fractalcontact.dimensions.spectrum") as problems:
+        faces = read_faces(surface, problems, smallest=4, gaps=False)
+        given = problems.choice("window", "none" if window is None else window, ("auto", "hann", "none"))
+        edge = None if tile is None else problems.integer("tile", tile, at_least=8)
+        if faces and edge is not None:
+            problems.require(
+                edge <= min(faces[0].grid.shape), "tile", f"at most {min(faces[0].grid.shape)}", edge
+            )
+    started = time.perf_counter()
+    curves = [_measures.spectrum(face, given, edge) for face in faces]
+    name = "power_spectral_density" if faces[0].axes == 2 else "profile_power_spectral_density"
+    result = stack(surface, faces, "wavenumber", curves, {name: "value"}, {"mode_count": "count"})
+    result = result.assign_coords(wavelength=2.0 * np.pi / result["wavenumber"])
+    slopes = [_measures.wide_slope(c.scale, c.value, c.count) for c in curves]
+    return finish(
+        result, surface, faces, "spectrum", slopes, started, {"window": window, "tile": tile},
+        title="Power spectral density of a surface",
+        references="Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
+    )  # fmt: skip
+
+
+def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
+    """Return the variogram: half the mean square height increment over all pairs of points at a lag.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x); NaN where nothing was observed.
+    max_lag : float, optional
+        Largest lag in metres. Default: half the shorter extent. Few lags are summed in one pass, also over
+        a surface that is not in memory (then the default is four spacings); many by transforms.
+
+    Returns
+    -------
+    Dataset over `lag` (m)
+        `variogram` (m2), `pair_count` and `local_slope`, which is 2 H for a self-affine surface. Pairs in all
+        directions are pooled. Up to 4.5 spacings each distance is a lag of its own; beyond, they are pooled
+        in rings as wide as the larger spacing. Pairs wrap around periodic axes.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or no lag is left.
+
+    References
+    ----------
+    Matheron (1963), Economic Geology 58; with transforms and gaps: Marcotte (1996), Computers and
+    Geosciences 22.
+    """
+    return _lag_curve("variogram", surface, max_lag, _measures.variogram, {"variogram": "value"})
+
+
+def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
+    """Return the madogram: half the mean absolute height increment, along both axes.
+
+    Parameters
+    ----------
+    surface : DataArray
+        As for `variogram`.
+    max_lag : float, optional
+        Largest lag in metres; default a quarter of the shorter extent.
+
+    Returns
+    -------
+    Dataset over `lag` (m)
+        `madogram` (m), `pair_count` and `local_slope`, which is H for a self-affine surface. Five lags or so
+        for each doubling.
+
+    References
+    ----------
+    Gneiting, Sevcikova and Percival (2012), Statistical Science 27.
+    """
+    return _lag_curve("madogram", surface, max_lag, _measures.madogram, {"madogram": "value"})
+
+
+def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
+    """Return the mean square second difference of the heights, along both axes.
+
+    A tilt adds nothing to z(s - h) - 2 z(s) + z(s + h), and its mean square converges for every H < 1, where
+    that of first differences does not.
+
+    Parameters
+    ----------
+    surface : DataArray
+        As for `variogram`.
+    max_lag : float, optional
+        Largest lag h in metres; default an eighth of the shorter extent.
+
+    Returns
+    -------
+    Dataset over `lag` (m)
+        `second_variogram` (m2), `pair_count` (of triples) and `local_slope`, which is 2 H for a self-affine
+        surface.
+
+    References
+    ----------
+    Chan and Wood (2000), Annals of Statistics 28; Zhu and Stein (2002), J. Agric. Biol. Environ. Stat. 7.
+    """
+    return _lag_curve(
+        "second_variogram", surface, max_lag, _measures.second_variogram, {"second_variogram": "value"}
+    )
+
+
+def roughness_length(surface: xr.DataArray) -> xr.Dataset:
+    """Return the mean rms height inside square windows, each about a plane of its own.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x); windows with a NaN in them are left out.
+
+    Returns
+    -------
+    Dataset over `window_size` (m)
+        `roughness` (m), `pair_count` (of windows) and `local_slope`, which is H for a self-affine surface.
+        Windows overlap by half; their edge grows by sqrt 2 from 4 points to a quarter of the face.
+
+    References
+    ----------
+    Malinverno (1990), Geophysical Research Letters 17.
+    """
+    return _window_curve(
+        "roughness_length", surface, "window_size", {"roughness": "value"}, {}, "Roughness inside windows"
+    )
+
+
+def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range") -> xr.Dataset:
+    """Count the cubes that meet the surface, on average over all positions of their grid.
+
+    The count depends on the unit of height: where heights are small against the cubes it is that of a
+    plane, whatever the surface. `vertical_scale` says how heights were scaled, and is kept in the result.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x); columns of cubes with a NaN in them are left out.
+    vertical_scale : "range" or float
+        "range" multiplies the heights so that their range is the extent of the face (the geometric mean of
+        its edges); a number multiplies them by it, 1 being natural scale.
+
+    Returns
+    -------
+    Dataset over `cube_size` (m)
+        `cube_count` (not whole, being a mean over positions), `local_slope`, which is -D for a fractal
+        surface, and `vertical_scale`, the factor on the heights. Edges double from one spacing to half the
+        face.
+
+    Notes
+    -----
+    Extremes of sampled heights miss what lies between the points, so that D is too low for rough surfaces,
+    by 0.2 to 0.3 where H is small.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998); Clarke (1986), Computers and Geosciences 12.
+    """
+    return _window_curve(
+        "cube_counts",
+        surface,
+        "cube_size",
+        {"cube_count": "value"},
+        {"vertical_scale": vertical_scale},
+        "Cube counts",
+    )
+
+
+def covering(surface: xr.DataArray, *, vertical_scale: float = 1.0) -> xr.Dataset:
+    """Return the area of the triangulated surface against the edge of the triangles.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x), or (..., x) for the length of a profile; cells with a NaN at
+        a corner are left out.
+    vertical_scale : float
+        Multiplies the heights; 1 is natural scale. The area of a surface of small slopes hardly depends on
+        the edge: its dimension by this method is then 2, and is 2 exactly for a plane.
+
+    Returns
+    -------
+    Dataset over `cube_size` (m)
+        `covering_area` (m2, of the nominal area; `covering_length`, m, of a profile), `local_slope`, which
+        is 2 - D (1 - D of a profile), and `vertical_scale`. Edges double from one spacing to half the face.
+
+    References
+    ----------
+    Clarke (1986), Computers and Geosciences 12 (triangular prisms).
+    """
+    name = "covering_area" if "y" in getattr(surface, "dims", ()) else "covering_length"
+    return _window_curve(
+        "covering",
+        surface,
+        "cube_size",
+        {name: "value"},
+        {"vertical_scale": vertical_scale},
+        "Area of the covering",
+    )
+
+
+def _lag_curve(
+    name: str, surface: Any, max_lag: float | None, measure: Callable[..., Any], value: dict[str, str]
+) -> xr.Dataset:
+    with Problems(f"fractalcontact.dimensions.{name}") as problems:
+        faces = read_faces(surface, problems)
+        longest = None if max_lag is None else problems.number("max_lag", max_lag, above=0)
+        if faces and longest is not None:
+            least = min(faces[0].grid.spacing)
+            problems.require(
+                longest >= least * (1 - 1e-9), "max_lag", f"at least one spacing, {least:g} m", longest
+            )
+    started = time.perf_counter()
+    curves = [measure(face, longest) for face in faces]
+    result = stack(surface, faces, "lag", curves, value, {"pair_count": "count"})
+    slopes = [local_slope(c.scale, c.value) for c in curves]
+    title = {
+        "variogram": "Variogram",
+        "madogram": "Madogram",
+        "second_variogram": "Mean square second differences",
+    }
+    return finish(
+        result,
+        surface,
+        faces,
+        name,
+        slopes,
+        started,
+        {"max_lag": max_lag},
+        title=f"{title[name]} of a surface",
+    )
+
+
+def _window_curve(
+    name: str, surface: Any, dim: str, value: dict[str, str], options: dict[str, Any], title: str
+) -> xr.Dataset:
+    with Problems(f"fractalcontact.dimensions.{name}") as problems:
+        faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name])
+        scale = options.get("vertical_scale")
+        if scale is not None and not (name == "cube_counts" and scale == "range"):
+            problems.number("vertical_scale", scale, above=0)
+    started = time.perf_counter()
+    arguments = () if scale is None else (scale,)
+    curves = [_measures.MEASURES[name](face, *arguments) for face in faces]
+    counted = {"pair_count": "count"} if name == "roughness_length" else {}
+    result = stack(surface, faces, dim, curves, value, counted)
+    slopes = [local_slope(c.scale, c.value) for c in curves]
+    return finish(result, surface, faces, name, slopes, started, options, title=f"{title} of a surface")
