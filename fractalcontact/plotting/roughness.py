@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.scaling import fit_line
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._reading import as_dataset, result_of, table, words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
@@ -19,18 +18,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
-CURVES = (
-    "power_spectral_density",
-    "profile_power_spectral_density",
-    "second_variogram",
-    "variogram",
-    "madogram",
-    "cube_count",
-    "roughness",
-    "covering_area",
-    "variation",
-)
+# slope of each curve in log-log scale: a H + b d + c, for a Hurst exponent H and the d of a surface (3) or a
+# profile (2); the first name that a Dataset holds is its curve
+CURVES = {
+    "power_spectral_density": (-2.0, -1.0, 1.0),
+    "profile_power_spectral_density": (-2.0, 0.0, -1.0),
+    "second_variogram": (2.0, 0.0, 0.0),
+    "variogram": (2.0, 0.0, 0.0),
+    "madogram": (1.0, 0.0, 0.0),
+    "cube_count": (1.0, -1.0, 0.0),
+    "roughness": (1.0, 0.0, 0.0),
+    "covering_area": (1.0, 0.0, -1.0),
+}
 COLUMNS = 3
+CLIPPED = 3  # per cent of the local slopes at either end that may lie beyond the axis
 
 
 @_style.styled
@@ -46,8 +47,8 @@ def dimension_curves(
         /dimensions of a study the children are taken, with the estimates beside them.
     estimates : Dataset, optional
         From `fractalcontact.dimensions.estimate`: where it has a method of the same name, its window
-        (scale_min, scale_max, in m) is shaded, the straight line through the curve in that window is drawn
-        and its slope told.
+        (scale_min, scale_max, in m) is shaded, and the slope that its exponent stands for is drawn through
+        the curve in that window and told.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -62,7 +63,8 @@ def dimension_curves(
     """
     found, fitted = _curves_in(curves, estimates)
     names = list(found)
-    rows, columns = -(-len(names) // COLUMNS), min(len(names), COLUMNS)
+    columns = 2 if len(names) == 4 else min(len(names), COLUMNS)
+    rows = -(-len(names) // columns)
     width = 2.7 * columns + (0.4 if columns > 1 else 1.6)
     sheet = _style.sheet(figure, (width, 3.7 * rows))
     heights = (2.2, 1.0) * rows
@@ -124,12 +126,14 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     marker = "." if x.size <= 60 else ""
     upper.plot(along(x), across(y), color=_style.BLUE, marker=marker, lw=1.2)
     if "local_slope" in curve:
-        lower.plot(along(x), table(curve, "local_slope", (dim,)), color=_style.BLUE, lw=1.0, marker=marker)
+        slopes = table(curve, "local_slope", (dim,))
+        lower.plot(along(x), slopes, color=_style.BLUE, lw=1.0, marker=marker)
+        _slope_limits(lower, slopes)
     for ax in (upper, lower):
         _style.log_scale(ax, x=x)
     _style.log_scale(upper, y=y)
     if fit is not None:
-        _draw_fit(upper, lower, fit, scale, x, y, (along, across))
+        _draw_fit(upper, lower, fit, (scale, value), (x, y), (along, across))
     upper.set_title(name.replace("_", " "))
     upper.set_ylabel(across.label(name_of(curve[value])))
     upper.tick_params(labelbottom=False)
@@ -140,28 +144,46 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
         _style.say(upper, "no curve")
 
 
+def _slope_limits(ax: Axes, slopes: Any) -> None:
+    """Keep the noise at the ends of a curve from squeezing all the rest."""
+    known = slopes[np.isfinite(slopes)]
+    if known.size:
+        low, high = np.percentile(known, (CLIPPED, 100 - CLIPPED))
+        room = max(0.25 * (high - low), 0.05)
+        ax.set_ylim(low - room, high + room)
+
+
 def _draw_fit(
-    upper: Axes, lower: Axes, fit: xr.Dataset, scale: str, x: Any, y: Any, shown: tuple[Any, Any]
+    upper: Axes,
+    lower: Axes,
+    fit: xr.Dataset,
+    names: tuple[str, str],
+    curve: tuple[Any, Any],
+    shown: tuple[Any, Any],
 ) -> None:
-    """Shade the window of the fit, draw its line, and tell its slope."""
+    """Shade the window of the fit, draw its slope through the curve, and tell it."""
     window = np.sort([float(fit["scale_min"]), float(fit["scale_max"])])
-    if scale == "wavenumber":
+    if names[0] == "wavenumber":
         window = np.sort(2 * np.pi / window)
     if not np.isfinite(window).all():
         return
     for ax in (upper, lower):
         ax.axvspan(*shown[0](window), color=_style.PALE, alpha=0.55, lw=0, zorder=0)
-    inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9))
-    line = fit_line(x[inside], y[inside])
-    if not np.isfinite(line.slope):
+    x, y = curve
+    inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9)) & (x > 0) & (y > 0)
+    hurst, dimension = float(fit["hurst"]), float(fit["fractal_dimension"])
+    if not inside.any() or not np.isfinite(hurst):
         return
+    a, b, c = CURVES[names[1]]
+    slope = a * float(fit.get("fitted_hurst", hurst)) + b * (hurst + dimension) + c
+    level = np.mean(np.log(y[inside]) - slope * np.log(x[inside]))
     ends = np.array([x[inside].min(), x[inside].max()])
-    upper.plot(shown[0](ends), shown[1](np.exp(line.intercept) * ends**line.slope), color=_style.RED, lw=1.4)
-    lower.plot(shown[0](ends), [line.slope] * 2, color=_style.RED, lw=1.2)
-    text = f"slope {line.slope:.2f}\n" + rf"$\Delta$ = {float(fit['fractal_dimension']):.2f}"
-    rising = line.slope > 0
-    upper.text(0.04 if rising else 0.96, 0.96, text, transform=upper.transAxes, va="top", color=_style.RED,
-               ha="left" if rising else "right")  # fmt: skip
+    upper.plot(shown[0](ends), shown[1](np.exp(level + slope * np.log(ends))), color=_style.RED, lw=1.4)
+    lower.plot(shown[0](ends), [slope] * 2, color=_style.RED, lw=1.2)
+    text = f"slope {slope:.2f}\n" + rf"$\Delta$ = {dimension:.2f}"
+    right = slope < 0
+    upper.text(0.96 if right else 0.04, 0.96, text, transform=upper.transAxes, va="top", color=_style.RED,
+               ha="right" if right else "left")  # fmt: skip
 
 
 @_style.styled

@@ -7,6 +7,7 @@ import pytest
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.plotting.roughness import CURVES
 
 FACTORS = {
     "m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "N": 1.0, "kN": 1e3, "Pa": 1.0, "MPa": 1e6, "GPa": 1e9,
@@ -187,6 +188,8 @@ def test_hydraulic_aperture_shows_each_flow(made, closed):
 
 def test_dimension_curves_show_curve_window_and_slope(made):
     curves, estimates = made.curves(), made.estimates()
+    estimates["hurst"][:] = 0.78
+    estimates["fractal_dimension"][:] = 2.22
     axes = plotting.dimension_curves(curves, estimates).axes
     upper, lower = axes[:3], axes[3:]
     for ax, below, (name, curve) in zip(upper, lower, curves.items(), strict=True):
@@ -195,12 +198,33 @@ def test_dimension_curves_show_curve_window_and_slope(made):
         assert np.asarray(ax.lines[0].get_xdata()) * fx == pytest.approx(curve[scale].values)
         slope = float(curve.local_slope[0])
         assert np.allclose(below.lines[1].get_ydata(), slope)
-        assert f"slope {slope:.2f}".replace("-", "-") in ax.texts[0].get_text()
+        assert f"slope {slope:.2f}" in ax.texts[0].get_text()
+        line, points = (np.log([one.get_xdata(), one.get_ydata()]) for one in (ax.lines[1], ax.lines[0]))
+        assert np.diff(line[1]) / np.diff(line[0]) == pytest.approx(slope)
+        assert np.interp(line[0], *points) == pytest.approx(line[1])
         window = np.array([2e-4, 4e-3])
         window = np.sort(2 * np.pi / window) if scale == "wavenumber" else window
         shaded = ax.patches[0]
         assert np.array([shaded.get_x(), shaded.get_x() + shaded.get_width()]) * fx == pytest.approx(window)
         assert name.replace("_", " ") == ax.get_title(loc="left")
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+@pytest.mark.parametrize("name", list(CURVES))
+def test_the_slope_of_each_curve_is_that_of_the_surface_it_is_measured_on(name, hurst):
+    """The slopes as the books give them: 2-D spectrum -2(1 + H), counts -(3 - H), area 2 - D ..."""
+    dimension = 3 - hurst
+    of_surfaces = {
+        "power_spectral_density": -2 * (1 + hurst),
+        "profile_power_spectral_density": -(5 - 2 * (2 - hurst)),
+        "second_variogram": 6 - 2 * dimension,
+        "variogram": 6 - 2 * dimension,
+        "madogram": 3 - dimension,
+        "cube_count": -dimension,
+        "roughness": 3 - dimension,
+        "covering_area": 2 - dimension,
+    }
+    assert np.dot(CURVES[name], (hurst, 3.0, 1.0)) == pytest.approx(of_surfaces[name])
 
 
 def test_dimensions_show_intervals_of_the_dimension_not_of_the_hurst_exponent(made):
