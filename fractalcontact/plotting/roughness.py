@@ -31,7 +31,7 @@ CURVES = {
     "covering_area": (1.0, 0.0, -1.0),
 }
 COLUMNS = 3
-CLIPPED = 3  # per cent of the local slopes at either end that may lie beyond the axis
+CLIPPED = 10  # per cent of the local slopes at either end that may lie beyond the axis
 
 
 @_style.styled
@@ -149,7 +149,7 @@ def _slope_limits(ax: Axes, slopes: Any) -> None:
     known = slopes[np.isfinite(slopes)]
     if known.size:
         low, high = np.percentile(known, (CLIPPED, 100 - CLIPPED))
-        room = max(0.25 * (high - low), 0.05)
+        room = max(0.4 * (high - low), 0.05)
         ax.set_ylim(low - room, high + room)
 
 
