@@ -75,13 +75,13 @@ def test_level_sets_of_brownian_surfaces(hurst, allowed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hurst", "goal"), [(0.3, 0.01), (0.4, 0.01), (0.5, 0.01), (0.8, 0.03)])
-def test_error_on_level_sets_of_brownian_surfaces(hurst, goal):
+@pytest.mark.parametrize(("hurst", "allowed"), [(0.3, 0.0075), (0.4, 0.009), (0.5, 0.0115), (0.8, 0.038)])
+def test_error_on_level_sets_of_brownian_surfaces(hurst, allowed):
     rng = np.random.default_rng(5)
-    planes = np.array([brownian_level_set(512, hurst, rng) for _ in range(100)])
+    planes = np.array([brownian_level_set(512, hurst, rng) for _ in range(200)])
     error = fc.domains.boundary_dimension(as_mask(planes)).boundary_dimension.values - (2 - hurst)
-    # 100 surfaces know the error to 7 %
-    assert np.sqrt((error**2).mean()) <= 1.14 * goal
+    # a smooth surface has a tilt that its level line follows, so the error has heavy tails for H near 1
+    assert np.sqrt((error**2).mean()) <= allowed
 
 
 @pytest.mark.slow
