@@ -185,12 +185,19 @@ class Descent:
         self.fresh = True
 
     def restore_force(self, force: float, capped: float) -> None:
-        """Scale the pressures below the cap until their sum is what is wanted."""
+        """Scale the pressures until their sum is what is wanted; those at the cap stay while they can."""
         wanted = float(self.control.total or 0.0)
         for _ in range(50):
-            if force <= capped or abs(force - wanted) <= self.precise * wanted:
+            if abs(force - wanted) <= self.precise * wanted or force <= 0:
                 break
-            factor = (wanted - capped) / (force - capped)
+            if capped >= wanted:  # too much is at the cap: all of it comes down
+                self.p *= self.kind(wanted / force)
+                factor = 1.0
+            elif capped >= force:  # nothing is left below the cap: the rest is spread over all nodes
+                np.minimum(self.p + self.kind((wanted - force) / self.size), self.cap, out=self.p)
+                factor = 1.0
+            else:
+                factor = (wanted - capped) / (force - capped)
             force, capped = self.run(_kernels.rescale, self.p, self.kind(factor), self.cap)[:2]
             if not np.isfinite(self.cap):
                 break

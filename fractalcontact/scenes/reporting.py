@@ -99,7 +99,7 @@ def _dimensions(tree: xr.DataTree) -> str:
         return ""
     rows = [("fractal dimension", "D", "95 % interval of D", "scales")]
     for method in found["method"].values:
-        one = found.sel(method=method)
+        one = found.sel({"method": method})
         low, high, dimension, hurst = (
             float(one[k]) for k in ("ci_low", "ci_high", "fractal_dimension", "hurst")
         )

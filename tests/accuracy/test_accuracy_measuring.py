@@ -28,10 +28,10 @@ def test_each_part_is_measured_within_its_budget(part):
 
 def test_the_error_of_the_solver_falls_with_the_spacing():
     data = fc.accuracy.measure("contact", budget=20)["contact"].to_dataset()
-    square = data["error"].sel(method="fast, square").dropna("knob")
+    square = data["error"].sel({"method": "fast, square"}).dropna("knob")
     assert square.values[-1] < 0.1 * square.values[0]
     paper, fast = (
-        data["error"].sel(method=name).dropna("knob") for name in ("elimination, disc", "fast, disc")
+        data["error"].sel({"method": name}).dropna("knob") for name in ("elimination, disc", "fast, disc")
     )
     common = np.intersect1d(paper["knob"], fast["knob"])
     np.testing.assert_allclose(paper.sel(knob=common), fast.sel(knob=common), atol=1e-6)
