@@ -1,0 +1,55 @@
+"""Every example of the gallery runs alone, without pyplot or a network, and prints the data it made."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GALLERY = Path(__file__).parents[2] / "gallery"
+SCRIPTS = sorted(path.name for path in GALLERY.glob("plot_*.py"))
+NO_NETWORK = (
+    "import runpy, socket, sys\n"
+    "def refuse(*a, **k): raise OSError('no network here')\n"
+    "socket.socket.connect = refuse\n"
+    "sys.path.insert(0, '.')\n"
+    "runpy.run_path(sys.argv[1], run_name='__main__')\n"
+    "assert 'matplotlib.pyplot' not in sys.modules\n"
+)
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the gallery, since one example renews the picture of the first page."""
+    folder = tmp_path_factory.mktemp("gallery")
+    for path in GALLERY.glob("*.py"):
+        shutil.copy(path, folder)
+    (folder / "images").mkdir()
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_example(copied, name):
+    environment = os.environ | {"FRACTALCONTACT_GALLERY": str(copied / "study")}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", NO_NETWORK, name],
+        cwd=copied, env=environment, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "<xarray." in done.stdout
+
+
+def test_the_gallery_is_there():
+    assert len(SCRIPTS) >= 10
+    assert (GALLERY / "images" / "overview.png").stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_examples_use_only_public_names(name):
+    lines = (GALLERY / name).read_text().splitlines()
+    imports = [line for line in lines if line.startswith(("import ", "from ")) and "fractalcontact" in line]
+    assert imports == ["import fractalcontact as fc"]
+    assert not any("fc._" in line or "._" in line for line in lines)
