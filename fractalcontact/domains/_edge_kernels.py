@@ -12,6 +12,17 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @kernel
+def _compare(here: Array, there: Array, seen: Array, seen_there: Array) -> tuple[np.int32, np.int32]:
+    """Count the pairs of two stretches of cells that were observed, and those that differ."""
+    observed, differing = np.int32(0), np.int32(0)
+    for j in range(here.size):
+        both = seen[j] & seen_there[j]
+        observed += np.int32(both)
+        differing += np.int32(both & (here[j] ^ there[j]))
+    return observed, differing
+
+
+@kernel
 def switches(
     mask: Array, valid: Array, offsets: Array, wrap_y: bool, wrap_x: bool, pairs: Array, differing: Array
 ) -> None:
@@ -30,17 +41,20 @@ def switches(
             row = i * blocks // ny
             for column in range(blocks):
                 start, stop = -(-column * nx // blocks), -(-(column + 1) * nx // blocks)
-                low, high = max(start, -right, 0), min(stop, nx - right)
-                count, changed = np.int64(0), np.int64(0)
-                for j in range(low, high):
-                    both = seen[j] & seen_there[j + right]
-                    count += both
-                    changed += both & (here[j] ^ there[j + right])
-                if wrap_x:
-                    for j in range(start, stop):
-                        if j + right < 0 or j + right >= nx:
-                            both = seen[j] & seen_there[(j + right) % nx]
-                            count += both
-                            changed += both & (here[j] ^ there[(j + right) % nx])
+                low, high = max(start, -right, 0), max(min(stop, nx - right), max(start, -right, 0))
+                count, changed = _compare(
+                    here[low:high],
+                    there[low + right : high + right],
+                    seen[low:high],
+                    seen_there[low + right : high + right],
+                )
                 pairs[row, column, lag] += count
                 differing[row, column, lag] += changed
+                if not wrap_x:
+                    continue
+                for j in range(start, stop):
+                    if j + right < 0 or j + right >= nx:
+                        beyond = (j + right) % nx
+                        both = seen[j] & seen_there[beyond]
+                        pairs[row, column, lag] += both
+                        differing[row, column, lag] += both & (here[j] ^ there[beyond])

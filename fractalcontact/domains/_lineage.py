@@ -17,9 +17,9 @@ def events(before: Labels, after: Labels) -> tuple[int, int, int, int]:
     """Return births, deaths, merges and splits, from the cells that both planes share."""
     old, new = before.map, after.map
     both = (old > 0) & (new > 0)
-    pairs = np.unique(np.stack([old[both], new[both]], axis=-1), axis=0)
-    ancestors = np.bincount(pairs[:, 1], minlength=after.count + 1)[1:]
-    heirs = np.bincount(pairs[:, 0], minlength=before.count + 1)[1:]
+    meetings = np.unique(old[both].astype(np.int64) * (after.count + 1) + new[both])
+    ancestors = np.bincount(meetings % (after.count + 1), minlength=after.count + 1)[1:]
+    heirs = np.bincount(meetings // (after.count + 1), minlength=before.count + 1)[1:]
     counts = (ancestors == 0, heirs == 0, ancestors > 1, heirs > 1)
     births, deaths, merges, splits = (int(np.count_nonzero(each)) for each in counts)
     return births, deaths, merges, splits
