@@ -10,6 +10,9 @@ decorrelation_length  the shear at which the faces have forgotten each other
 transmissivity        how much fluid the open part of the joint lets through
 register              brings two measured faces into mated position first
 
+Beside them stand the named laws of the field, to compare with: `barton_choubey_strength`,
+`barton_bandis_scaled`, `bandis_constants`, `bandis_closure`, `PARK_PAULAY`, and `size_effect`.
+
 Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is +x and N is +y.
 """
 
@@ -25,5 +28,14 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "strength": ["friction"],
         "leakage": ["transmissivity"],
         "matching": ["register"],
+        "forgetting": ["decorrelation_length"],
+        "empirical": [
+            "PARK_PAULAY",
+            "bandis_closure",
+            "bandis_constants",
+            "barton_bandis_scaled",
+            "barton_choubey_strength",
+            "size_effect",
+        ],
     },
 )

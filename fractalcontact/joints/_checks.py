@@ -9,7 +9,7 @@ import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.joints._directions import Direction
-from fractalcontact.joints._sliding import WHOLE, Block
+from fractalcontact.joints._sliding import WHOLE, Block, heights_under
 from fractalcontact.joints.crack import FILL, Crack
 
 if TYPE_CHECKING:
@@ -45,8 +45,10 @@ def check_shear(shear: Any, crack: Any, directions: Sequence[Direction], problem
     return shears
 
 
-def missing(where: str, direction: Direction, shear: float, count: int) -> InvalidInput:
+def missing(where: str, crack: Crack, direction: Direction, shear: float) -> InvalidInput:
     """Return the error for heights that are missing in the path of the block."""
+    under = heights_under(crack.faces()[0], crack.layout, crack.layout.shift(shear, direction.unit))
+    count = int(np.count_nonzero(~np.isfinite(under)))
     return InvalidInput(
         where,
         [

@@ -20,6 +20,7 @@ SMOOTHING = (4.0, 2.0, 1.0)  # cells; the last one decides, and hides what lies 
 OVERLAP = 0.3  # least part of the faces that must lie over each other
 STEPS = 40
 SMALL = 1e-4  # a step this small, in cells at the edge, ends the iteration
+WHOLE = 10  # whole steps; shorter ones after them end a cycle of the weights
 SETTLED = 0.01  # so does one that is this small beside the standard errors
 TILES = 6  # along each axis, left out one by one for the standard errors
 RANK = 1e-9  # relative; below it a shift or turn does not change the match
@@ -142,13 +143,15 @@ def _refined(
     gradients = np.gradient(lower), np.gradient(upper)
     edge = max(lower.shape) / 2
     used = [0, 1] + ([2] if rotates else []) + [3] + ([4, 5] if tilts else [])
-    for iteration in range(pose.iterations + 1, pose.iterations + STEPS + 1):
+    before = pose.iterations
+    for iteration in range(before + 1, before + STEPS + 1):
         system = _equations(pose, lower, upper, gradients, offset, edge)
         matrix = system.matrices.sum(axis=0)[np.ix_(used, used)]
         if not _determined(matrix):
             return replace(pose, determined=False)
         step = np.zeros(6)
         step[used] = np.linalg.solve(matrix, system.vectors.sum(axis=0)[used])
+        step[:3] *= 1.0 if iteration - before <= WHOLE else 0.25
         errors = _jackknife(system, used)
         settled = np.abs(step[:3]).max() <= max(SMALL, SETTLED * float(np.nanmin(errors)))
         pose = Pose(

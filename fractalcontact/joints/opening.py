@@ -137,9 +137,7 @@ def _rigid(crack: Crack, shears: Array, towards: Sequence[Direction]) -> xr.Data
     layout = crack.layout
     lower, upper = crack.faces()
     initial = separations(lower, upper, layout, np.zeros(1), (0.0, 1.0))[0]
-    lifted = (
-        np.stack([_lifted(lower, upper, layout, shears, towards_one) for towards_one in towards]) - initial
-    )
+    lifted = np.stack([_lifted(crack, shears, one) for one in towards]) - initial
     slope_y, slope_x = mean_slopes(lower, layout)
     slopes = np.array([slope_y * d.unit[0] + slope_x * d.unit[1] for d in towards])
     plane = ("direction", "shear")
@@ -156,12 +154,8 @@ def _rigid(crack: Crack, shears: Array, towards: Sequence[Direction]) -> xr.Data
     )
 
 
-def _lifted(lower: Array, upper: Array, layout: Any, shears: Array, towards: Direction) -> Array:
-    highest = separations(lower, upper, layout, shears, towards.unit)
+def _lifted(crack: Crack, shears: Array, towards: Direction) -> Array:
+    highest = separations(*crack.faces(), crack.layout, shears, towards.unit)
     if not np.isfinite(highest).all():
-        from fractalcontact.joints._sliding import heights_under
-
-        shear = float(shears[~np.isfinite(highest)][0])
-        under = heights_under(lower, layout, layout.shift(shear, towards.unit))
-        raise missing(WHERE, towards, shear, int(np.count_nonzero(~np.isfinite(under))))
+        raise missing(WHERE, crack, towards, float(shears[~np.isfinite(highest)][0]))
     return highest

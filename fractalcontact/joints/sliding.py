@@ -94,7 +94,6 @@ def delta_plane(crack: Crack, shear: float, towards: Direction, where: str) -> A
     lower, upper = crack.faces()
     under = heights_under(lower, crack.layout, crack.layout.shift(shear, towards.unit))
     plane = np.asarray(under - upper)
-    gaps = plane.size - int(np.count_nonzero(np.isfinite(plane)))
-    if gaps:
-        raise missing(where, towards, shear, gaps)
+    if not np.isfinite(plane).all():
+        raise missing(where, crack, towards, shear)
     return plane

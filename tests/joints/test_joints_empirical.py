@@ -1,0 +1,71 @@
+"""Named laws at worked values."""
+
+import numpy as np
+import pytest
+
+from fractalcontact import joints
+
+
+def test_barton_choubey():
+    given = {"roughness": 10, "wall_strength": 30e6, "residual_angle": 26}
+    strength = joints.barton_choubey_strength(0.744e6, **given)
+    assert strength == pytest.approx(0.67121e6, rel=1e-5)
+    assert np.degrees(np.arctan(strength / 0.744e6)) == pytest.approx(42.0555, abs=1e-4)
+    several = joints.barton_choubey_strength(np.array([[0.744e6, 30e6]]), **given)
+    np.testing.assert_allclose(several, [[strength, 30e6 * np.tan(np.radians(26))]])
+
+
+def test_scaled_constants_keep_the_sample_and_fall_with_length():
+    sample = joints.barton_bandis_scaled(10, 50e6, 0.1)
+    assert sample.roughness == pytest.approx(10)
+    assert sample.wall_strength == pytest.approx(50e6)
+    assert sample.peak_shear == pytest.approx(0.1 / 500 * 100 ** (1 / 3))
+    longer = joints.barton_bandis_scaled(10, 50e6, 1.0)
+    assert longer.roughness == pytest.approx(10 * 10**-0.2)
+    assert longer.wall_strength == pytest.approx(50e6 * 10**-0.3)
+
+
+def test_bandis_closure():
+    constants = joints.bandis_constants(10, 100e6, 0.2e-3)
+    assert constants.initial_stiffness == pytest.approx(20.35e9)
+    assert constants.greatest_closure == pytest.approx(0.136871e-3, rel=1e-5)
+    closures = joints.bandis_closure(
+        np.array([0.0, 1e6, 10e6, 30e6]),
+        initial_stiffness=constants.initial_stiffness,
+        greatest_closure=constants.greatest_closure,
+    )
+    np.testing.assert_allclose(closures, np.array([0, 0.036158, 0.107053, 0.125243]) * 1e-3, rtol=1e-5)
+
+
+def test_size_effect_of_doubling():
+    factors = joints.size_effect(2.0, contact_dimension=1.66, roughness_dimension=1.94)
+    np.testing.assert_allclose(factors, [0.790, 0.824, 1.580], atol=5e-4)
+    # Euclidean contact knows no size
+    plain = joints.size_effect(7.0, contact_dimension=2.0)
+    assert plain.strength == plain.friction == 1.0
+
+
+def test_size_effect_is_constant_force_per_fractal_measure():
+    # F = sigma* L^D, so the nominal pressure F / L^2 changes by scale^(D - 2)
+    dimension, star = 1.4, 3.0
+    small, large = (star * length**dimension / length**2 for length in (0.1, 0.7))
+    assert large / small == pytest.approx(joints.size_effect(7.0, contact_dimension=dimension).strength)
+
+
+def test_friction_angles_of_concrete():
+    angles = {name: np.degrees(np.arctan(value)) for name, value in joints.PARK_PAULAY.items()}
+    assert angles["monolithic"] == pytest.approx(54.46, abs=0.01)
+    assert angles["against hardened concrete"] == pytest.approx(45.0)
+
+
+def test_messages():
+    with pytest.raises(ValueError, match=r"(?s)nominal_pressure.*roughness.*residual_angle"):
+        joints.barton_choubey_strength(0.0, roughness=30, wall_strength=1e6, residual_angle=100)
+    with pytest.raises(ValueError, match="range of the fit"):
+        joints.bandis_constants(0.0, 1e6, 1e-3)
+    with pytest.raises(ValueError, match="contact_dimension"):
+        joints.size_effect(2.0, contact_dimension=2.5)
+    with pytest.raises(ValueError, match="length"):
+        joints.barton_bandis_scaled(10, 1e6, -1.0)
+    with pytest.raises(ValueError, match="initial_stiffness"):
+        joints.bandis_closure(1.0, initial_stiffness=0.0, greatest_closure=1.0)

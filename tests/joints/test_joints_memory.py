@@ -1,0 +1,155 @@
+"""Loss of correlation: exact sums, known lengths, intervals that cover."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+MATERIAL = {"young": 30e9, "poisson": 0.2}
+
+
+def correlated(n, length, seed, kind="exponential"):
+    """Return a periodic Gaussian face and the shear at which its correlation has fallen to 1/e."""
+    q = np.hypot(2 * np.pi * np.fft.fftfreq(n)[:, None], 2 * np.pi * np.fft.rfftfreq(n)[None, :])
+    density = {
+        "exponential": (1 + (q * length) ** 2) ** -1.5,
+        "gaussian": np.exp(-((q * length) ** 2) / 4),
+        "rolled off": (1 + (q * length) ** 2) ** -1.8,
+    }[kind]
+    correlation = np.fft.irfft2(density, (n, n))[0, : n // 2]
+    correlation = correlation / correlation[0] - np.exp(-1)
+    k = int(np.argmax(correlation < 0))
+    known = k - 1 + correlation[k - 1] / (correlation[k - 1] - correlation[k])
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((n, n)))
+    return np.fft.irfft2(noise * np.sqrt(density), (n, n)), known
+
+
+def test_periodic_correlation_is_the_autocovariance(make_face, rough):
+    heights = rough((32, 48), 0) + 7.0
+    crack = fc.joints.Crack(make_face(heights, periodic=True), **MATERIAL)
+    result = fc.joints.decorrelation_length(crack, shear=np.arange(10.0))
+    z = heights - heights.mean()
+    power = np.fft.ifft2(np.abs(np.fft.fft2(z)) ** 2).real / z.size
+    np.testing.assert_allclose(result.correlation.sel(direction="E"), power[0, :10] / power[0, 0], atol=1e-13)
+    np.testing.assert_allclose(result.correlation.sel(direction="S"), power[:10, 0] / power[0, 0], atol=1e-13)
+    variance = 2 * (power[0, 0] - power[0, :10])
+    np.testing.assert_allclose(result.structure_function.sel(direction="W"), variance, atol=1e-12)
+
+
+def test_block_sums_on_a_free_face(make_face, rough):
+    lower, upper = rough((40, 36), 1), rough((40, 36), 2)
+    y, x = np.indices(lower.shape)
+    design = np.stack([np.ones(lower.size), y.ravel(), x.ravel()], axis=1)
+    flat = [
+        (z.ravel() - design @ np.linalg.lstsq(design, z.ravel(), rcond=None)[0]).reshape(z.shape)
+        for z in (lower, upper)
+    ]
+    crack = fc.joints.Crack(make_face(lower + 0.3 * x), make_face(upper - y), block=20, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack, shear=[0.0, 3.0], direction="N")
+    (ay, ax), (by, bx) = crack.layout.start, crack.layout.cells
+    under, own = flat[0][ay + 3 : ay + 3 + by, ax : ax + bx], flat[1][ay : ay + by, ax : ax + bx]
+    expected = (under * own).sum() / np.sqrt((under**2).sum() * (own**2).sum())
+    assert result.correlation.sel(shear=3.0).item() == pytest.approx(expected, rel=1e-9)
+
+
+def test_mated_faces_start_at_one(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((64, 64), 3)), block=20, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack)
+    np.testing.assert_allclose(result.correlation.sel(shear=0), 1, rtol=1e-14)
+    np.testing.assert_array_equal(result.structure_function.sel(shear=0), 0)
+    assert result.shear[-1] == crack.travel("E")
+    assert result.shear.size == 23
+
+
+def test_a_wave_forgets_at_a_known_shear(make_face):
+    # correlation cos(kv): 1/e at v = acos(1/e)/k
+    x = np.arange(240)
+    face = make_face(np.broadcast_to(np.cos(2 * np.pi * x / 80), (240, 240)), periodic=True)
+    crack = fc.joints.Crack(face, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack, direction=("E", "N"))
+    expected = np.arccos(np.exp(-1)) * 80 / (2 * np.pi)
+    assert result.decorrelation_length.sel(direction="E") == pytest.approx(expected, abs=5e-3)
+    # along its crests a wave forgets nothing
+    assert np.isnan(result.decorrelation_length.sel(direction="N"))
+    assert "remember" in result.missing_reason.sel(direction="N").item()
+
+
+def test_a_known_length_with_its_interval(make_face):
+    heights, known = correlated(512, 3.0, 1)
+    crack = fc.joints.Crack(make_face(heights[:300, :300] * 1e-6, 1e-4), block=0.0128, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack)
+    assert (result.decorrelation_length_low < result.decorrelation_length).all()
+    assert (result.decorrelation_length < result.decorrelation_length_high).all()
+    assert result.decorrelation_length.mean() == pytest.approx(known * 1e-4, rel=0.15)
+    assert (result.missing_reason == "").all()
+    assert result.decorrelation_length.attrs["units"] == "m"
+
+
+def test_no_interval_where_the_block_is_too_small(make_face):
+    heights, _ = correlated(512, 12.0, 1)
+    crack = fc.joints.Crack(make_face(heights[:300, :300]), block=128, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack, direction="E")
+    assert np.isfinite(result.decorrelation_length)
+    assert np.isnan(result.decorrelation_length_low)
+    assert "15 lengths" in result.missing_reason.item()
+    few = fc.joints.Crack(make_face(heights[:16, :16]), block=5, **MATERIAL)
+    assert fc.joints.decorrelation_length(few, direction="E").correlation.shape == (1, 7)
+
+
+def test_flat_faces_say_so(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((20, 20))), block=9, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack)
+    assert np.isnan(result.decorrelation_length).all()
+    assert (result.missing_reason == "the faces are planes").all()
+
+
+def test_long_travels_are_sampled_in_geometric_steps(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((400, 400), 1)), block=20, **MATERIAL)
+    shear = fc.joints.decorrelation_length(crack, direction="E").shear.values
+    assert shear.size <= 129
+    assert shear[0] == 0
+    assert shear[-1] == 190
+    assert (shear == np.rint(shear)).all()
+
+
+def test_units_do_not_matter(make_face, rough):
+    heights = rough((96, 96), 1)
+    one = fc.joints.Crack(make_face(heights), block=40, **MATERIAL)
+    two = fc.joints.Crack(make_face(heights * 2.0**-30, 2.0**-14), block=40 * 2.0**-14, **MATERIAL)
+    a, b = fc.joints.decorrelation_length(one), fc.joints.decorrelation_length(two)
+    np.testing.assert_array_equal(a.correlation, b.correlation.values)
+    np.testing.assert_array_equal(a.decorrelation_length * 2.0**-14, b.decorrelation_length)
+
+
+def test_messages(make_face, rough):
+    whole = fc.joints.Crack(make_face(rough((32, 32), 1)), **MATERIAL)
+    with pytest.raises(ValueError, match="smaller than its face"):
+        fc.joints.decorrelation_length(whole)
+    crack = fc.joints.Crack(make_face(rough((32, 32), 1)), block=10, **MATERIAL)
+    with pytest.raises(ValueError, match="ascending from 0"):
+        fc.joints.decorrelation_length(crack, shear=[1.0, 2.0])
+    with pytest.raises(ValueError, match="crack"):
+        fc.joints.decorrelation_length(3)
+    heights = rough((32, 32), 1)
+    heights[15, 22] = np.nan
+    holed = fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    with pytest.raises(ValueError, match="missing"):
+        fc.joints.decorrelation_length(holed, direction="E")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "length"), [("exponential", 3.0), ("exponential", 6.0), ("gaussian", 6.0), ("rolled off", 4.0)]
+)
+def test_the_interval_covers(make_face, kind, length):
+    inside, total = 0, 0
+    for seed in range(300):
+        heights, known = correlated(512, length, seed, kind)
+        crack = fc.joints.Crack(make_face(heights[:256, :256]), block=128, **MATERIAL)
+        found = fc.joints.decorrelation_length(crack, direction="E", shear=np.arange(40.0))
+        if np.isfinite(found.decorrelation_length_low):
+            total += 1
+            inside += bool(found.decorrelation_length_low <= known <= found.decorrelation_length_high)
+    assert total > 250
+    # two standard deviations of 300 draws are 2.5 %
+    assert 0.925 <= inside / total <= 0.985
