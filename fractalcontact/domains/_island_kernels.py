@@ -1,4 +1,4 @@
-"""Loops over the parts of islands: joining them across the seams of a periodic mask, and measuring them."""
+"""Loops over the parts of islands: joining them across seams, and measuring them."""
 
 from __future__ import annotations
 
@@ -63,40 +63,32 @@ def join(parts: int, links: Array) -> tuple[Array, Array, Array]:
 
 @kernel
 def measure(
-    parts: Array,
-    island: Array,
-    shift: Array,
-    wrap_y: bool,
-    wrap_x: bool,
-    sums: Array,
-    sides: Array,
-    box: Array,
+    parts: Array, cells: Array, start: int, wrap_y: bool, wrap_x: bool, sums: Array, sides: Array, box: Array
 ) -> None:
-    """Add up every island in the frame in which it is continuous.
+    """Add up the parts of a band of rows that begins at row `start` of the plane.
 
-    `sums` (islands, 3) gets cells, rows and columns; `sides` (islands, 2) the sides across y and across x
-    that face open cells; `box` (islands, 4) the first and last row and column, and holds wide limits before.
+    `sums` (parts, 3) gets cells, rows and columns; `sides` (parts, 2) the sides across y and across x that
+    face open cells; `box` (parts, 4) the first and last row and column, and holds wide limits before.
     """
-    ny, nx = parts.shape
-    for i in range(ny):
+    ny, nx = cells.shape
+    for k in range(parts.shape[0]):
+        i = start + k
         for j in range(nx):
-            part = parts[i, j]
+            part = parts[k, j]
             if part == 0:
                 continue
-            number = island[part]
-            row, column = i + shift[part, 0] * ny, j + shift[part, 1] * nx
-            sums[number, 0] += 1
-            sums[number, 1] += row
-            sums[number, 2] += column
-            box[number, 0] = min(box[number, 0], row)
-            box[number, 1] = max(box[number, 1], row)
-            box[number, 2] = min(box[number, 2], column)
-            box[number, 3] = max(box[number, 3], column)
-            if (i > 0 or wrap_y) and parts[i - 1, j] == 0:
-                sides[number, 0] += 1
-            if (i < ny - 1 or wrap_y) and parts[(i + 1) % ny, j] == 0:
-                sides[number, 0] += 1
-            if (j > 0 or wrap_x) and parts[i, j - 1] == 0:
-                sides[number, 1] += 1
-            if (j < nx - 1 or wrap_x) and parts[i, (j + 1) % nx] == 0:
-                sides[number, 1] += 1
+            sums[part, 0] += 1
+            sums[part, 1] += i
+            sums[part, 2] += j
+            box[part, 0] = min(box[part, 0], i)
+            box[part, 1] = max(box[part, 1], i)
+            box[part, 2] = min(box[part, 2], j)
+            box[part, 3] = max(box[part, 3], j)
+            if (i > 0 or wrap_y) and cells[i - 1, j] == 0:
+                sides[part, 0] += 1
+            if (i < ny - 1 or wrap_y) and cells[(i + 1) % ny, j] == 0:
+                sides[part, 0] += 1
+            if (j > 0 or wrap_x) and cells[i, j - 1] == 0:
+                sides[part, 1] += 1
+            if (j < nx - 1 or wrap_x) and cells[i, (j + 1) % nx] == 0:
+                sides[part, 1] += 1

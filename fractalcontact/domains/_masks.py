@@ -116,9 +116,7 @@ def read_mask(
     grid = _grid(mask, problems, argument)
     wraps = resolve_periodic(periodic, grid, problems, "periodic")
     grid = Grid(grid.shape, grid.spacing, (wraps[0], wraps[1]), grid.known)
-    values = np.ascontiguousarray(mask.values)
-    flags = values if values.dtype.kind == "b" else values > 0
-    cells = flags.view(np.uint8).reshape(-1, *grid.shape)
+    cells = _flags(mask).view(np.uint8).reshape(-1, *grid.shape)
     observed = _observed(valid, mask, problems)
     if observed is not None:
         cells = cells * observed
@@ -131,6 +129,22 @@ def read_mask(
         _leading_coords(mask),
         {dim: mask.coords[dim] for dim in CORE_DIMS} if grid.known else {},
     )
+
+
+def _flags(mask: xr.DataArray) -> Array:
+    """Return where the mask is set, as a C-ordered array; a chunked mask is read chunk by chunk."""
+    if mask.chunks is None:
+        values = np.ascontiguousarray(mask.values)
+        return values if values.dtype.kind == "b" else np.asarray(values > 0)
+    flags = np.empty(mask.shape, bool)
+    stops = [np.cumsum(lengths) for lengths in mask.chunks]
+    for block in np.ndindex(*(len(each) for each in stops)):
+        where = tuple(
+            slice(int(stop[k]) - lengths[k], int(stop[k]))
+            for stop, lengths, k in zip(stops, mask.chunks, block, strict=True)
+        )
+        np.greater(mask[where].values, 0, out=flags[where])
+    return flags
 
 
 def _grid(mask: xr.DataArray, problems: Problems, argument: str) -> Grid:
@@ -154,7 +168,7 @@ def _observed(valid: Any, mask: xr.DataArray, problems: Problems) -> Array | Non
     if valid.shape != mask.shape[-valid.ndim :]:
         problems.add("valid", f"the shape of the mask, {mask.shape[-valid.ndim :]}", f"shape {valid.shape}")
         return None
-    return np.ascontiguousarray(valid.values.reshape(-1, ny, nx)).astype(np.uint8)
+    return _flags(valid).view(np.uint8).reshape(-1, ny, nx)
 
 
 def _leading_coords(mask: xr.DataArray) -> dict[str, xr.DataArray]:

@@ -61,7 +61,7 @@ def percolation(
     with Problems("fractalcontact.domains.percolation") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
-    found = across(find(planes, connectivity), planes)
+    found = across(find(planes, connectivity, keep=False), planes)
     variables = {
         "coverage": planes.variable(planes.coverage),
         "largest_share": planes.variable(found["largest_share"]),
@@ -82,25 +82,14 @@ def percolation(
 
 def across(found: Sequence[_labels.Labels], planes: Planes) -> dict[str, Array]:
     """Return the share of the largest island, and whether one crosses along x and along y."""
-    largest = np.array([_labels.sizes(labels).max(initial=0) for labels in found])
+    largest = np.array([labels.sizes.max(initial=0) for labels in found])
     wraps = planes.grid.periodic
     return {
         "largest_share": np.where(planes.occupied > 0, largest / np.maximum(planes.occupied, 1), np.nan),
-        "percolates": np.array(
-            [[_crosses(labels, axis, wraps[axis]) for axis in (1, 0)] for labels in found]
-        ),
+        "percolates": np.array([[labels.crosses(axis, wraps[axis]) for axis in (1, 0)] for labels in found]),
     }
 
 
 def meaning(connectivity: int) -> str:
     """Say what percolates, and by which neighbours."""
     return f"an island of the set crosses the plane along the axis ({4 * connectivity} neighbours)"
-
-
-def _crosses(labels: _labels.Labels, axis: int, wraps: bool) -> bool:
-    if wraps:
-        return bool(labels.closes[1:, axis].any())
-    number = labels.map
-    first: Array = np.take(number, 0, axis)
-    last: Array = np.take(number, -1, axis)
-    return bool(np.intersect1d(first[first > 0], last[last > 0]).size)

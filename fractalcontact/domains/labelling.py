@@ -27,6 +27,7 @@ def islands(
     connectivity: int = 1,
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
+    keep: Sequence[str] = ("label",),
 ) -> xr.Dataset:
     """Islands of a set of cells: their number, their map, and a table of their sizes.
 
@@ -40,6 +41,9 @@ def islands(
         Whether islands go on across the edges; by default what the axes say. True is refused on a free axis.
     valid : DataArray of bool, optional
         Cells that were observed; the others are in no island.
+    keep : sequence of str
+        Maps to keep: ("label",) or (). Without the map a plane is gone through band by band, in little
+        memory beyond the mask itself.
 
     Returns
     -------
@@ -66,19 +70,28 @@ def islands(
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.islands") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
+        maps = problems.choices("keep", keep, ("label",)) if len(keep) else ()
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
-    found = find(planes, connectivity)
+    found = find(planes, connectivity, keep="label" in maps)
     tables = [measure(labels, planes) for labels in found]
     columns = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
     variables = {
         **{name: planes.variable(values) for name, values in summary(found, planes, connectivity).items()},
-        "label": planes.variable(np.array([labels.map for labels in found]), "y", "x"),
+        **{name: planes.variable(np.array([labels.map for labels in found]), "y", "x") for name in maps},
         **{name: ("island", values) for name, values in columns.items()},
         "run_time": ((), time.perf_counter() - begin),
     }
-    dataset = assemble(planes, variables, _island_coords(planes, tables), on_plane=True, notes=_notes(planes))
+    dataset = assemble(
+        planes, variables, _island_coords(planes, tables), on_plane="label" in maps, notes=_notes(planes)
+    )
     _place_unknown(dataset, planes, tables)
-    parameters = {"mask": mask, "connectivity": connectivity, "periodic": periodic, "valid": valid}
+    parameters = {
+        "mask": mask,
+        "connectivity": connectivity,
+        "periodic": periodic,
+        "valid": valid,
+        "keep": maps,
+    }
     return stamp(
         dataset, "fractalcontact.domains.islands", parameters, title="Islands of a set", references=SOURCE
     )
@@ -86,7 +99,7 @@ def islands(
 
 def summary(found: Sequence[_labels.Labels], planes: Planes, connectivity: int) -> dict[str, Array]:
     """Return the scalars of every plane."""
-    sizes = [_labels.sizes(labels) for labels in found]
+    sizes = [labels.sizes for labels in found]
     euler = [_labels.euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
     area = planes.grid.cell_area if planes.grid.known else np.nan
     largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
@@ -100,10 +113,10 @@ def summary(found: Sequence[_labels.Labels], planes: Planes, connectivity: int) 
     }
 
 
-def find(planes: Planes, connectivity: int) -> list[_labels.Labels]:
-    """Label every plane."""
+def find(planes: Planes, connectivity: int, *, keep: bool = True) -> list[_labels.Labels]:
+    """Find the islands of every plane, with or without their map."""
     wraps = planes.grid.periodic
-    return together(lambda cells: _labels.label_plane(cells, connectivity, wraps), planes.cells)
+    return together(lambda cells: _labels.label_plane(cells, connectivity, wraps, keep=keep), planes.cells)
 
 
 def measure(labels: _labels.Labels, planes: Planes) -> dict[str, Array]:

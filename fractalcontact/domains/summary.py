@@ -68,7 +68,7 @@ def describe(
     boxes = box_dimension(mask, **told)
     edge = boundary_dimension(mask, **told)
     gaps = lacunarity(mask, [min(BOX, *planes.grid.shape)], **told).isel(box_size=0)
-    found = labelling.find(planes, connectivity)
+    found = labelling.find(planes, connectivity, keep=False)
     crossed = crossing.across(found, planes)
     dy, dx = planes.grid.spacing if planes.grid.known else (np.nan, np.nan)
     sides = contact_edges(planes.cells, planes.grid.periodic) @ np.array([dx, dy])

@@ -80,6 +80,38 @@ def columns(result, shift):
     return result.area.values, centre_x, centre_y, width.values, height.values
 
 
+@pytest.mark.parametrize("connectivity", [1, 2])
+@pytest.mark.parametrize("wraps", [(False, False), (True, True), (False, True)])
+def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, monkeypatch):
+    from fractalcontact.domains import _labels
+
+    rng = np.random.default_rng(6)
+    for density in (0.2, 0.5, 0.7):
+        mask = as_mask(rng.random((2, 23, 17)) < density, (1.0, 2.0), wraps)
+        whole = fc.domains.islands(mask, connectivity=connectivity)
+        crossed = fc.domains.percolation(mask, connectivity=connectivity)
+        with monkeypatch.context() as patch:
+            patch.setattr(_labels, "BAND", 3 * 17)
+            bands = fc.domains.islands(mask, connectivity=connectivity, keep=())
+            assert crossed.percolates.identical(
+                fc.domains.percolation(mask, connectivity=connectivity).percolates
+            )
+        assert "label" not in bands
+        for name in bands.data_vars:
+            if name != "run_time":
+                assert np.array_equal(bands[name], whole[name], equal_nan=True), name
+
+
+def test_chunked_masks_give_what_whole_ones_give():
+    pytest.importorskip("dask")
+    mask = as_mask(np.random.default_rng(7).random((2, 30, 20)) < 0.4)
+    valid = as_mask(np.random.default_rng(8).random((30, 20)) < 0.9)
+    for function in (fc.domains.islands, fc.domains.box_dimension, fc.domains.lacunarity):
+        one = function(mask, valid=valid).drop_vars("run_time")
+        other = function(mask.chunk(step=1, y=7, x=9), valid=valid.chunk(y=11)).drop_vars("run_time")
+        assert one.identical(other.assign_attrs(one.attrs))
+
+
 def test_island_over_the_edges_keeps_its_centroid_and_box():
     cells = np.zeros((8, 10), bool)
     cells[np.ix_([7, 0], [9, 0, 1])] = True
