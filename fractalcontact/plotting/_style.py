@@ -182,6 +182,13 @@ def letter(number: int) -> str:
     return chr(ord("A") + number) if number < 26 else str(number + 1)
 
 
+def halo() -> list[Any]:
+    """Return the effect that keeps words readable where they cross a line."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2.0, foreground="white")]
+
+
 def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
     """Set logarithmic axes, those for which there is anything positive to show."""
     for values, setter in ((x, ax.set_xscale), (y, ax.set_yscale)):

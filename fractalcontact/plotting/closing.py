@@ -158,17 +158,14 @@ def shear_key(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
 
 def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0, *, below: bool = False) -> None:
     """Mark points of a curve with letters, beginning with letter number `first`, above or below it."""
-    from matplotlib.patheffects import withStroke
-
     place: dict[str, Any] = {"xytext": (-5, 4), "ha": "right"}
     if below:
         place = {"xytext": (3, -4), "ha": "left", "va": "top"}
-    halo = [withStroke(linewidth=2.0, foreground="white")]
     ax.plot(x, y, "o", color=colour, mec="white", mew=0.8, ms=5.5, zorder=4)
     for number, (a, b) in enumerate(zip(x, y, strict=True), first):
         if np.isfinite(a) and np.isfinite(b):
             ax.annotate(_style.letter(number), (a, b), textcoords="offset points", fontsize=8, weight="bold",
-                        path_effects=halo, zorder=5, **place)  # fmt: skip
+                        path_effects=_style.halo(), zorder=5, **place)  # fmt: skip
 
 
 def from_zero(ax: Axes, x: Any, y: Any) -> None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 WINDS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
+NEEDED = 0.16  # of the width of the cut, for a few words
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -176,14 +177,15 @@ def _measure(
                     textcoords="offset points", color=_style.RED, ha="center", va="bottom")  # fmt: skip
     if slide.lift > 0:
         low, high = float(up(foot)), float(up(foot + slide.lift))
-        wide = slide.shear > 0.12 * np.ptp(along.factor * np.array(ax.get_xlim()))
+        low_x, high_x = ax.get_xlim()
+        # the words stand over the shear if it is wide enough, else before the block if there is room
+        right = end - start > NEEDED * (high_x - low_x) or start - low_x < NEEDED * (high_x - low_x)
         ax.plot([start, end], [high, high], color=_style.BLUE, lw=0.7, ls=":")
         ax.annotate("", (start, low), (start, high), arrowprops=look | {"color": _style.BLUE})
-        side: dict[str, Any] = (
-            {"xytext": (6, 0), "ha": "left"} if wide else {"xytext": (-6, 0), "ha": "right"}
-        )
-        ax.annotate(f"{lift_name} = {amount(slide.lift, 'm')}", (start, (low + high) / 2), **side,
-                    textcoords="offset points", color=_style.BLUE, va="center")  # fmt: skip
+        away, side = (6, "left") if right else (-6, "right")
+        ax.annotate(f"{lift_name} = {amount(slide.lift, 'm')}", (start, (low + high) / 2), (away, 0),
+                    textcoords="offset points", color=_style.BLUE, ha=side, va="center",
+                    path_effects=_style.halo())  # fmt: skip
 
 
 def line_through(plane: xr.DataArray, centre: Array, unit: Array) -> tuple[Array, Array]:
