@@ -88,6 +88,8 @@ def decorrelation(sums: Sums, shears: Array, edge: float) -> Length:
         return Length(math.nan, reason="the faces are planes")
     if math.isnan(value):
         return Length(value, reason="the faces still remember each other at the greatest shear")
+    if value < shears[1]:
+        return Length(value, reason="no interval: the length is below the first shear")
     if tiles < FINE * FINE:
         return Length(value, reason="no interval: the block has too few cells")
     if edge < LEAST_LENGTHS * value:

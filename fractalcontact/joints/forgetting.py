@@ -126,13 +126,20 @@ def _whole_cells(crack: Crack, towards: Sequence[Direction]) -> Array:
     return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, MOST)))]) * step
 
 
+def _without_rounding(residual: Array, heights: Array) -> Array:
+    """Return the heights from the mean plane; zero where they are no more than the rounding of a plane."""
+    rounding = 64.0 * np.finfo(float).eps * float(np.nanmax(np.abs(heights)))
+    return residual if float(np.nanmax(np.abs(residual))) > rounding else residual * 0.0
+
+
 def _sums(crack: Crack, shears: Array, towards: Direction) -> Any:
     from fractalcontact.surfaces._polynomial import detrended
 
     layout = crack.layout
     order = 0 if any(layout.wraps) else 1
     faces = [crack.lower] if crack.upper is None else [crack.lower, crack.upper]
-    planes = [detrended(np.asarray(face.values, dtype=np.float64), order)[0] for face in faces]
+    heights = [np.asarray(face.values, dtype=np.float64) for face in faces]
+    planes = [_without_rounding(detrended(face, order)[0], face) for face in heights]
     sums, variance = tile_sums(planes[0], planes[-1][layout.slices], layout, shears, towards.unit)
     if not np.isfinite(variance).all():
         raise missing(WHERE, crack, towards, float(shears[~np.isfinite(variance)][0]))

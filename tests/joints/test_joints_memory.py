@@ -96,11 +96,22 @@ def test_no_interval_where_the_block_is_too_small(make_face):
     assert fc.joints.decorrelation_length(few, direction="E").correlation.shape == (1, 7)
 
 
-def test_flat_faces_say_so(make_face):
-    crack = fc.joints.Crack(make_face(np.zeros((20, 20))), block=9, **MATERIAL)
+@pytest.mark.parametrize("height", [0.0, 3.3, 1e9])
+@pytest.mark.parametrize("slope", [0.0, 0.1])
+def test_planes_say_so(make_face, height, slope):
+    heights = height + slope * np.indices((20, 20))[1]
+    crack = fc.joints.Crack(make_face(heights, 0.3), block=9 * 0.3, **MATERIAL)
     result = fc.joints.decorrelation_length(crack)
     assert np.isnan(result.decorrelation_length).all()
     assert (result.missing_reason == "the faces are planes").all()
+
+
+def test_a_length_below_one_cell_has_no_interval(make_face):
+    noise = np.random.default_rng(0).standard_normal((80, 80))
+    result = fc.joints.decorrelation_length(fc.joints.Crack(make_face(noise), block=40, **MATERIAL))
+    assert (result.decorrelation_length < 1).all()
+    assert np.isnan(result.decorrelation_length_low).all()
+    assert "below the first shear" in result.missing_reason[0].item()
 
 
 def test_long_travels_are_sampled_in_geometric_steps(make_face, rough):
