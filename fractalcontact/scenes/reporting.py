@@ -156,20 +156,21 @@ def _dilatancy(tree: xr.DataTree) -> str:
 
 def _friction(tree: xr.DataTree) -> str:
     found = _group(tree, "joints/friction")
-    if found is None or "shear_strength" not in found:
+    if found is None or "peak_shear_strength" not in found:
         return ""
-    strength = found["shear_strength"].max("shear")
-    rows = [("peak shear strength", "nominal pressure", "strength")]
-    for direction in np.atleast_1d(found["direction"].values):
-        one = strength.sel(direction=direction) if "direction" in strength.dims else strength
-        for step in range(one.sizes.get("step", 1)):
-            at = one.isel(step=step) if "step" in one.dims else one
-            force = (
-                found["nominal_pressure"].isel(step=step).values.ravel()[0]
-                if "nominal_pressure" in found
-                else np.nan
+    rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", "at shear")]
+    for direction in found["direction"].values:
+        for step in range(found.sizes["step"]):
+            one = found.sel(direction=direction).isel(step=step)
+            rows.append(
+                (
+                    str(direction),
+                    f"{float(one['nominal_pressure']) / 1e6:.3g} MPa",
+                    f"{float(one['peak_shear_strength']) / 1e6:.4g} MPa",
+                    f"{float(one['peak_friction_angle']):.1f} degree",
+                    f"{float(one['peak_shear']) * 1e3:.3g} mm",
+                )
             )
-            rows.append((str(direction), f"{force / 1e6:.3g} MPa", f"{float(at) / 1e6:.4g} MPa"))
     return table(rows)
 
 
