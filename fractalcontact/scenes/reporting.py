@@ -162,11 +162,12 @@ def _friction(tree: xr.DataTree) -> str:
     for direction in found["direction"].values:
         for step in range(found.sizes["step"]):
             one = found.sel(direction=direction).isel(step=step)
+            strength = float(one["peak_shear_strength"])
             rows.append(
                 (
                     str(direction),
                     f"{float(one['nominal_pressure']) / 1e6:.3g} MPa",
-                    f"{float(one['peak_shear_strength']) / 1e6:.4g} MPa",
+                    f"{strength / 1e6:.4g} MPa" if np.isfinite(strength) else "none: the faces lock",
                     f"{float(one['peak_friction_angle']):.1f} degree",
                     f"{float(one['peak_shear']) * 1e3:.3g} mm",
                 )
