@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import use_threads
-
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -94,6 +92,7 @@ def area_ratios(heights: Array, edges: Array, steps: tuple[float, float]) -> Arr
     The triangular prisms of Clarke (1986), on every cell of every position of the grid; for a profile (one
     row) the length of the chords over that of their plan.
     """
+    from fractalcontact.base.jit import use_threads
     from fractalcontact.dimensions._kernels import prism_sums
 
     use_threads()
@@ -116,6 +115,7 @@ def roughness(heights: Array, edges: Array) -> tuple[Array, Array]:
 
     Windows overlap by half; their edge in points is that of `edges`, at least one point along y.
     """
+    from fractalcontact.base.jit import use_threads
     from fractalcontact.dimensions._kernels import roughness_sums
 
     use_threads()

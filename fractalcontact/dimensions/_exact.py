@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import use_threads
-
 Array = np.ndarray[Any, np.dtype[Any]]
 
 CHUNK = 256
@@ -63,6 +61,7 @@ class Increments:
 
         The covariance is that of unit increments over one spacing, plus `noise` on the heights.
         """
+        from fractalcontact.base.jit import use_threads
         from fractalcontact.dimensions._kernels import whiten
 
         columns = np.stack([self.jumps, self.gaps], axis=-1)

@@ -29,14 +29,11 @@ class Face:
     source : DataArray
         Dims (y, x), or (x,).
     grid : Grid
-    level, unit : float
-        `heights` are (source - level) / unit, once they have been asked for.
     """
 
     source: xr.DataArray
     grid: Grid
-    level: float = 0.0
-    unit: float = 1.0
+    _unit: float = 1.0
     _heights: Array | None = None
     _flat: bool | None = None
 
@@ -48,11 +45,16 @@ class Face:
             low, high = float(raw.min()), float(raw.max())
             if np.isnan(low):
                 low, high = float(np.nanmin(raw)), float(np.nanmax(raw))
-            self.level = low
-            self.unit = float(np.ldexp(1.0, np.frexp(high - low)[1])) if high > low else 1.0
+            self._unit = float(np.ldexp(1.0, np.frexp(high - low)[1])) if high > low else 1.0
             self._heights = raw - low
-            self._heights *= 1.0 / self.unit
+            self._heights *= 1.0 / self._unit
         return self._heights
+
+    @property
+    def unit(self) -> float:
+        """The unit of `heights` in m, a power of two."""
+        _ = self.heights
+        return self._unit
 
     @property
     def raw(self) -> Array:

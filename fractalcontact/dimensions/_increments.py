@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import use_threads
 from fractalcontact.dimensions._pairs import (
     LAGS,
     Overlap,
@@ -70,6 +69,7 @@ def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: in
     step : int
         Shortest lag in spacings.
     """
+    from fractalcontact.base.jit import use_threads
     from fractalcontact.dimensions._kernels import increment_sums
 
     use_threads()
@@ -80,7 +80,9 @@ def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: in
         number = _complete_counts(heights.shape, rows, step)
         mask = None
         if np.isnan(sums).any():
-            sums, number = _gapped_sums(heights, rows, step)
+            # a row without gaps keeps its sum, so that it does not matter which slab it was read with
+            sparse, number = _gapped_sums(heights, rows, step)
+            sums = np.where(np.isnan(sums), sparse, sums)
             mask = np.isfinite(heights[:rows])
         rows_of_sums.append(sums)
         counts += number
@@ -130,6 +132,8 @@ def _estimate(
         [3 * (order - 1) + i + 6 * (axes == 2 and axis == 0) for axis in range(axes) for i in range(3)]
     )
     means = moments.means[columns]
+    # logarithms of numbers near one: the unit of height changes no bit
+    means = means / np.ldexp(1.0, np.frexp(np.nanmax(means, initial=0.0))[1])
     usable = np.isfinite(means) & (means > 0) & (np.arange(3 * axes) % 3 < lags)
     design = np.zeros((3 * axes, axes + 1))
     for axis in range(axes):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import use_threads
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -56,6 +55,7 @@ def direct(
     kind : int
         `SQUARE`, `ABSOLUTE` or `SECOND`.
     """
+    from fractalcontact.base.jit import use_threads
     from fractalcontact.dimensions._kernels import pair_sums
 
     use_threads()

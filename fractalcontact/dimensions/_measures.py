@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,10 +49,11 @@ def spectrum(face: Face, window: str, tile: int | None = None) -> Curve:
     else:
         q, mean = spectra.half_wavenumbers(shape, spacing)[0][1:], power[1:]
         count = spectra.half_weights(shape[0])[1:].astype(np.int64)
-    return Curve(q, mean * face.unit**2, count)
+    return Curve(q, mean * (face.unit**2 if tile is None else 1.0), count)
 
 
-def _tiles(face: Face, tile: int | None) -> Any:
+def _tiles(face: Face, tile: int | None) -> Iterator[Array]:
+    """Yield the whole face in scaled heights, or its tiles in metres."""
     if tile is None:
         yield face.heights
         return
@@ -62,7 +63,7 @@ def _tiles(face: Face, tile: int | None) -> Any:
         if face.is_lazy and face.axes == 2:
             strip = np.asarray(face.source.isel(y=slice(j, j + edge_y)).values, dtype=np.float64)
         else:
-            strip = face.heights[j : j + edge_y]
+            strip = face.raw[j : j + edge_y]
         for i in range(0, nx - tile + 1, tile // 2):
             yield strip[:, i : i + tile]
 
@@ -112,7 +113,7 @@ def variogram(face: Face, longest: float | None = None) -> Curve:
     offsets = _lags.near_offsets(face.shape, face.spacing, longest)
     wide = max(face.grid.spacing)
     if lazy or len(offsets) <= _lags.FEW:
-        return _pooled(face, offsets, _lags.SQUARE, 0.5 * face.unit**2, wide, longest)
+        return _pooled(face, offsets, _lags.SQUARE, 0.5, wide, longest)
     squares, counts = _lags.transformed(face.heights, face.periodic)
     vectors = _lags.lag_vectors(face.shape, face.periodic)
     nominal = _lags.nominal_counts(np.moveaxis(vectors, 0, -1), face.shape, face.periodic)
@@ -128,15 +129,15 @@ def variogram(face: Face, longest: float | None = None) -> Curve:
 
 def madogram(face: Face, longest: float | None = None) -> Curve:
     """Return half the mean absolute increment; `longest` in m."""
-    return _along_axes(face, longest, _lags.ABSOLUTE, 0.5 * face.unit, 0.25)
+    return _along_axes(face, longest, _lags.ABSOLUTE, 0.5, 0.25)
 
 
 def second_variogram(face: Face, longest: float | None = None) -> Curve:
     """Return the mean square second difference; `longest` in m."""
-    return _along_axes(face, longest, _lags.SECOND, face.unit**2, 0.125)
+    return _along_axes(face, longest, _lags.SECOND, 1.0, 0.125)
 
 
-def _along_axes(face: Face, longest: float | None, kind: int, unit: float, share: float) -> Curve:
+def _along_axes(face: Face, longest: float | None, kind: int, factor: float, share: float) -> Curve:
     reach = 2 if kind == _lags.SECOND else 1
     if longest is None:
         least = max(face.grid.spacing)
@@ -146,27 +147,27 @@ def _along_axes(face: Face, longest: float | None, kind: int, unit: float, share
         for n, s in zip(face.shape, face.spacing, strict=True)
     ]
     offsets = _lags.axis_offsets(face.shape, (largest[0], largest[1]))
-    return _pooled(face, offsets, kind, unit, min(face.grid.spacing), longest)
+    return _pooled(face, offsets, kind, factor, min(face.grid.spacing), longest)
 
 
-def _pooled(face: Face, offsets: Array, kind: int, unit: float, width: float, longest: float) -> Curve:
+def _pooled(face: Face, offsets: Array, kind: int, factor: float, width: float, longest: float) -> Curve:
     """Sum pairs directly and pool the lag vectors of equal length."""
     reach = 2 if kind == _lags.SECOND else 1
     periodic = face.periodic
     if face.is_lazy:
         periodic = (False, False)  # the far side of a periodic face would have to be read for every slab
-        unit = unit / face.unit ** (1 if kind == _lags.ABSOLUTE else 2)  # slabs are in metres
         slabs, columns = face.slabs(reach * int(offsets[:, 0].max(initial=0))), (0, face.shape[1])
     else:
         heights, columns = _lags.wrapped(face.heights, periodic, offsets, reach)
         slabs = iter([(heights, face.shape[0])])
+        factor *= face.unit ** (1 if kind == _lags.ABSOLUTE else 2)  # slabs above are in metres
     mean, counts = _lags.direct(slabs, columns, offsets, kind)
     nominal = _lags.nominal_counts(offsets, face.shape, periodic, reach)
     distance = np.hypot(offsets[:, 0] * face.spacing[0], offsets[:, 1] * face.spacing[1])
     # along the axes alone every lag is kept apart
     width = width if kind == _lags.SQUARE else longest
     lag, value, pairs = _lags.rings(distance, mean, counts, nominal, width, longest)
-    return Curve(lag, unit * value, pairs)
+    return Curve(lag, factor * value, pairs)
 
 
 def roughness_length(face: Face) -> Curve:

@@ -113,7 +113,7 @@ class CurveMethod:
             return undefined(f"fewer than two points of the curve between {low:g} m and {high:g} m")
         x, y = curve.scale[inside], curve.value[inside]
         weights = curve.count[inside].astype(float) if self.power is None else (x / x[0]) ** self.power
-        slope = fit_line(x, y, weights).slope
+        slope = fit_line(x, y / y[0], weights).slope  # a constant curve has slope 0 to the last bit
         return Estimate(
             self.to_hurst(slope, face.axes),
             scale_min=float(lengths[inside].min()),

@@ -301,5 +301,6 @@ def _window_curve(
     curves = [_measures.MEASURES[name](face, *arguments) for face in faces]
     counted = {"pair_count": "count"} if name == "roughness_length" else {}
     result = stack(surface, faces, dim, curves, value, counted)
-    slopes = [local_slope(c.scale, c.value) for c in curves]
+    # over its first value, a constant curve has slope 0 to the last bit
+    slopes = [local_slope(c.scale, c.value / (c.value[:1] if (c.value > 0).all() else 1.0)) for c in curves]
     return finish(result, surface, faces, name, slopes, started, options, title=f"{title} of a surface")

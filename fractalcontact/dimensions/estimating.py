@@ -86,6 +86,9 @@ def estimate(
 
     Notes
     -----
+    `sel` of xarray has an argument named `method` of its own: choose a method with
+    ``found.sel({"method": "spectrum"})``.
+
     The likelihood of a free face is that of its cosine modes under fractional Brownian heights: it does not
     change when a plane, an offset of each row or an offset of each column is added. On a periodic face it
     is that of a power-law spectrum between cut-offs, which is another family. A profile has the exact

@@ -1,0 +1,160 @@
+"""Many surfaces: error against the least possible one, and coverage of the intervals.
+
+The least standard deviation of H from n x n points of an exact fractional Brownian surface of unknown
+amplitude is sqrt(2 / var(d ln f / dH)) / n, f being the aliased spectral density and the variance being over
+all wavevectors; it is computed here, and not taken from the package.
+"""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+pytestmark = pytest.mark.slow
+MEMBERS = {64: 600, 128: 200, 256: 60}
+
+
+def aliased(hurst, points=256, images=6):
+    """Spectral density of the sampled surface; the tail of the sum over images as an integral."""
+    w = (np.arange(points) + 0.5) / points * np.pi
+    total = np.zeros((points, points))
+    for i in range(-images, images + 1):
+        for j in range(-images, images + 1):
+            total += ((w[:, None] + 2 * np.pi * i) ** 2 + (w + 2 * np.pi * j) ** 2) ** (-hurst - 1)
+    # outside the square of side 2 images + 1
+    edge = (2 * images + 1) * np.pi
+    angle = (np.arange(2000) + 0.5) / 2000 * np.pi / 4
+    tail = 8 * np.mean((edge / np.cos(angle)) ** (-2 * hurst)) * np.pi / 4 / (2 * hurst) / (2 * np.pi) ** 2
+    return total + tail
+
+
+def bound(hurst, noise=0.0, step=1e-4):
+    """Return n times the least standard deviation of H, the noise being unknown if there is any."""
+
+    def density(h):
+        # half the mean square increment over one spacing is one
+        f = aliased(h)
+        w = (np.arange(256) + 0.5) / 256 * np.pi
+        return f / np.mean(f * (1 - np.cos(w)))
+
+    middle = density(hurst) + noise
+    slope = (density(hurst + step) - density(hurst - step)) / (2 * step) / middle
+    columns = [np.ones(slope.size), slope.ravel()] + ([1.0 / middle.ravel()] if noise else [])
+    information = 0.5 * np.cov(np.stack(columns[1:]), bias=True).reshape(len(columns) - 1, -1)
+    return float(np.sqrt(np.linalg.inv(information)[0, 0]))
+
+
+def sample(shape, hurst, members, seed, spacing=1e-4):
+    rng = np.random.default_rng([seed, int(1000 * hurst), *shape])
+    for _ in range(members):
+        yield fc.surfaces.fbm(shape, spacing, hurst=hurst, rms_increment=1e-6, rng=rng), rng
+
+
+def table(faces, methods, **options):
+    """Return hurst, ci_low and ci_high: (members, methods) each."""
+    found = [fc.dimensions.estimate(face, methods, **options) for face in faces]
+    return tuple(np.array([one[key].values for one in found]) for key in ("hurst", "ci_low", "ci_high"))
+
+
+def rms(values):
+    return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+def covered(low, high, hurst):
+    """Coverage, and how far it may fall from .95: .02, or two binomial standard deviations."""
+    share = np.mean((low <= hurst) & (hurst <= high), axis=0)
+    return share, max(0.02, 2.2 * np.sqrt(0.95 * 0.05 / len(low)))
+
+
+def test_bound_is_the_known_one():
+    known = {0.1: 0.512, 0.3: 0.856, 0.5: 1.029, 0.7: 1.130, 0.9: 1.194}
+    for hurst, value in known.items():
+        assert bound(hurst) == pytest.approx(value, rel=0.01)
+
+
+@pytest.mark.parametrize("n", [64, 128, 256])
+@pytest.mark.parametrize("hurst", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_error_and_coverage_on_fractional_brownian_faces(n, hurst):
+    members = MEMBERS[n]
+    faces = (face for face, _ in sample((n, n), hurst, members, 1))
+    estimates, low, high = table(faces, ["default", "increments"])
+    scatter = 1.0 + 2.2 / np.sqrt(2 * members)
+    assert (rms(estimates - hurst) * n / bound(hurst) < np.array([1.15, 1.4]) * scatter).all()
+    share, allowed = covered(low, high, hurst)
+    assert (np.abs(share - 0.95) < allowed).all()
+
+
+@pytest.mark.parametrize("hurst", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_noise_of_a_tenth_of_the_short_variogram(hurst):
+    """Variance of the noise: a tenth of half the mean square increment over one spacing."""
+    n, members = 256, 40
+    faces = (
+        face.copy(data=face.values + np.sqrt(0.05) * 1e-6 * rng.standard_normal(face.shape))
+        for face, rng in sample((n, n), hurst, members, 2)
+    )
+    found = [fc.dimensions.estimate(face, noise=True).isel(method=0) for face in faces]
+    error = np.array([float(one.hurst) for one in found]) - hurst
+    least = bound(hurst, 0.1) / n
+    assert abs(error.mean()) < 0.02
+    assert rms(error) < 1.3 * least * (1.0 + 2.2 / np.sqrt(2 * members))
+    height = np.array([float(one.noise_height) for one in found])
+    # where noise and roughness look alike, only the sum of both is known well
+    assert np.mean(height**2) == pytest.approx(0.05e-12, rel=0.1 if hurst > 0.4 else 1.0)
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.85])
+@pytest.mark.parametrize("kind", ["random", "blocks"])
+def test_missing_tenth(hurst, kind):
+    n, members = 96, 200
+    allowed = 1.25 * np.sqrt(0.9)  # a full face of as many points has the edge n sqrt(.9)
+
+    def gapped():
+        for face, rng in sample((n, n), hurst, members, 3):
+            heights = face.values.copy()
+            if kind == "random":
+                heights[rng.random(heights.shape) < 0.1] = np.nan
+            while np.isfinite(heights).mean() > 0.9:
+                y, x, *size = *rng.integers(0, n - 4, 2), *rng.integers(4, n // 6, 2)
+                heights[y : y + size[0], x : x + size[1]] = np.nan
+            yield face.copy(data=heights)
+
+    estimates, low, high = table(gapped(), ["default", "increments"])
+    least = bound(hurst) / (n * 0.9)
+    assert rms(estimates - hurst)[0] < allowed * least * (1.0 + 2.2 / np.sqrt(2 * members))
+    share, slack = covered(low, high, hurst)
+    assert (np.abs(share - 0.95) < slack + 0.01).all()
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.85])
+def test_unequal_spacings(hurst):
+    members = 200
+    faces = (face for face, _ in sample((64, 64), hurst, members, 4, (3e-4, 1e-4)))
+    estimates, low, high = table(faces, ["default", "increments"])
+    assert (rms(estimates - hurst) < 1.25 * 1.15 * bound(hurst) / 64).all()
+    share, slack = covered(low, high, hurst)
+    assert (np.abs(share - 0.95) < slack).all()
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("cut", [{}, {"long_cutoff": 64e-4, "rolloff": 16e-4, "short_cutoff": 4e-4}])
+def test_periodic_family(hurst, cut):
+    """All modes of a square band: n times the least standard deviation is 1.383."""
+    n, members = 128, 200
+    faces = (
+        fc.surfaces.spectral((n, n), 1e-4, hurst=hurst, rms_height=1e-6, rng=[5, k], **cut)
+        for k in range(members)
+    )
+    estimates, low, high = table(faces, ["default"])
+    if not cut:
+        assert rms(estimates - hurst)[0] * n < 1.1 * 1.383
+    share, slack = covered(low, high, hurst)
+    assert (np.abs(share - 0.95) < slack + 0.01).all()
+
+
+@pytest.mark.parametrize("hurst", [0.1, 0.5, 0.9])
+def test_profiles(hurst):
+    faces = (face for face, _ in sample((400,), hurst, 300, 6))
+    estimates, low, high = table(faces, ["default", "increments"])
+    assert rms(estimates - hurst)[0] * 20 < 0.85
+    share, slack = covered(low, high, hurst)
+    assert (np.abs(share - 0.95) < slack).all()
