@@ -8,8 +8,8 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._paths import chosen_path, load_text, shear_text
-from fractalcontact.plotting._reading import as_dataset, extent_of, result_of
+from fractalcontact.plotting._paths import chosen_path, load_text, load_words, shear_text, shear_words
+from fractalcontact.plotting._reading import as_dataset, extent_of, nearest, result_of
 from fractalcontact.plotting._units import axis_label, scale_of
 from fractalcontact.plotting.relief import name_plane, plane_scale
 
@@ -57,7 +57,7 @@ def contact_domains(
     """
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
     path, dim = chosen_path(data, shear, normal_force, panels, "contact_domains")
-    count, columns = path.sizes[dim], min(path.sizes[dim], COLUMNS)
+    count, columns = path.sizes[dim], columns_for(path.sizes[dim])
     width = _style.WIDTH * columns / COLUMNS
     sheet = _style.sheet(figure, (max(width, 3.0), maps_height(path, count, width)))
     axes = sheet.subplots(-(-count // columns), columns, squeeze=False).ravel()
@@ -93,9 +93,14 @@ def _name(one: xr.Dataset, data: xr.Dataset, dim: str) -> str:
     return load_text(one, data) if dim == "step" else shear_text(one, data)
 
 
+def columns_for(count: int) -> int:
+    """Return the number of columns for a number of maps."""
+    return 2 if count == 4 else min(count, COLUMNS)
+
+
 def maps_height(path: xr.Dataset, count: int, width: float) -> float:
     """Return the height (inches) of a sheet of maps on paper of the given width."""
-    columns = min(count, COLUMNS)
+    columns = columns_for(count)
     left, right, bottom, top = extent_of(path["state"])
     shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
     return 0.5 + -(-count // columns) * (shape * (width / columns - 0.15) + 0.28)
@@ -201,23 +206,35 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
     if not np.isfinite(areas).any():
         _style.say(ax, "no island")
         return
-    groups = _island_groups(data, areas)
-    for group, colour in zip(groups, _style.family(len(groups)), strict=True):
+    title, groups = _island_groups(data, areas)
+    colours = _style.family(len(groups))
+    for (_, group), colour in zip(groups, colours, strict=True):
         ordered = np.sort(group[np.isfinite(group)])[::-1]
         ax.step(scale(ordered), np.arange(1, ordered.size + 1), where="pre", color=colour,
                 marker="." if ordered.size < 40 else None)  # fmt: skip
     _style.log_scale(ax, x=areas, y=np.ones(1))
     _style.plain_ticks(ax)
+    if title:
+        _style.key(ax, title, [name for name, _ in groups], colours)
 
 
-def _island_groups(data: xr.Dataset, areas: Any) -> list[Any]:
-    """Return the areas of the islands of each mask, in the order of the masks."""
-    names = [f"island_{dim}" for dim in ("member", "direction", "shear", "step")]
-    keys = [np.unique(data[name].values, return_inverse=True)[1] for name in names if name in data.coords]
-    if not keys:
-        return [areas]
-    _, group = np.unique(np.stack(keys, axis=-1), axis=0, return_inverse=True)
-    return [areas[group.ravel() == number] for number in range(group.max() + 1)]
+def _island_groups(data: xr.Dataset, areas: Any) -> tuple[str, list[tuple[str, Any]]]:
+    """Return the title of the names of the masks, and for each its name and the areas of its islands.
+
+    Masks along one path of load or of shear are named after it, others are numbered.
+    """
+    names = [dim for dim in ("member", "direction", "shear", "step") if f"island_{dim}" in data.coords]
+    if not names:
+        return "", [("", areas)]
+    columns = [np.unique(data[f"island_{dim}"].values, return_inverse=True) for dim in names]
+    _, group = np.unique(np.stack([inverse for _, inverse in columns], -1), axis=0, return_inverse=True)
+    parts = [areas[group.ravel() == number] for number in range(group.max() + 1)]
+    title, texts = "", [str(number) for number in range(len(parts))]
+    if len(names) == 1 and names[0] in ("shear", "step") and names[0] in data.coords:
+        title, every = (shear_words if names[0] == "shear" else load_words)(data)
+        places = [nearest(data[names[0]], value) for value in columns[0][0]]
+        texts = [every[place] for place in places] if every else texts
+    return title, list(zip(texts, parts, strict=True))
 
 
 def _state_key(sheet: Any) -> None:

@@ -159,11 +159,14 @@ def test_islands_of_several_masks_have_a_curve_each_and_the_last_is_mapped(made)
         "label": (("step", "y", "x"), np.array([part.label.values for part in parts])),
         "area": ("island", areas),
     }
-    both = label(xr.Dataset(data, coords={"island_step": ("island", step), "y": state.y, "x": state.x}))
+    coords = {"island_step": ("island", step), "y": state.y, "x": state.x, "step": [3, 4]}
+    coords["normal_force"] = ("step", [1e4, 3e4])
+    both = label(xr.Dataset(data, coords=coords))
     map_, curves = plotting.islands(both).axes
     assert np.array_equal(np.all(colours(map_) == OPEN, axis=-1), parts[1].label.values == 0)
     for line, part in zip(curves.lines, parts, strict=True):
         assert np.asarray(line.get_xdata()) * 1e-6 == pytest.approx(np.sort(part.area.values)[::-1])
+    assert [text.get_text() for text in curves.artists[0].get_texts()] == ["10", "30"]
 
 
 def test_scheme_is_drawn_from_the_cracks_numbers(made):
