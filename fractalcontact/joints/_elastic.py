@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +58,11 @@ class Load:
         return {self.control: self.values, "bulk": self.bulk, "keep": self.keep, **self.solver}
 
 
+def is_nothing(keep: Any) -> bool:
+    """Say whether no map is to be kept."""
+    return keep is None or (isinstance(keep, Sized) and len(keep) == 0)
+
+
 def check_load(
     problems: Problems, loads: Mapping[str, Any], bulk: Any, keep: Any, solver: Mapping[str, Any]
 ) -> Load:
@@ -65,7 +70,7 @@ def check_load(
     control = problems.exactly_one(**loads) if len(loads) > 1 else next(iter(loads))
     given = loads[control]
     values = np.zeros(1) if given is None else problems.numbers(control, given, at_least=0)
-    kept = problems.choices("keep", keep, MAPS) if len(keep) else ()
+    kept = () if is_nothing(keep) else problems.choices("keep", keep, MAPS)
     return Load(control, values, problems.choice("bulk", bulk, BULK), kept, solver)
 
 

@@ -95,7 +95,7 @@ def dilatancy(
             solver = {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
             loads = {"normal_force": normal_force}
             path = _elastic.check_load(problems, loads, bulk, keep, solver | {"tolerance": tolerance})
-        elif len(keep):
+        elif keep:
             problems.add("keep", "maps only together with normal_force", keep)
     start = time.perf_counter()
     result = _rigid(crack, shears, towards)
