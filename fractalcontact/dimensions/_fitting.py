@@ -1,0 +1,166 @@
+"""Maximum likelihood from squared modes: of a free face, complete or not, and of a periodic one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from fractalcontact.dimensions import _modes, _periodic, _whittle
+from fractalcontact.dimensions._estimates import Estimate, normal_interval
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+LEAST_MODES = 12
+_STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
+_FEW_PROBES, _MANY_POINTS = 3, 1 << 18
+
+
+class Modes(Protocol):
+    """What the fit needs of a set of modes."""
+
+    @property
+    def order(self) -> Array:
+        """A length for each mode: long waves and short waves are told apart by it."""
+
+    def part(self, kept: Array) -> Modes:
+        """Keep some of the modes."""
+
+    def fit(self, start: float, noise: bool) -> _whittle.WhittleFit:
+        """Fit the family of the face."""
+
+    def error(self, fit: _whittle.WhittleFit) -> float:
+        """Return the standard error of H."""
+
+
+@dataclass(frozen=True)
+class FreeModes:
+    """Cosine modes of a face with free edges under fractional Brownian heights.
+
+    `chosen` picks the modes out of all; `gapped` is what missing points do to them, None if there are none.
+    """
+
+    lattice: _modes.Lattice
+    chosen: Array
+    power: Array
+    order: Array
+    gapped: Any = None
+
+    @classmethod
+    def of(cls, heights: Array, lattice: _modes.Lattice, chosen: Array, reference: float) -> FreeModes:
+        """Transform a face; `reference` is a Hurst exponent near its own."""
+        observed = np.isfinite(heights)
+        order = _modes.wavelengths(lattice)[chosen]
+        if observed.all():
+            return cls(lattice, chosen, _modes.power(heights)[chosen], order)
+        from fractalcontact.dimensions._gaps import PROBES, GappedModes
+
+        probes = _FEW_PROBES if heights.size > _MANY_POINTS else PROBES
+        gapped = GappedModes(lattice, observed, reference, probes)
+        return cls(lattice, chosen, gapped.power(heights)[chosen], order, gapped)
+
+    def part(self, kept: Array) -> FreeModes:
+        """Keep some of the chosen modes."""
+        chosen = np.zeros_like(self.chosen)
+        chosen[self.chosen] = kept
+        return replace(self, chosen=chosen, power=self.power[kept], order=self.order[kept])
+
+    def fit(self, start: float, noise: bool) -> _whittle.WhittleFit:
+        """Fit from a pilot estimate; with noise from two starts, taking the better end."""
+
+        def model(hurst: float) -> Array:
+            return _modes.expected_power(self.lattice, hurst)[self.chosen]
+
+        gaps: Callable[[float], Array] | None = None
+        white = None
+        if self.gapped is not None:
+            gaps = lambda hurst: self.gapped.excess(hurst)[self.chosen]  # noqa: E731
+            white = self.gapped.white_excess()[self.chosen] if noise else None
+        if not noise:
+            return _whittle.fit(self.power, model, start, gaps=gaps)
+        # noise roughens the pilot, so that the search must come from both sides
+        fits = [
+            _whittle.fit(self.power, model, hurst, noise=level, gaps=gaps, white_excess=white)
+            for hurst, level in ((0.7, 0.05), (0.3, 0.02))
+        ]
+        settled = [fit for fit in fits if fit.converged] or fits
+        return min(settled, key=lambda fit: float(np.sum(np.log(fit.amplitude * fit.total))))
+
+    def error(self, fit: _whittle.WhittleFit) -> float:
+        """Return the standard error of H, with what the modes share at edges and gaps.
+
+        Without gaps the full covariance of the modes, on lattices of 24 to 64 points, raises that of
+        independent modes by 1 to 3 %, hardly depending on the size. With gaps it is measured: bread,
+        covariance of the score, bread.
+        """
+        if self.gapped is None:
+            return fit.standard_error * (1.01 + 0.02 * float(np.clip(fit.hurst, 0.0, 1.0)))
+        reference = self.gapped.reference_power()
+        rows = np.zeros((len(fit.columns), *reference.shape))
+        rows[:, self.chosen] = fit.columns / fit.total * reference[self.chosen]
+        meat = 0.25 * self.gapped.score_covariance(rows, fit.hurst, fit.noise / fit.amplitude)
+        bread = np.linalg.inv(fit.bread)
+        return float(np.sqrt((bread @ meat @ bread.T)[1, 1]))
+
+
+@dataclass(frozen=True)
+class PeriodicModes:
+    """Modes of a periodic face under a power law."""
+
+    modes: _periodic.Modes
+
+    @property
+    def order(self) -> Array:
+        """Wavelengths over the largest extent."""
+        return np.asarray(1.0 / self.modes.wavenumber)
+
+    def part(self, kept: Array) -> PeriodicModes:
+        """Keep some of the modes."""
+        modes = self.modes
+        return PeriodicModes(
+            replace(
+                modes, power=modes.power[kept], wavenumber=modes.wavenumber[kept], weights=modes.weights[kept]
+            )
+        )
+
+    def fit(self, start: float, noise: bool) -> _whittle.WhittleFit:
+        """Fit the power law, and white noise under it."""
+        least = self.modes.wavenumber.max() ** (-self.modes.axes - 1.0)
+        return _whittle.fit(
+            self.modes.power,
+            lambda hurst: _periodic.power_law(self.modes, hurst),
+            start,
+            noise=0.01 * float(least) if noise else None,
+            weights=self.modes.weights,
+        )
+
+    def error(self, fit: _whittle.WhittleFit) -> float:
+        """Return the standard error of H; the modes are independent."""
+        return fit.standard_error
+
+
+def fitted(modes: Modes, start: float, noise: bool) -> tuple[_whittle.WhittleFit, Estimate]:
+    """Fit, and return the estimate with its interval.
+
+    Where the exponent changes with scale more than chance allows, the interval also holds the exponents
+    of the longer and of the shorter half of the modes, each fitted alone.
+    """
+    fit = modes.fit(start, noise)
+    error = modes.error(fit)
+    low, high = normal_interval(fit.hurst, error)
+    note = "" if fit.converged else "the fit stopped at the limit of its range"
+    if abs(fit.misfit) > _STRANGE:
+        middle = float(np.median(modes.order))
+        for kept in (modes.order > middle, modes.order <= middle):
+            if np.count_nonzero(kept) >= LEAST_MODES:
+                part = modes.part(kept)
+                alone = part.fit(fit.hurst, noise)
+                ends = normal_interval(alone.hurst, part.error(alone))
+                low, high = min(low, ends[0]), max(high, ends[1])
+        note = (
+            f"the exponent changes with scale ({fit.misfit:+.1f} standard deviations): "
+            "the interval holds that of the longer and of the shorter half of the modes"
+        )
+    return fit, Estimate(fit.hurst, error, low, high, misfit=fit.misfit, note=note)
