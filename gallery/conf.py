@@ -1,13 +1,17 @@
 """How the site is built: sphinx-build -W -b html gallery gallery/_build/html (no network needed)."""
 
+import atexit
 import os
+import shutil
 import sys
 import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # the helpers of the examples stand beside this file
 # one study for all examples of the paper, computed anew by every build
-os.environ.setdefault("FRACTALCONTACT_GALLERY", tempfile.mkdtemp(prefix="fractalcontact-gallery-"))
+if "FRACTALCONTACT_GALLERY" not in os.environ:
+    os.environ["FRACTALCONTACT_GALLERY"] = tempfile.mkdtemp(prefix="fractalcontact-gallery-")
+    atexit.register(shutil.rmtree, os.environ["FRACTALCONTACT_GALLERY"], ignore_errors=True)
 
 import fractalcontact
 
