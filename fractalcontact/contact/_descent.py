@@ -122,10 +122,10 @@ class Descent:
         iteration = 0
         for iteration in range(GREATEST_ITERATIONS + 1):
             balance = self.weigh()
-            if self.fresh and balance.objective > self.last + balance.noise and self.halved < HALVINGS:
+            if self.clipped and balance.objective > self.last + balance.noise and self.halved < HALVINGS:
                 self.halve(control)
                 continue
-            self.last, self.halved = balance.objective, 0
+            self.last, self.halved, self.clipped = balance.objective, 0, False
             inner, outer, residual = self.inspect(balance)
             if residual <= tolerance:
                 if self.fresh or not certify:
@@ -163,7 +163,7 @@ class Descent:
         """Take a pressure to start from, with the force that is wanted."""
         self.begun = self.operator.transforms + self.precondition.transforms
         np.clip(start, 0, self.cap, out=self.p, casting="same_kind")
-        self.last, self.halved, self.curvature, self.step = np.inf, 0, 0.0, 0.0
+        self.last, self.halved, self.clipped, self.curvature, self.step = np.inf, 0, False, 0.0, 0.0
         if self.control.total is not None:
             sums = self.run(_kernels.rescale, self.p, self.kind(1), self.cap)
             self.restore_force(sums[0], sums[1])
@@ -255,8 +255,12 @@ class Descent:
         )
         self.r = self.operator.apply(self.t)
         along, self.curvature = self.run(_kernels.slope, self.gap, self.u, self.t, self.r, closure)[:2]
-        self.step = along / self.curvature if self.curvature > 0 and along > 0 else 0.0
-        return self.step > 0
+        self.step = along / self.curvature if self.curvature > 0 and along > 0 else np.inf
+        if not forced and along > 0:
+            # full contact of a periodic body costs nothing to relieve: no further than to no force at all
+            relieved = float(np.sum(np.sum(self.t, axis=1, dtype=np.float64)))
+            self.step = min(self.step, balance.force / relieved if relieved > 0 else np.inf)
+        return self.step < np.inf
 
     def uniform(self, gap: float) -> float:
         """Uniform pressure on the free set that would close the summed gap (periodic bodies, else zero).
@@ -271,7 +275,8 @@ class Descent:
         self.p, self.old = self.old, self.p
         step = self.kind(self.step)
         clipped, force, capped = self.run(_kernels.advance, self.old, self.t, step, self.cap, self.p)[:3]
-        if clipped == 0:
+        self.clipped = clipped > 0
+        if not self.clipped:
             in_bands(_kernels.follow, self.blocks, self.size, self.rows, self.u, self.r, step)
             self.fresh = False
             return True

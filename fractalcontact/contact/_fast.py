@@ -9,6 +9,7 @@ nodes overestimates it, so that what it finds either verifies the nodes or names
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ import numpy as np
 from fractalcontact.contact._descent import Control, Descent
 from fractalcontact.contact._nested import cold_start, plane_descent
 from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
-from fractalcontact.contact._problem import Body, Problem, Solution
+from fractalcontact.contact._operator import Operator
+from fractalcontact.contact._problem import Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
@@ -24,10 +26,11 @@ Window = tuple[slice, slice]
 SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
 SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
 GREATEST_REACH = 2.0  # extrapolation along the path, in steps
-FEW_NODES = 1500  # candidates up to which sums over pairs are faster than transforms
+FEW_NODES = 1000  # candidates up to which sums over pairs are faster than transforms
 FIRST_NODES = 256  # candidates to begin with
 WHOLE = 0.75  # part of the extent from which a window is not worth having
-ROOM = 1.1  # window for this much more than the expected closure
+TRIAL = 1e-2  # residual at which a closure is known well enough to tell the candidates
+ROOM = 1.1  # candidates for this much more than the expected closure
 
 
 class Fast:
@@ -38,6 +41,21 @@ class Fast:
         self.known: list[tuple[float, float, Array]] = []  # the last two steps: control, closure, pressure
         self.plane: Plane | None = None
         self.spent = (0, 0)
+
+    @cached_property
+    def ordered(self) -> Array:
+        """Gaps at first touch, ascending."""
+        return np.sort(self.problem.gap.ravel())
+
+    @cached_property
+    def tables(self) -> tuple[Array, Array]:
+        """Influence and stiffness between nodes, by distance."""
+        return self.problem.body.table(), stiffness_table(self.problem.body)
+
+    @cached_property
+    def operator(self) -> Operator:
+        """The operator on the whole extent."""
+        return self.problem.body.operator()
 
     def step(self, control: Control) -> Solution:
         """Solve one step of the path."""
@@ -81,36 +99,44 @@ class Fast:
 
     def on_nodes(self, control: Control) -> Solution | None:
         """Solve by sums over pairs; None where there are too many candidates."""
-        gap = self.problem.gap.ravel()
-        self.ordered = getattr(self, "ordered", None) if hasattr(self, "ordered") else np.sort(gap)
-        closure = self.expected_closure(control)
-        room = 1.0 if control.closure is not None else ROOM
-        count = FIRST_NODES if closure is None else self.candidates(closure * room)
+        count = self.first_count(control)
         start = self.guess(control)
-        while 0 < (count := min(max(count, 1), gap.size)) <= FEW_NODES:
-            chosen = np.flatnonzero(gap <= self.ordered[count - 1])
-            solution = self.count(self.solve_nodes(chosen, control, start))
-            if control.closure is not None or self.candidates(solution.closure) <= chosen.size:
-                return self.embedded(solution, chosen)
+        while 0 < count <= FEW_NODES:
+            chosen = np.flatnonzero(self.problem.gap.ravel() <= self.ordered[count - 1])
+            if chosen.size > FEW_NODES:  # a plateau
+                break
+            solution = self.count(self.solve_nodes(chosen, control, start, TRIAL))
             start = self.embedded_pressure(solution, chosen)
-            count = min(self.candidates(solution.closure), 4 * chosen.size)
+            needed = self.candidates(solution.closure * (1 + TRIAL))
+            if control.closure is not None or needed <= chosen.size:
+                solution = self.count(self.solve_nodes(chosen, control, start, self.tolerance))
+                return self.everywhere(replace(solution, pressure=self.embedded_pressure(solution, chosen)))
+            count = min(needed, 4 * chosen.size)
         return None
+
+    def first_count(self, control: Control) -> int:
+        """Number of candidates to begin with."""
+        if control.closure is not None:
+            return self.candidates(control.closure)
+        closure = self.expected_closure(control)
+        if closure is None:
+            return min(FIRST_NODES, self.ordered.size)
+        likely = self.candidates(closure * ROOM)
+        return max(1, likely if likely <= FEW_NODES else min(likely, 4 * self.candidates(self.known[-1][1])))
 
     def candidates(self, closure: float) -> int:
         """Nodes whose gap at first touch is below a closure."""
         return int(np.searchsorted(self.ordered, closure))
 
-    def solve_nodes(self, chosen: Array, control: Control, start: Array | None) -> Solution:
+    def solve_nodes(self, chosen: Array, control: Control, start: Array | None, tolerance: float) -> Solution:
         """Solve on the nodes `chosen` alone."""
-        body, nx = self.problem.body, self.problem.body.shape[1]
-        if not hasattr(self, "tables"):
-            self.tables = (body.table(), stiffness_table(body))
+        nx = self.problem.body.shape[1]
         iy, ix = chosen // nx, chosen % nx
         operator, precondition = PairSum(self.tables[0], iy, ix), NodePreconditioner(self.tables[1], iy, ix)
         gap = self.problem.gap.reshape(1, -1)[:, chosen]
         first = np.ones(gap.shape) if start is None else start.reshape(1, -1)[:, chosen]
         descent = Descent(gap, self.problem.cap, operator, precondition, self.problem.local, np.float64)
-        return descent.solve(first if first.any() else np.ones(gap.shape), control, self.tolerance)
+        return descent.solve(first if first.any() else np.ones(gap.shape), control, tolerance)
 
     def embedded_pressure(self, solution: Solution, chosen: Array) -> Array:
         """Pressure on the whole extent."""
@@ -118,14 +144,8 @@ class Fast:
         pressure.ravel()[chosen] = solution.pressure.ravel()
         return pressure
 
-    def embedded(self, solution: Solution, chosen: Array) -> Solution:
-        """Solution on the whole extent, with the settlement everywhere."""
-        return self.everywhere(replace(solution, pressure=self.embedded_pressure(solution, chosen)))
-
     def everywhere(self, solution: Solution) -> Solution:
         """Settlement on the whole extent."""
-        if not hasattr(self, "operator"):
-            self.operator = self.problem.body.operator()
         self.spent = (self.spent[0], self.spent[1] + 1)
         return replace(solution, settlement=self.operator.apply(solution.pressure))
 

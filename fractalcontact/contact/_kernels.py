@@ -270,10 +270,12 @@ def follow(start, stop, rows, u, r, step):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pair_sum(start, stop, table, iy, ix, from_y, from_x, value, out):  # type: ignore[no-untyped-def]
-    """Sum of table[distance to source] * value over the sources, for every node."""
+def pair_sum(start, stop, table, iy, ix, wanted, sources, value, out):  # type: ignore[no-untyped-def]
+    """Sum of table[distance to source] * value over the sources, for every wanted node."""
     for k in range(start, stop):
+        y, x = iy[wanted[k]], ix[wanted[k]]
         total = 0.0
-        for m in range(value.size):
-            total += table[abs(iy[k] - from_y[m]), abs(ix[k] - from_x[m])] * value[m]
-        out[k] = total
+        for m in range(sources.size):
+            dy, dx = abs(y - iy[sources[m]]), abs(x - ix[sources[m]])
+            total += table[np.uint32(dy), np.uint32(dx)] * value[m]  # unsigned: no test for negatives
+        out[wanted[k]] = total

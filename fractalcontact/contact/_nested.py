@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
 from fractalcontact.contact._descent import Control, Descent
 from fractalcontact.contact._precondition import Preconditioner
@@ -66,5 +67,5 @@ def _plate(body: Body, spacing: tuple[float, float]) -> float:
     if body.influence != "disc":
         return 0.0
     ratio = max(spacing) / min(spacing)
-    second = ratio <= _influence.GREATEST_RATIO
+    second = ratio <= _influence.GREATEST_RATIO * (1 + UNIFORM)
     return _influence.disc_radius("second_order" if second else "inscribed", spacing)

@@ -23,25 +23,20 @@ class PairSum:
 
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.table, self.iy, self.ix = table, iy, ix
+        self.every = np.arange(iy.size)
         self.transforms = 0
 
     def apply(self, value: Array) -> Array:
         """Sum over all nodes of table[distance] times value, for every node."""
-        sources = np.flatnonzero(value)
+        return self.sum(value, self.every)
+
+    def sum(self, value: Array, wanted: Array) -> Array:
+        """Sum for the nodes `wanted` (indices); zero for the others."""
         flat = value.reshape(-1)
+        sources = np.flatnonzero(flat)
         out = np.zeros_like(flat)
-        in_bands(
-            _kernels.pair_sum,
-            flat.size,
-            flat.size * sources.size,
-            self.table,
-            self.iy,
-            self.ix,
-            self.iy[sources],
-            self.ix[sources],
-            flat[sources],
-            out,
-        )
+        nodes = (self.iy, self.ix, wanted, sources, flat[sources])
+        in_bands(_kernels.pair_sum, wanted.size, wanted.size * sources.size, self.table, *nodes, out)
         return out.reshape(value.shape)
 
 
@@ -59,7 +54,7 @@ class NodePreconditioner:
     def apply(self) -> tuple[Array, Array]:
         """Pressure for the gap in x on the set in mask."""
         self.x[~self.mask] = 0.0
-        return self.pairs.apply(self.x), self.nothing
+        return self.pairs.sum(self.x, np.flatnonzero(self.mask)), self.nothing
 
     def mean_settlement(self) -> float:
         """Infinite: the mean needs no help."""

@@ -117,10 +117,10 @@ class Preconditioner:
 
 
 def bin_edge(body: Body, axis: int) -> int:
-    """Nodes along the edge of a bin: near square, and not too few bins."""
+    """Nodes along the edge of a bin: a power of two, near square, and not too few bins."""
     mean = float(np.sqrt(body.spacing[0] * body.spacing[1]))
-    wanted = min(2 * BIN, max(1, round(BIN * mean / body.spacing[axis])))
-    return int(max(1, min(wanted, body.shape[axis] // 8)))
+    wanted = min(2 * BIN, round(BIN * mean / body.spacing[axis]), body.shape[axis] // 8)
+    return 1 << (max(1, wanted).bit_length() - 1)
 
 
 def wider(n: int, edge: int) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
 from fractalcontact.contact._problem import Body, power_of_two
 
@@ -76,7 +77,7 @@ def _checked_radius(
     ratio = max(spacing) / min(spacing)
     if isinstance(choice, str):
         word = problems.choice("disc_radius", choice, _influence.DISC_RADII)
-        if word == "second_order" and ratio > _influence.GREATEST_RATIO:
+        if word == "second_order" and ratio > _influence.GREATEST_RATIO * (1 + UNIFORM):
             expected = "spacings in a ratio of at most 2 for the second-order disc (use influence='square')"
             problems.add("influence", expected, f"'disc' with a ratio of {ratio:.4g}")
             return 1.0
