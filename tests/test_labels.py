@@ -10,8 +10,19 @@ import fractalcontact as fc
 from fractalcontact.base.schema import QUANTITIES
 
 ROOMS = ("surfaces", "dimensions", "contact", "domains", "joints")
-# these give no labelled data: an object, a number, a table of words
-UNLABELLED = {"joints.Crack", "contact.effective_modulus", "contact.flat_stiffness", "dimensions.methods"}
+# these give no labelled data: an object, a number, a table of words, the named laws of the handbooks
+UNLABELLED = {
+    "joints.Crack",
+    "joints.PARK_PAULAY",
+    "joints.bandis_closure",
+    "joints.bandis_constants",
+    "joints.barton_bandis_scaled",
+    "joints.barton_choubey_strength",
+    "joints.size_effect",
+    "contact.effective_modulus",
+    "contact.flat_stiffness",
+    "dimensions.methods",
+}
 
 
 def face(n=40):
@@ -68,6 +79,9 @@ CALLS = {
     "joints.register": lambda: fc.joints.register(face(), face() + 1e-5),
     "joints.transmissivity": lambda: fc.joints.transmissivity(gap()),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
+    "domains.area_dimension": lambda: fc.domains.area_dimension(
+        [state(), state().isel(x=slice(None, None, 2), y=slice(None, None, 2))]
+    ),
     "domains.generalised_dimensions": lambda: fc.domains.generalised_dimensions(state(), q=[0, 1, 2]),
 }
 

@@ -181,6 +181,8 @@ QUANTITIES: dict[str, Quantity] = {
     "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension"),
     "boundary_dimension_low": Quantity("1", "lower end of the interval of the dimension of the boundary"),
     "boundary_dimension_high": Quantity("1", "upper end of the interval of the dimension of the boundary"),
+    "area_dimension": Quantity("1", "dimension of the set by its area at several resolutions"),
+    "resolution": Quantity("m", "spacing to which the contact is resolved"),
     "boundary_sides": Quantity("1", "number of sides of cells on the boundary of the set"),
     "largest_share": Quantity("1", "share of the set in its largest island"),
     "singularity_strength": Quantity("1", "singularity strength alpha(q)"),

@@ -17,6 +17,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "labelling": ["islands"],
         "lineage": ["evolution"],
         "moments": ["generalised_dimensions"],
+        "resolving": ["area_dimension"],
         "summary": ["describe"],
     },
 )

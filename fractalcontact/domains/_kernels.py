@@ -69,10 +69,11 @@ def _cut_columns(
                 measure[offset] += width * _height(beside, start, stop, height, size)
             continue
         stop = min(offset, nx)
-        width = _part(prefix, 0, stop, stop, min(stop + size, nx), stop, stop, size)
+        start = 0
+        width = _part(prefix, start, stop, stop, min(stop + size, nx), stop, stop, size)
         if width > 0:
             count[offset] += 1
-            measure[offset] += width * _height(beside, 0, stop, height, size)
+            measure[offset] += width * _height(beside, start, stop, height, size)
         start = offset + (nx - offset) // size * size
         if offset <= nx and start < nx:
             width = _part(prefix, start, nx, max(start - size, 0), start, start, start, size)

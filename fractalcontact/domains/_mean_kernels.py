@@ -55,16 +55,20 @@ def _inside(mask: Array, largest: int, wrap_y: bool, wrap_x: bool) -> Array:
 
 
 @kernel
-def _first(mask: Array, backwards: bool) -> Array:
-    """First row that holds a cell, for every column; ny where there is none."""
+def _from_edges(mask: Array) -> tuple[Array, Array, Array, Array]:
+    """Cells from the top, bottom, left and right edge to the set; the whole line if it holds none."""
     ny, nx = mask.shape
-    found = np.full(nx, ny, np.int64)
-    for i in range(ny - 1, -1, -1):
-        row = mask[ny - 1 - i] if backwards else mask[i]
+    top, bottom = np.full(nx, ny, np.int64), np.full(nx, ny, np.int64)
+    left, right = np.full(ny, nx, np.int64), np.full(ny, nx, np.int64)
+    for i in range(ny):
+        row = mask[i]
         for j in range(nx):
             if row[j]:
-                found[j] = i
-    return found
+                top[j] = min(top[j], i)
+                bottom[j] = ny - 1 - i
+                left[i] = min(left[i], j)
+                right[i] = nx - 1 - j
+    return top, bottom, left, right
 
 
 @kernel
@@ -103,9 +107,7 @@ def mean_cover(mask: Array, largest: int, wrap_y: bool, wrap_x: bool) -> tuple[A
     """
     inside = _inside(mask, largest, wrap_y, wrap_x)
     whole, folded = inside.copy(), inside.copy()
-    across = mask.T
-    top, bottom = _first(mask, False), _first(mask, True)
-    left, right = _first(across, False), _first(across, True)
+    top, bottom, left, right = _from_edges(mask)
     if not wrap_y:
         _hanging(top, largest, wrap_x, whole)
         _hanging(bottom, largest, wrap_x, whole)
