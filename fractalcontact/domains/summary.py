@@ -48,8 +48,7 @@ def describe(
     Dataset
         Over the leading dims of the mask: `coverage`; `total_perimeter` (m), along the sides of cells inside
         the extent; `n_islands`, `largest_cells`, `largest_island`, `mean_island_area` (m2), `largest_share`,
-        `euler_number`
-        (see `islands`); `percolates` over `axis` (see `percolation`); `box_dimension` with
+        `euler_number` (see `islands`); `percolates` over `axis` (see `percolation`); `box_dimension` with
         `box_dimension_low` and `box_dimension_high`, `dust_dimension`, `dust_spread`, `differs_from_dust`
         (see `box_dimension`); `boundary_dimension` with its interval (see `boundary_dimension`);
         `lacunarity` and `dust_lacunarity` at the `box_size` of 8 cells, or of the shorter side if that is
