@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -118,22 +118,24 @@ def _sane(name: str, result: xr.Dataset, seconds: float) -> Finding:
             continue
         if np.isinf(variable.values).any():
             return Finding(name, None, f"{quantity} is infinite", False, seconds)
-        if np.isnan(variable.values).any() and not _explained(result, str(quantity)):
+        # one reason serves all that is missing with it: no exponent, no interval either
+        told = any(_tells(one.attrs) for one in result.variables.values()) or _tells(result.attrs)
+        if np.isnan(variable.values).any() and not told:
             return Finding(name, None, f"{quantity} is NaN without a reason", False, seconds)
     return Finding(name, None, "finite or explained", True, seconds)
 
 
 def _explained(result: xr.Dataset, quantity: str) -> bool:
-    """Whether the result says why a number is missing: at the number itself, or once for all it holds."""
-    attributes = [
-        result[quantity].attrs,
-        result.attrs,
-        *(variable.attrs for variable in result.variables.values()),
-    ]
+    """Whether the number itself, or the result as a whole, says why it is missing."""
+    return _tells(result.attrs) or _tells(result[quantity].attrs)
+
+
+def _tells(attributes: Mapping[Any, Any]) -> bool:
+    """Whether attributes hold a reason for missing numbers."""
     return any(
-        "reason" in str(key) or "not_given" in str(key) or (key == "comment" and "NaN" in str(value))
-        for one in attributes
-        for key, value in one.items()
+        str(key) in ("reason", "missing_reason", "not_given", "note")
+        or (key == "comment" and "NaN" in str(value))
+        for key, value in attributes.items()
     )
 
 

@@ -99,6 +99,16 @@ def open(path: str | os.PathLike[str]) -> Any:
     return array
 
 
+def as_dataset(array: xr.DataArray) -> xr.Dataset:
+    """Return a Dataset of one variable; what is said of the whole moves to the Dataset's attributes."""
+    name = "values" if array.name is None else str(array.name)
+    dataset = array.rename(name).to_dataset()
+    dataset[name].attrs = {key: value for key, value in array.attrs.items() if key not in _GLOBAL}
+    dataset[name].encoding = dict(array.encoding)
+    dataset.attrs = {key: array.attrs[key] for key in _GLOBAL if key in array.attrs}
+    return dataset
+
+
 def clear_partial(folder: Path) -> None:
     """Remove the temporary files of runs that are no longer alive."""
     for leftover in folder.glob(f".*{PARTIAL}"):
@@ -121,15 +131,13 @@ def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> xr.Dataset | xr
     """Return what is written: global attributes lifted out of a DataArray, Conventions always there."""
     import xarray as xr
 
-    data = _as_dataset(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)
+    data = _marked(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)
     data.attrs = {"Conventions": CONVENTIONS} | data.attrs
     return data
 
 
-def _as_dataset(array: xr.DataArray) -> xr.Dataset:
-    name = "values" if array.name is None else str(array.name)
-    dataset = array.rename(name).to_dataset()
-    dataset[name].attrs = {key: value for key, value in array.attrs.items() if key not in _GLOBAL}
-    dataset[name].encoding = dict(array.encoding)
-    dataset.attrs = {key: array.attrs[key] for key in _GLOBAL if key in array.attrs} | {_KIND: name}
+def _marked(array: xr.DataArray) -> xr.Dataset:
+    """Return the array in a Dataset that tells `open` to give it back alone."""
+    dataset = as_dataset(array)
+    dataset.attrs[_KIND] = next(iter(dataset.data_vars))
     return dataset

@@ -35,6 +35,10 @@ _STATE = {
     "flag_meanings": "open contact yielded",
 }
 
+_NO_INTERVAL = {"comment": "NaN where no honest interval can be given"}
+_NO_CENTRE = {"comment": "NaN where an island winds around the whole period"}
+_NO_ISLAND = {"comment": "NaN where the set is empty"}
+
 QUANTITIES: dict[str, Quantity] = {
     # coordinates of the plane and of the paths through it
     "x": Quantity("m", "position along x", {"standard_name": "projection_x_coordinate", "axis": "X"}),
@@ -70,8 +74,8 @@ QUANTITIES: dict[str, Quantity] = {
     "fitted_hurst": Quantity("1", "Hurst exponent as fitted, before it was limited to 0 ... 1"),
     "misfit": Quantity("1", "departure from the model in standard deviations"),
     "standard_error": Quantity("1", "standard error of the Hurst exponent"),
-    "ci_low": Quantity("1", "lower end of the 95 % confidence interval"),
-    "ci_high": Quantity("1", "upper end of the 95 % confidence interval"),
+    "ci_low": Quantity("1", "lower end of the 95 % confidence interval", _NO_INTERVAL),
+    "ci_high": Quantity("1", "upper end of the 95 % confidence interval", _NO_INTERVAL),
     "scale_min": Quantity("m", "smallest scale of the fit"),
     "scale_max": Quantity("m", "largest scale of the fit"),
     "scale_count": Quantity("1", "number of scales in the fit"),
@@ -177,14 +181,18 @@ QUANTITIES: dict[str, Quantity] = {
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
     "lacunarity": Quantity("1", "gliding-box lacunarity"),
     "dust_lacunarity": Quantity("1", "gliding-box lacunarity of a random dust of equal coverage"),
-    "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension"),
-    "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension"),
-    "boundary_dimension_low": Quantity("1", "lower end of the interval of the dimension of the boundary"),
-    "boundary_dimension_high": Quantity("1", "upper end of the interval of the dimension of the boundary"),
+    "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension", _NO_INTERVAL),
+    "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension", _NO_INTERVAL),
+    "boundary_dimension_low": Quantity(
+        "1", "lower end of the interval of the dimension of the boundary", _NO_INTERVAL
+    ),
+    "boundary_dimension_high": Quantity(
+        "1", "upper end of the interval of the dimension of the boundary", _NO_INTERVAL
+    ),
     "area_dimension": Quantity("1", "dimension of the set by its area at several resolutions"),
     "resolution": Quantity("m", "spacing to which the contact is resolved"),
     "boundary_sides": Quantity("1", "number of sides of cells on the boundary of the set"),
-    "largest_share": Quantity("1", "share of the set in its largest island"),
+    "largest_share": Quantity("1", "share of the set in its largest island", _NO_ISLAND),
     "singularity_strength": Quantity("1", "singularity strength alpha(q)"),
     "singularity_spectrum": Quantity("1", "singularity spectrum f(alpha(q))"),
     "boundary_dimension": Quantity("1", "dimension of the boundary of the set"),
@@ -202,8 +210,8 @@ QUANTITIES: dict[str, Quantity] = {
     "area": Quantity("m2", "area of the island"),
     "cells": Quantity("1", "number of cells of the island"),
     "perimeter": Quantity("m", "perimeter of the island"),
-    "centroid_x": Quantity("m", "centroid along x"),
-    "centroid_y": Quantity("m", "centroid along y"),
+    "centroid_x": Quantity("m", "centroid along x", _NO_CENTRE),
+    "centroid_y": Quantity("m", "centroid along y", _NO_CENTRE),
     "x_min": Quantity("m", "western edge of the island"),
     "x_max": Quantity("m", "eastern edge of the island"),
     "y_min": Quantity("m", "southern edge of the island"),

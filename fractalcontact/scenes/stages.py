@@ -13,8 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
 from fractalcontact.scenes.planning import check_loads
@@ -181,11 +184,7 @@ def _surface_work(name: str, scene: Scene, results: Results) -> Work:
 
 
 def _read_face(table: Table, folder: Path) -> xr.Dataset:
-    face = read_surface(table, folder)
-    dataset = face.rename("height").to_dataset()
-    dataset.attrs = {key: face.attrs[key] for key in face.attrs if key not in ("units", "long_name")}
-    dataset["height"].attrs = {key: face.attrs[key] for key in ("long_name", "units") if key in face.attrs}
-    return dataset
+    return as_dataset(read_surface(table, folder).rename("height"))
 
 
 def _dimension_work(name: str, scene: Scene, results: Results) -> Work:
@@ -214,6 +213,8 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     crack = _crack(scene, results)
     if name in ("closure", "elastic_dilatancy") and "hardness" in scene.table("material"):
         options.setdefault("hardness", scene.table("material")["hardness"])
+    if name == "delta_surface" and name not in scene.wanted("joints"):
+        options["shear"] = np.max(options["shear"])  # the figures draw the last one
     if name == "closure":
         return _closure_work(crack, options, scene.table("joint").get("closure", {}), stage.keep)
     if name == "elastic_dilatancy":
@@ -241,7 +242,7 @@ def _upper_face(table: Table, folder: Path, lower: xr.Dataset, registers: bool) 
     face = read_surface(table, folder)
     if registers:
         return _call("joints", "register", lower["height"], face)
-    return face.rename("height").to_dataset()
+    return as_dataset(face.rename("height"))
 
 
 def _domain_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
@@ -258,10 +259,9 @@ def _crack(scene: Scene, results: Results) -> Crack:
 
 
 def _crack_options(scene: Scene) -> dict[str, Any]:
-    options = {key: value for key, value in scene.table("material").items() if key != "hardness"}
-    if "block" in scene.table("joint"):
-        options["block"] = scene.table("joint")["block"]
-    return options
+    material, joint = scene.table("material"), scene.table("joint")
+    options = {key: material[key] for key in ("young", "poisson", "basic_friction_angle") if key in material}
+    return options | ({"block": joint["block"]} if "block" in joint else {})
 
 
 def _height(results: Results) -> xr.DataArray:
@@ -273,6 +273,4 @@ def _call(room: str, function: str, *arguments: Any, **options: Any) -> Any:
     import importlib
 
     result = getattr(importlib.import_module(f"fractalcontact.{room}"), function)(*arguments, **options)
-    return (
-        result.to_dataset() if hasattr(result, "to_dataset") and not hasattr(result, "data_vars") else result
-    )
+    return result if hasattr(result, "data_vars") else as_dataset(result)

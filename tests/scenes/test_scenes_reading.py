@@ -1,34 +1,10 @@
 """Scenes: what is right is read, what is wrong is named, all at once."""
 
-import os
-import subprocess
-import sys
-
 import pytest
+from study import SOUND, command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-
-SOUND = """
-title = "a small study"
-[surface]
-generate = "spectral"
-shape = [48, 48]
-spacing = 1e-4
-hurst = 0.8
-rms_height = 2e-5
-rng = 5
-[material]
-young = 30e9
-poisson = 0.2
-[joint]
-block = 2.4e-3
-direction = "W"
-shear = [1e-4, 4e-4]
-normal_force = [1.0, 10.0]
-[want]
-joints = ["closure", "rigid_dilatancy"]
-"""
 
 
 @pytest.fixture
@@ -77,8 +53,8 @@ def test_everything_wrong_is_listed_at_once(write):
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
-        ('generate = "spectral"', 'generate = "magic"', "magic"),
-        ('generate = "spectral"', 'generate = "spectral"\nread = "x.npy"', "one of `read`"),
+        ('generate = "fbm"', 'generate = "magic"', "magic"),
+        ('generate = "fbm"', 'generate = "fbm"\nread = "x.npy"', "one of `read`"),
         ("[want]", "[wants]", "did you mean 'want'"),
         ("[material]", "[material]\nyong = 1.0", "did you mean 'young'"),
         ("young = 30e9", "", "material.young"),
@@ -144,14 +120,3 @@ def test_the_plan_is_printed_and_nothing_runs(write, tmp_path):
     assert done.returncode == 0
     assert "joints/closure" in done.stdout
     assert not (tmp_path / "out").exists()
-
-
-def command(*words):
-    environment = {key: value for key, value in os.environ.items() if key != "NO_SUCH_VARIABLE"}
-    return subprocess.run(
-        [sys.executable, "-m", "fractalcontact", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=environment,
-    )
