@@ -19,6 +19,7 @@ _ROUNDING = 1e-26  # share of the mean square that transforms lose
 _PERIODIC = "all modes of the band: cut-offs and plateau found from the spectrum"
 _FAMILY = "periodic family: power law between cut-offs"
 _FREE = "all modes that vary along both axes"
+_SMOOTHED = "the fitted noise is below zero and told as 0: there is none, or short waves were smoothed away"
 _ASKED = "asked for"
 
 
@@ -51,6 +52,7 @@ def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
         )
     fit, estimate = fitted(modes, pilot, noise)
     as_free = "a periodic face with gaps is taken as free" if all(face.grid.periodic) else ""
+    smooth = _SMOOTHED if noise and fit.noise < 0 else ""
     return replace(
         estimate,
         scale_min=float(lengths[chosen].min()),
@@ -58,7 +60,7 @@ def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
         increment=_increment(fit) * face.unit,
         noise=float(np.sqrt(max(fit.noise, 0.0))) * face.unit if noise else np.nan,
         window=_FREE if scales is None else _ASKED,
-        note="; ".join(part for part in (as_free, estimate.note) if part),
+        note="; ".join(part for part in (as_free, smooth, estimate.note) if part),
     )
 
 
@@ -81,7 +83,9 @@ def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
         increment=float(np.sqrt(np.mean(step * step))) * face.unit,
         noise=float(np.sqrt(max(fit.noise / cell, 0.0))) * face.unit if noise else np.nan,
         window=_PERIODIC if scales is None else _ASKED,
-        note="; ".join(part for part in (_FAMILY, estimate.note) if part),
+        note="; ".join(
+            part for part in (_FAMILY, _SMOOTHED if noise and fit.noise < 0 else "", estimate.note) if part
+        ),
     )
 
 

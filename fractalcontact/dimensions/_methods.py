@@ -63,14 +63,18 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
             f"increments over at least two of the lags 1, 2 and 4 times {step * dx:g} m are needed"
         )
     reason = _not_fractional(face, noise)
-    low, high = normal_interval(found.hurst, found.standard_error) if not reason else (np.nan, np.nan)
+    error = np.nan if reason else found.standard_error * found.strain
+    low, high = normal_interval(found.hurst, error)
     return Estimate(
         found.hurst,
-        np.nan if reason else found.standard_error,
+        error,
         low,
         high,
         increment=found.increment,
         not_given=reason,
+        note="the lags disagree on the exponent, and the interval is widened by it"
+        if found.strain > 1.0
+        else "",
         **window,  # type: ignore[arg-type]
     )
 

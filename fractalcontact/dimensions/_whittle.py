@@ -21,7 +21,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Model = Callable[[float], Array]
 
 LOWEST, HIGHEST = 1e-4, 1.9  # where the exponent of the lattice covariance makes sense
+_BEYOND = 1.97  # nodes stay below
 _WIDTH = 0.06  # half the distance of the nodes, in ln H: interpolation is then good to 1e-5
+_WIDE = 0.24  # the same while the search is far from its end
 _ROUNDS, _STEPS = 40, 60
 
 
@@ -140,17 +142,20 @@ def fit(
     """
     half = 0.5 if weights is None else 0.5 * weights
     position = float(np.log(np.clip(start, 0.01, 1.5)))
-    done = False
+    width, done = _WIDTH, False
     for _ in range(_ROUNDS):
-        local = _Local.around(model, gaps, position, _WIDTH, white_excess)
-        x, noise, done = _climb(local, power, noise, half)
-        moved = position + x * _WIDTH
+        width = min(width, np.log(_BEYOND) - position)
+        local = _Local.around(model, gaps, position, width, white_excess)
+        x, noise, inside = _climb(local, power, noise, half)
+        moved = position + x * width
         position = float(np.clip(moved, np.log(LOWEST), np.log(HIGHEST)))
+        done = inside and width <= _WIDTH
         if done or position != moved:
             break
+        width = _WIDTH if inside else _WIDE
     total, columns, means = local.at(x, noise)
     hurst = float(np.exp(position))
-    scale = np.array([1.0, 1.0 / (_WIDTH * hurst), 1.0])[: len(columns)]
+    scale = np.array([1.0, 1.0 / (width * hurst), 1.0])[: len(columns)]
     columns, means = columns * scale[:, None], means * scale[:, None]
     information = (half * columns) @ columns.T
     amplitude = _amplitude(power, total, means, half)

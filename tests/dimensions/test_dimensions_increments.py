@@ -138,3 +138,14 @@ def test_standard_error_is_near_the_least_possible():
 def test_constant_heights_give_no_exponent():
     found = _increments.closed_form(_increments.moments([(np.ones((9, 9)), 9)], (9, 9)), (1.0, 1.0))
     assert np.isnan(found.hurst)
+
+
+def test_lags_that_disagree_widen_the_interval():
+    means = np.tile([1.0, 4.0**0.6, 16.0**0.6], 4)
+    means[[3, 4, 5, 9, 10, 11]] *= 4 - 4**0.6
+    counts = np.full(12, 4096)
+    agreed = _increments.closed_form(_increments.Moments(means, counts, (64, 64), 1, None), (1.0, 1.0))
+    assert agreed.strain == 1.0
+    means[[5, 11]] *= 1.5  # as if noise or smoothing had changed the longest lag
+    bent = _increments.closed_form(_increments.Moments(means, counts, (64, 64), 1, None), (1.0, 1.0))
+    assert bent.strain > 3.0
