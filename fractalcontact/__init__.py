@@ -16,17 +16,4 @@ import lazy_loader
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submodules=[
-        "accuracy",
-        "contact",
-        "dimensions",
-        "domains",
-        "joints",
-        "plotting",
-        "scenes",
-        "surfaces",
-    ],
-    submod_attrs={"base.netcdf": ["open", "save"]},
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,11 +7,4 @@ measure    true error against run time of the methods, over their own knobs
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "catalogue": ["Case", "cases"],
-        "examination": ["examine"],
-        "measuring": ["measure"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

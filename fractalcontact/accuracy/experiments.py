@@ -177,7 +177,7 @@ def _press_sphere(options: dict[str, Any], face: xr.DataArray) -> float:
 
 
 def _hertz_error(force: float, _: float) -> float:
-    return abs(force / (4.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5) - 1.0)
+    return float(abs(force / (4.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5) - 1.0))
 
 
 def _wave(n: float) -> xr.DataArray:

@@ -110,7 +110,7 @@ def _measured(name: str, part: Any, share: float) -> xr.Dataset:
             "NaN: not a setting of this method, or its share of the budget was spent"
         )
     dataset["error"].attrs.update(knob=part.knob, error=part.error, truth=part.truth)
-    facts = {"share": share}
+    facts: dict[str, Any] = {"share": share}
     return stamp(dataset, WHERE, {"part": name}, title=f"Error against run time: {name}", **facts)
 
 

@@ -9,11 +9,4 @@ per closure of the same block with perfectly mating faces.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "modulus": ["effective_modulus"],
-        "pressing": ["press"],
-        "flat_block": ["flat_stiffness"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

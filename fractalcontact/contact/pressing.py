@@ -32,9 +32,9 @@ def press(
     surface: xr.DataArray,
     *,
     contact_modulus: float,
-    closure: float | Sequence[float] | None = None,
-    normal_force: float | Sequence[float] | None = None,
-    nominal_pressure: float | Sequence[float] | None = None,
+    closure: float | Sequence[float] | Array | None = None,
+    normal_force: float | Sequence[float] | Array | None = None,
+    nominal_pressure: float | Sequence[float] | Array | None = None,
     boundary: str | None = None,
     influence: str | None = None,
     disc_radius: str | float = "second_order",
@@ -127,7 +127,7 @@ def press(
             maps[name].append(_state(step) if name == "state" else getattr(step, name))
     result = _dataset(surface, plan, measures, maps)
     _warn(result)
-    facts = {
+    facts: dict[str, Any] = {
         "boundary": "periodic" if plan.path.body.periodic else "free",
         "influence": plan.path.body.influence,
         "achieved_residual": float(result["residual"].max()),

@@ -16,18 +16,4 @@ surface of Hurst exponent H has the dimension 3 - H, its profiles 2 - H.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "curves": [
-            "covering",
-            "cube_counts",
-            "madogram",
-            "roughness_length",
-            "second_variogram",
-            "spectrum",
-            "variogram",
-        ],
-        "estimating": ["estimate", "methods"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,17 +7,4 @@ function. Start with `describe`, which gives every scalar at once.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "counting": ["box_counts", "box_dimension"],
-        "crossing": ["percolation"],
-        "edges": ["boundary_dimension"],
-        "gliding": ["lacunarity"],
-        "labelling": ["islands"],
-        "lineage": ["evolution"],
-        "moments": ["generalised_dimensions"],
-        "resolving": ["area_dimension"],
-        "summary": ["describe"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -18,24 +18,4 @@ Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is 
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "crack": ["Crack"],
-        "sliding": ["delta_surface"],
-        "closing": ["closure"],
-        "opening": ["dilatancy"],
-        "strength": ["friction"],
-        "leakage": ["transmissivity"],
-        "matching": ["register"],
-        "forgetting": ["decorrelation_length"],
-        "empirical": [
-            "PARK_PAULAY",
-            "bandis_closure",
-            "bandis_constants",
-            "barton_bandis_scaled",
-            "barton_choubey_strength",
-            "size_effect",
-        ],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

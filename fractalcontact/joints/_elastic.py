@@ -98,12 +98,13 @@ def _press(crack: Crack, shear: float, towards: Direction, load: Load, where: st
     heights = delta_plane(crack, shear, towards, where)
     surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack, crack.layout))
     boundary = "periodic" if all(crack.layout.periodic) else "free"
+    imposed: dict[str, Any] = {load.control: load.values}
     pressed = press(
         surface,
         contact_modulus=crack.contact_modulus,
         boundary=boundary,
         keep=load.keep,
-        **{load.control: load.values},
+        **imposed,
         **load.solver,
     )
     with Problems(where) as problems:

@@ -14,19 +14,4 @@ part of a larger drawing. `paper_figure` draws the five figures of the founding 
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "relief": ["face", "field"],
-        "roughness": ["dimension_curves", "dimensions"],
-        "closing": ["closure_laws", "contact_area"],
-        "domain_maps": ["contact_domains", "islands", "island_map"],
-        "sliding": ["rigid_dilatancy", "elastic_dilatancy", "friction"],
-        "scheme": ["sliding_scheme"],
-        "lacunar": ["box_dimension", "lacunarity"],
-        "leakage": ["hydraulic_aperture"],
-        "accuracy_curves": ["error_against_time"],
-        "paper": ["paper_figure"],
-        "drawing": ["draw"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

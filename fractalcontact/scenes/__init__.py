@@ -11,11 +11,4 @@ Nothing is computed, imported, compiled or stored that no wanted result needs.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "reading": ["Scene", "load"],
-        "planning": ["plan"],
-        "running": ["run"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

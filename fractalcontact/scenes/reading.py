@@ -173,7 +173,7 @@ def _check_stages(
     table: Table,
     name: str,
     common: tuple[str, ...],
-    stages: Mapping[str, tuple[str, ...]],
+    stages: Mapping[str, str],
     problems: Problems,
 ) -> None:
     tables = {key: value for key, value in table.items() if isinstance(value, dict) and key in stages}

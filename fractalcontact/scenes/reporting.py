@@ -90,7 +90,7 @@ def _group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
         node: Any = tree[path]
     except KeyError:
         return None
-    return node.to_dataset() if node.has_data else None  # type: ignore[no-any-return]
+    return node.to_dataset() if node.has_data else None
 
 
 def _dimensions(tree: xr.DataTree) -> str:

@@ -146,7 +146,8 @@ def read_surface(table: Table, folder: Path) -> xr.DataArray:
 
     options = {key: value for key, value in table.items() if key not in ("level", "fill")}
     if "generate" in options:
-        face = getattr(surfaces, options.pop("generate"))(**options)
+        generate: Callable[..., xr.DataArray] = getattr(surfaces, options.pop("generate"))
+        face = generate(**options)
     elif "sample" in options:
         face = surfaces.sample(options.pop("sample"))
     else:
@@ -268,9 +269,13 @@ def _height(results: Results) -> xr.DataArray:
     return results["surfaces"]["height"]
 
 
-def _call(room: str, function: str, *arguments: Any, **options: Any) -> Any:
+def _call(room: str, function: str, *arguments: Any, **options: Any) -> xr.Dataset:
     """Call a public function of a room, by name, so that a part can be sent to another process."""
     import importlib
 
-    result = getattr(importlib.import_module(f"fractalcontact.{room}"), function)(*arguments, **options)
-    return result if hasattr(result, "data_vars") else as_dataset(result)
+    import xarray as xr
+
+    public: Callable[..., xr.Dataset | xr.DataArray]
+    public = getattr(importlib.import_module(f"fractalcontact.{room}"), function)
+    result = public(*arguments, **options)
+    return as_dataset(result) if isinstance(result, xr.DataArray) else result

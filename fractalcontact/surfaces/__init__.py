@@ -16,16 +16,4 @@ A surface is a DataArray `height` with dims (y, x), in metres, heights up, x and
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "brownian": ["fbm"],
-        "displacement": ["midpoint"],
-        "measured": ["from_array", "read"],
-        "preparing": ["fill", "level"],
-        "samples": ["sample"],
-        "statistics": ["describe"],
-        "synthesis": ["spectral"],
-        "waves": ["weierstrass"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

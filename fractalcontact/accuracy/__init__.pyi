@@ -1,0 +1,11 @@
+from .catalogue import Case as Case
+from .catalogue import cases as cases
+from .examination import examine as examine
+from .measuring import measure as measure
+
+__all__ = [
+    "Case",
+    "cases",
+    "examine",
+    "measure",
+]

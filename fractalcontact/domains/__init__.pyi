@@ -1,0 +1,23 @@
+from .counting import box_counts as box_counts
+from .counting import box_dimension as box_dimension
+from .crossing import percolation as percolation
+from .edges import boundary_dimension as boundary_dimension
+from .gliding import lacunarity as lacunarity
+from .labelling import islands as islands
+from .lineage import evolution as evolution
+from .moments import generalised_dimensions as generalised_dimensions
+from .resolving import area_dimension as area_dimension
+from .summary import describe as describe
+
+__all__ = [
+    "area_dimension",
+    "boundary_dimension",
+    "box_counts",
+    "box_dimension",
+    "describe",
+    "evolution",
+    "generalised_dimensions",
+    "islands",
+    "lacunarity",
+    "percolation",
+]

@@ -1,0 +1,31 @@
+from .closing import closure as closure
+from .crack import Crack as Crack
+from .empirical import PARK_PAULAY as PARK_PAULAY
+from .empirical import bandis_closure as bandis_closure
+from .empirical import bandis_constants as bandis_constants
+from .empirical import barton_bandis_scaled as barton_bandis_scaled
+from .empirical import barton_choubey_strength as barton_choubey_strength
+from .empirical import size_effect as size_effect
+from .forgetting import decorrelation_length as decorrelation_length
+from .leakage import transmissivity as transmissivity
+from .matching import register as register
+from .opening import dilatancy as dilatancy
+from .sliding import delta_surface as delta_surface
+from .strength import friction as friction
+
+__all__ = [
+    "Crack",
+    "PARK_PAULAY",
+    "bandis_closure",
+    "bandis_constants",
+    "barton_bandis_scaled",
+    "barton_choubey_strength",
+    "closure",
+    "decorrelation_length",
+    "delta_surface",
+    "dilatancy",
+    "friction",
+    "register",
+    "size_effect",
+    "transmissivity",
+]
