@@ -187,3 +187,29 @@ def test_methods_are_listed():
     assert done.returncode == 0
     for name in ("spectrum", "variogram", "cube_counts"):
         assert name in done.stdout
+
+
+def test_parts_can_run_elsewhere(tmp_path):
+    import pickle
+
+    class Worker:
+        """Takes parts as a cluster does: as bytes."""
+
+        sent = 0
+
+        def submit(self, part, pure):
+            Worker.sent += 1
+            result = pickle.loads(pickle.dumps(part))()
+
+            class Future:
+                def result(self):
+                    return result
+
+            return Future()
+
+    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
+    here = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    there = fc.scenes.run(tmp_path / "study.toml", progress=False, client=Worker())
+    assert Worker.sent == 2
+    for name in ("closure", "contact_fraction", "normal_force"):
+        np.testing.assert_array_equal(here["joints/closure"][name], there["joints/closure"][name])
