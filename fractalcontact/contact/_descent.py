@@ -29,7 +29,7 @@ import numpy as np
 from fractalcontact.base.jit import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._problem import Solution
+from fractalcontact.contact._problem import Control, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -38,32 +38,21 @@ FEW = 0.003
 GREATEST_ITERATIONS = 2000
 PATIENCE = 40  # iterations without progress
 HALVINGS = 20
-
-
-@dataclass(frozen=True)
-class Control:
-    """What is imposed: the sum of the pressure (force), or the closure."""
-
-    total: float | None = None
-    closure: float | None = None
-
-    @property
-    def value(self) -> float:
-        """The imposed number."""
-        return float(self.total if self.total is not None else self.closure or 0.0)
+CAPPINGS = 50
 
 
 @dataclass
 class Balance:
     """Sums over the current pressure."""
 
-    force: float
-    work: float
-    height: float
+    force: float  # sum p
+    work: float  # sum p u
+    height: float  # sum p gap
     closure: float
-    scale: float
+    scale: float  # of the error, a length
     objective: float
-    noise: float
+    noise: float  # rounding of the objective
+    floor: float  # residual that rounding allows
 
 
 class Conditioner(Protocol):
@@ -133,17 +122,12 @@ class Descent:
                     break
                 self.refresh()
                 continue
-            if residual < 0.9 * best:
-                best, stale = residual, 0
-            stale += 1
-            if stale > PATIENCE:
-                reason = "stagnated"
+            best, stale = (residual, 0) if residual < 0.9 * best else (best, stale + 1)
+            rounded = residual <= balance.floor
+            if stale > (PATIENCE // 8 if rounded else PATIENCE) or not self.turn(balance, inner, outer):
+                reason = "rounding" if rounded else "stagnated"
                 break
-            if not self.turn(balance, inner, outer) or not self.advance():
-                if self.fresh:
-                    reason = "stagnated"
-                    break
-                self.refresh()
+            self.advance()
         if not self.fresh and certify:
             self.refresh()
             balance = self.weigh()
@@ -185,22 +169,18 @@ class Descent:
         self.fresh = True
 
     def restore_force(self, force: float, capped: float) -> None:
-        """Scale the pressures until their sum is what is wanted; those at the cap stay while they can."""
+        """Scale the pressures below the cap until their sum is what is wanted."""
         wanted = float(self.control.total or 0.0)
-        for _ in range(50):
-            if abs(force - wanted) <= self.precise * wanted or force <= 0:
+        for _ in range(CAPPINGS):
+            if abs(force - wanted) <= self.precise * wanted:
+                return
+            if not capped < min(wanted, force):
                 break
-            if capped >= wanted:  # too much is at the cap: all of it comes down
-                self.p *= self.kind(wanted / force)
-                factor = 1.0
-            elif capped >= force:  # nothing is left below the cap: the rest is spread over all nodes
-                np.minimum(self.p + self.kind((wanted - force) / self.size), self.cap, out=self.p)
-                factor = 1.0
-            else:
-                factor = (wanted - capped) / (force - capped)
-            force, capped = self.run(_kernels.rescale, self.p, self.kind(factor), self.cap)[:2]
-            if not np.isfinite(self.cap):
-                break
+            factor = self.kind((wanted - capped) / (force - capped))
+            force, capped = self.run(_kernels.rescale, self.p, factor, self.cap)[:2]
+            if self.cap == np.inf:
+                return
+        self.p[...] = lowest(self.u + self.gap, wanted, float(self.cap))
 
     def weigh(self) -> Balance:
         """Closure, objective and the scale of the error."""
@@ -213,7 +193,8 @@ class Descent:
             objective = 0.5 * work + height
         scale = max(work / force if force > 0 else 0.0, force * self.local)
         noise = 8 * self.precise * (abs(work) + abs(height) + abs(closure) * force)
-        return Balance(force, work, height, closure, scale, objective, noise)
+        floor = 64 * self.precise * abs(closure) / scale if scale > 0 else 0.0
+        return Balance(force, work, height, closure, scale, objective, noise, floor)
 
     def saturated_closure(self) -> float:
         """Least closure at which every loaded node is at the cap."""
@@ -259,7 +240,7 @@ class Descent:
         if not forced and along > 0:
             # full contact of a periodic body costs nothing to relieve: no further than to no force at all
             relieved = float(np.sum(np.sum(self.t, axis=1, dtype=np.float64)))
-            self.step = min(self.step, balance.force / relieved if relieved > 0 else np.inf)
+            self.step = min(self.step, 1.01 * balance.force / relieved if relieved > 0 else np.inf)
         return self.step < np.inf
 
     def uniform(self, gap: float) -> float:
@@ -270,20 +251,32 @@ class Descent:
         settled = self.precondition.mean_settlement()
         return gap / settled if settled > 0 else 0.0
 
-    def advance(self) -> bool:
-        """Take the step; False where nothing moved."""
+    def advance(self) -> None:
+        """Take the step, cut to the bounds."""
         self.p, self.old = self.old, self.p
         step = self.kind(self.step)
+        if self.control.total is not None and self.cap < np.inf:
+            self.advance_capped(self.control.total)
+            return
         clipped, force, capped = self.run(_kernels.advance, self.old, self.t, step, self.cap, self.p)[:3]
         self.clipped = clipped > 0
         if not self.clipped:
             in_bands(_kernels.follow, self.blocks, self.size, self.rows, self.u, self.r, step)
             self.fresh = False
-            return True
+            return
         if self.control.total is not None:
             self.restore_force(force, capped)
         self.refresh()
-        return True
+
+    def advance_capped(self, wanted: float) -> None:
+        """Take the step under a cap, keeping the force: what is cut off is shared by the free set."""
+        free = self.precondition.mask[: self.gap.shape[0], : self.gap.shape[1]]
+        np.copyto(self.p, self.old)
+        values = self.old[free] - self.step * self.t[free].astype(np.float64)
+        rest = float(np.sum(np.sum(np.where(free, 0, self.old), axis=1, dtype=np.float64)))
+        self.p[free] = shifted(values, wanted - rest, float(self.cap))
+        self.clipped = True
+        self.refresh()
 
     def halve(self, control: Control) -> None:
         """Go back half of the last step, because it went too far."""
@@ -292,3 +285,27 @@ class Descent:
         self.p, self.old = self.old, self.p
         self.curvature = 0.0
         self.advance()
+
+
+def lowest(level: Array, wanted: float, cap: float) -> Array:
+    """Even pressure on the lowest nodes, as many as can carry what is wanted with some to spare."""
+    enough = min(level.size, int(np.ceil(1.1 * wanted / cap)))
+    pressure = np.zeros(level.shape)
+    pressure.ravel()[np.argpartition(level.ravel(), enough - 1)[:enough]] = wanted / enough
+    return pressure
+
+
+def shifted(values: Array, wanted: float, cap: float) -> Array:
+    """Shift values by one amount so that, cut to 0 .. cap, they add up to what is wanted."""
+    low, high, shift = float(values.min()) - cap, float(values.max()), 0.0
+    for _ in range(200):
+        moved = np.clip(values - shift, 0.0, cap)
+        excess = float(np.sum(moved)) - wanted
+        low, high = (shift, high) if excess > 0 else (low, shift)
+        slack = int(np.count_nonzero((moved > 0) & (moved < cap)))
+        better = shift + excess / slack if slack else np.inf
+        better = better if low < better < high else 0.5 * (low + high)
+        if better == shift or abs(excess) <= 1e-15 * wanted:
+            break
+        shift = better
+    return moved

@@ -23,7 +23,7 @@ from scipy.linalg import solve as solve_dense
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.contact._optimality import residual
-from fractalcontact.contact._problem import Problem, Solution
+from fractalcontact.contact._problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -156,19 +156,29 @@ def check_size(nodes: int) -> None:
         )
 
 
-def solve(problem: Problem, dense: Dense, *, total: float | None, closure: float | None) -> Solution:
-    """Solve one step by elimination; exactly one of `total` (sum of pressure) and `closure` is given."""
-    balance = solve_force(dense, total) if total is not None else solve_closure(dense, float(closure or 0.0))
-    pressure = np.zeros(dense.gap.size)
-    pressure[balance.nodes] = balance.pressure
-    settlement = dense.settlement(balance.nodes, balance.pressure)
-    gap = dense.gap + settlement - balance.closure
-    shape = problem.body.shape
-    return Solution(
-        pressure=pressure.reshape(shape),
-        settlement=settlement.reshape(shape),
-        closure=balance.closure,
-        total=float(balance.pressure.sum()),
-        iterations=balance.rounds,
-        residual=residual(pressure, settlement, gap, problem.body.spacing),
-    )
+class Elimination:
+    """The method on one problem; each step starts anew."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.dense = problem, Dense(problem)
+
+    def step(self, control: Control) -> Solution:
+        """Solve one step of a path."""
+        dense = self.dense
+        if control.total is not None:
+            balance = solve_force(dense, control.total)
+        else:
+            balance = solve_closure(dense, control.value)
+        pressure = np.zeros(dense.gap.size)
+        pressure[balance.nodes] = balance.pressure
+        settlement = dense.settlement(balance.nodes, balance.pressure)
+        gap = dense.gap + settlement - balance.closure
+        shape = self.problem.body.shape
+        return Solution(
+            pressure=pressure.reshape(shape),
+            settlement=settlement.reshape(shape),
+            closure=balance.closure,
+            total=float(balance.pressure.sum()),
+            iterations=balance.rounds,
+            residual=residual(pressure, settlement, gap, self.problem.body.spacing),
+        )

@@ -14,14 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.contact._descent import Control, Descent
+from fractalcontact.contact._descent import Descent
 from fractalcontact.contact._nested import cold_start, plane_descent
 from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
 from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._problem import Problem, Solution
+from fractalcontact.contact._problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
+WHOLE_PLANE = (slice(None), slice(None))
 
 SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
 SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
@@ -61,7 +62,7 @@ class Fast:
         """Solve one step of the path."""
         self.spent = (0, 0)
         if self.problem.body.periodic:
-            solution = self.on_plane(control, (slice(None), slice(None)), self.guess(control))
+            solution = self.on_plane(control, WHOLE_PLANE, self.guess(control))
         else:
             solution = self.on_nodes(control) or self.on_window(control)
         self.known = [*self.known[-1:], (control.value, solution.closure, solution.pressure)]
@@ -103,7 +104,7 @@ class Fast:
         start = self.guess(control)
         while 0 < count <= FEW_NODES:
             chosen = np.flatnonzero(self.problem.gap.ravel() <= self.ordered[count - 1])
-            if chosen.size > FEW_NODES:  # a plateau
+            if chosen.size > FEW_NODES or not self.bears(chosen.size, control):  # a plateau, or too few
                 break
             solution = self.count(self.solve_nodes(chosen, control, start, TRIAL))
             start = self.embedded_pressure(solution, chosen)
@@ -113,6 +114,10 @@ class Fast:
                 return self.everywhere(replace(solution, pressure=self.embedded_pressure(solution, chosen)))
             count = min(needed, 4 * chosen.size)
         return None
+
+    def bears(self, nodes: int, control: Control) -> bool:
+        """Whether so many nodes can carry the force under the cap, with some to spare."""
+        return control.total is None or nodes * self.problem.cap > 2 * control.total
 
     def first_count(self, control: Control) -> int:
         """Number of candidates to begin with."""
@@ -158,9 +163,11 @@ class Fast:
             start, expected = cold_start(self.problem, control, np.float64)
             closure = expected if closure is None else closure
         window = self.window(ROOM * float(closure or 0.0))
+        if not self.bears(self.problem.gap[window].size, control):
+            window = WHOLE_PLANE
         while True:
             solution = self.on_plane(control, window, start)
-            if window == (slice(None), slice(None)):
+            if window == WHOLE_PLANE:
                 return solution
             outside = np.ones(self.problem.body.shape, dtype=bool)
             outside[window] = False
@@ -181,7 +188,7 @@ class Fast:
             box.append(slice(first // step * step, min(n, -(-last // step) * step)))
         size = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
         if size > WHOLE * near.size or min(s.stop - s.start for s in box) < 3:
-            return slice(None), slice(None)
+            return WHOLE_PLANE
         return box[0], box[1]
 
     def on_plane(self, control: Control, window: Window, start: Array | None) -> Solution:

@@ -12,9 +12,9 @@ import numpy as np
 
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
-from fractalcontact.contact._descent import Control, Descent
+from fractalcontact.contact._descent import Descent
 from fractalcontact.contact._precondition import Preconditioner
-from fractalcontact.contact._problem import Body, Problem
+from fractalcontact.contact._problem import Body, Control, Problem
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -26,7 +26,9 @@ def cold_start(problem: Problem, control: Control, kind: Any) -> tuple[Array, fl
     """Pressure to start from on the grid of `problem`, and about which closure to expect."""
     factors = tuple(2 if n >= 2 * SMALLEST else 1 for n in problem.body.shape)
     if factors == (1, 1):
-        return np.ones(problem.body.shape, dtype=kind), float(problem.gap.max())
+        if control.closure is None:
+            return np.ones(problem.body.shape, dtype=kind), float(problem.gap.max())
+        return np.maximum(control.closure - problem.gap, 0.0).astype(kind), control.closure
     coarse = coarser(problem, factors)
     share = coarse.gap.size / problem.gap.size
     fewer = Control(None if control.total is None else control.total * share, control.closure)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.contact._flat import flat_block
-from fractalcontact.contact._problem import Body, Problem, Solution, serial_mean, serial_sum
+from fractalcontact.contact._problem import Body, Control, Problem, Solution, serial_sum
 from fractalcontact.contact._setup import Units
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
+Solver = Callable[[Control], Solution]
 
 BALANCE = 1e-6  # greatest share of a given force that the pressures may miss
 
@@ -83,21 +83,19 @@ class Step:
 
 def solve_path(path: Path) -> Iterator[Step]:
     """Yield the steps of a path as they are solved."""
-    solver = _rough_steps if path.gap.any() else _flat_steps
-    yield from solver(path)
-
-
-def _rough_steps(path: Path) -> Iterator[Step]:
     problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
-    advance = _eliminator(problem) if path.method == "elimination" else _descender(problem, path.tolerance)
+    flat = not path.gap.any()
+    solver: Solver | None = None
     for value in path.values:
         begun = perf_counter()
+        control = _control(path, value)
         if value == 0:
             solution = _touching(problem)
-        elif path.control == "closure":
-            solution = advance(None, value / path.units.height)
+        elif flat and _bears(problem, _flat(path, value)):
+            solution = _flat(path, value)
         else:
-            solution = advance(value / path.units.force, None)
+            solver = solver or _solver(problem, path)
+            solution = solver(control)
         carried = solution.total * path.units.force
         force = carried if path.control == "closure" else value
         if abs(carried - force) > BALANCE * force:
@@ -106,48 +104,48 @@ def _rough_steps(path: Path) -> Iterator[Step]:
         yield Step(solution, problem, path.units, force, perf_counter() - begun, converged)
 
 
-def _flat_steps(path: Path) -> Iterator[Step]:
-    """A face of zero range: closure = force / stiffness, with the stiffness of `flat_stiffness`."""
-    problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
-    stiffness = _stiffness(path)
-    for value in path.values:
-        begun = perf_counter()
-        force = value * stiffness if path.control == "closure" else value
-        total = force / path.units.force
-        flat = flat_block(path.body)
-        closure = (value if path.control == "closure" else force / stiffness) / path.units.height
-        solution = Solution(
-            flat.pressure * total,
-            flat.settlement * total,
-            closure,
-            total,
-            flat.iterations,
-            flat.transforms,
-            flat.residual,
-        )
-        yield Step(solution, problem, path.units, force, perf_counter() - begun, True)
-
-
-def _stiffness(path: Path) -> float:
-    compliance = flat_block(path.body).compliance
-    return path.units.modulus * path.units.length * path.body.cell_area / compliance if compliance else np.inf
+def _control(path: Path, value: float) -> Control:
+    if path.control == "closure":
+        return Control(closure=value / path.units.height)
+    return Control(total=value / path.units.force)
 
 
 def _touching(problem: Problem) -> Solution:
+    """First touch: no pressure anywhere."""
     nothing = np.zeros(problem.body.shape)
     return Solution(nothing, nothing, 0.0, 0.0)
 
 
-def _eliminator(problem: Problem):  # type: ignore[no-untyped-def]
-    from fractalcontact.contact import _elimination
+def _flat(path: Path, value: float) -> Solution:
+    """A face of zero range: closure = force / stiffness, with the stiffness of `flat_stiffness`."""
+    block = flat_block(path.body)
+    stiffness = np.inf
+    if block.compliance > 0:
+        stiffness = path.units.modulus * path.units.length * path.body.cell_area / block.compliance
+    force, closure = (value * stiffness, value) if path.control == "closure" else (value, value / stiffness)
+    total = force / path.units.force
+    return Solution(
+        block.pressure * total,
+        block.settlement * total,
+        closure / path.units.height,
+        total,
+        block.iterations,
+        block.transforms,
+        block.residual,
+    )
 
-    dense = _elimination.Dense(problem)
-    return lambda total, closure: _elimination.solve(problem, dense, total=total, closure=closure)
+
+def _bears(problem: Problem, solution: Solution) -> bool:
+    """Whether no node would yield."""
+    return bool(solution.pressure.max() <= problem.cap)
 
 
-def _descender(problem: Problem, tolerance: float):  # type: ignore[no-untyped-def]
-    from fractalcontact.contact._descent import Control
+def _solver(problem: Problem, path: Path) -> Solver:
+    """Return the method asked for, ready to be called step after step."""
+    if path.method == "elimination":
+        from fractalcontact.contact._elimination import Elimination
+
+        return Elimination(problem).step
     from fractalcontact.contact._fast import Fast
 
-    fast = Fast(problem, tolerance)
-    return lambda total, closure: fast.step(Control(total, closure))
+    return Fast(problem, path.tolerance).step

@@ -59,11 +59,14 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
         return _nothing(grid)
     heights = np.asarray(call["surface"].values, dtype=np.float64)
     gap = heights.max() - heights
-    unit = power_of_two(float(gap.max()))
-    units = Units(length_unit((grid.spacing[0], grid.spacing[1])), unit, modulus, body.cell_area)
-    gap /= unit
     if control == "nominal_pressure":
         control, values = "normal_force", values * grid.nominal_area
+    length = length_unit((grid.spacing[0], grid.spacing[1]))
+    height = float(gap.max())
+    if height == 0:  # flat: the step itself is the only height there is
+        height = float(values.max()) if control == "closure" else float(values.max()) / modulus / length
+    units = Units(length, power_of_two(height), modulus, body.cell_area)
+    gap /= units.height
     path = Path(body, units, gap, control, tuple(float(v) for v in values), hardness, tolerance, method)
     _limits(path, grid, problems)
     return Plan(grid, path, tuple(keep))

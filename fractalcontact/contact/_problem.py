@@ -61,6 +61,19 @@ class Problem:
         return float(np.sqrt(self.body.spacing[0] * self.body.spacing[1])) / self.gap.size
 
 
+@dataclass(frozen=True)
+class Control:
+    """What is imposed: the sum of the pressure (force), or the closure."""
+
+    total: float | None = None
+    closure: float | None = None
+
+    @property
+    def value(self) -> float:
+        """The imposed number."""
+        return float(self.total if self.total is not None else self.closure or 0.0)
+
+
 @dataclass
 class Solution:
     """State of one step, scaled."""
