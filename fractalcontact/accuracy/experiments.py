@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from fractalcontact.accuracy.measuring import Experiment
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +15,30 @@ if TYPE_CHECKING:
 MODULUS, RADIUS, APPROACH = 1e9, 1.0, 1e-4  # the sphere of Hertz: Pa, m, m
 HURST, MEMBERS = 0.7, 8
 RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One method, turned up along its knob.
+
+    Attributes
+    ----------
+    method : str
+    knobs : sequence of float
+        Settings in the order of growing cost.
+    prepare : callable
+        Knob to the input, untimed.
+    solve : callable
+        Input to the result, timed.
+    error : callable
+        Result and knob to the true error.
+    """
+
+    method: str
+    knobs: Sequence[float]
+    prepare: Callable[[float], Any]
+    solve: Callable[[Any], Any]
+    error: Callable[[Any, float], float]
 
 
 @dataclass(frozen=True)

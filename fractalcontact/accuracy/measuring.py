@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.accuracy import experiments
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
@@ -18,30 +18,6 @@ if TYPE_CHECKING:
 
 WHERE = "fractalcontact.accuracy.measure"
 REPEATS = 3
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """One method, turned up along its knob.
-
-    Attributes
-    ----------
-    method : str
-    knobs : sequence of float
-        Settings in the order of growing cost.
-    prepare : callable
-        Knob to the input, untimed.
-    solve : callable
-        Input to the result, timed.
-    error : callable
-        Result and knob to the true error.
-    """
-
-    method: str
-    knobs: Sequence[float]
-    prepare: Callable[[float], Any]
-    solve: Callable[[Any], Any]
-    error: Callable[[Any, float], float]
 
 
 def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -> xr.DataTree:
@@ -69,8 +45,6 @@ def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -
     """
     import xarray as xr
 
-    from fractalcontact.accuracy import experiments
-
     with Problems(WHERE) as problems:
         names = (
             tuple(experiments.PARTS) if parts is None else problems.choices("parts", parts, experiments.PARTS)
@@ -85,7 +59,7 @@ def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -
     return tree
 
 
-def _measured(name: str, part: Any, share: float) -> xr.Dataset:
+def _measured(name: str, part: experiments.Part, share: float) -> xr.Dataset:
     import xarray as xr
 
     knobs = sorted({knob for one in part.experiments for knob in one.knobs})
@@ -114,7 +88,7 @@ def _measured(name: str, part: Any, share: float) -> xr.Dataset:
     return stamp(dataset, WHERE, {"part": name}, title=f"Error against run time: {name}", **facts)
 
 
-def _turned_up(experiment: Experiment, share: float) -> dict[float, tuple[float, float, float]]:
+def _turned_up(experiment: experiments.Experiment, share: float) -> dict[float, tuple[float, float, float]]:
     """Return error, least and first run time for every knob that fits into the share of seconds."""
     found: dict[float, tuple[float, float, float]] = {}
     spent, last = 0.0, 0.0
