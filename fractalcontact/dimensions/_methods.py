@@ -91,8 +91,10 @@ class CurveMethod:
     """A straight line through a curve of `_measures` in log-log scale.
 
     `to_hurst` turns slope and number of axes into H; `power` weighs the points by scale^power, or by their
-    counts where it is None; `window` chooses the scales of a face. `levels` tells that the measure does not
-    see a plane; `also` is a note to every estimate.
+    counts where it is None. `octaves` lets every octave of a free face weigh alike: a measured face leaves
+    its power law at the short end first, where most of the modes are; on a periodic one counts are right.
+    `window` chooses the scales of a face. `levels` tells that the measure does not see a plane; `also` is a
+    note to every estimate.
     """
 
     measure: Callable[[Face], _measures.Curve]
@@ -100,6 +102,7 @@ class CurveMethod:
     power: float | None
     window: Callable[[Face], tuple[float, float, str]]
     as_wavelength: bool = False
+    octaves: bool = False
     levels: bool = False
     also: str = ""
 
@@ -116,7 +119,8 @@ class CurveMethod:
         if np.count_nonzero(inside) < 2:
             return undefined(f"fewer than two points of the curve between {low:g} m and {high:g} m")
         x, y = curve.scale[inside], curve.value[inside]
-        weights = curve.count[inside].astype(float) if self.power is None else (x / x[0]) ** self.power
+        power = -1.0 if self.octaves and not all(face.grid.periodic) else self.power
+        weights = curve.count[inside].astype(float) if power is None else (x / x[0]) ** power
         slope = fit_line(x, y / y[0], weights).slope  # a constant curve has slope 0 to the last bit
         return Estimate(
             self.to_hurst(slope, face.axes),
@@ -199,6 +203,7 @@ METHODS: dict[str, Method] = {
             None,
             _wave_window,
             as_wavelength=True,
+            octaves=True,
             levels=True,
         ),
         gaps=False,

@@ -87,7 +87,15 @@ def plan(scene: Scene) -> Plan:
     return Plan(scene.name, tuple(stages))
 
 
-CURVES = ("spectrum", "variogram", "madogram", "cube_counts", "roughness_length", "covering")
+CURVES = (
+    "spectrum",
+    "variogram",
+    "madogram",
+    "second_variogram",
+    "cube_counts",
+    "roughness_length",
+    "covering",
+)
 
 
 def _dimension_stages(scene: Scene) -> list[Stage]:
