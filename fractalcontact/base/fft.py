@@ -25,6 +25,11 @@ def library() -> str:
     return "ducc0" if _ducc0_installed() and os.environ.get("FRACTALCONTACT_FFT", "") != "scipy" else "scipy"
 
 
+def writes_in_place() -> bool:
+    """Whether an `out` saves anything: scipy makes a new array and copies it."""
+    return library() == "ducc0"
+
+
 def fast_length(n: int, *, real: bool = True) -> int:
     """Return the smallest length >= n that transforms fast."""
     return int(scipy.fft.next_fast_len(int(n), real=real))

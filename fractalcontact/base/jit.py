@@ -28,6 +28,18 @@ def kernel(function: F) -> F:
     return compiled
 
 
+def sum_kernel(function: F) -> F:
+    """Compile a serial loop whose sums over a row may be done in lanes: several times as fast.
+
+    The order of the sums is then the compiler's, the same for every call and any number of threads. The
+    arrays must be finite.
+    """
+    compiled: F = numba.njit(
+        cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz", "nnan"}
+    )(function)
+    return compiled
+
+
 def parallel_kernel(function: F) -> F:
     """Compile a loop whose `prange` runs on the threads of `base.threads`.
 

@@ -26,8 +26,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from fractalcontact.base import fft
 from fractalcontact.base.jit import in_bands
 from fractalcontact.contact import _kernels
+from fractalcontact.contact._capped import lowest, shifted
 from fractalcontact.contact._operator import Operator
 from fractalcontact.contact._problem import Control, Solution
 
@@ -61,14 +63,14 @@ class Conditioner(Protocol):
     rows: int
     columns: int
     bins: tuple[int, int]
+    plane: tuple[int, int]
     mask: Array
-    x: Array
     sums: Array
     counts: Array
     transforms: int
 
-    def apply(self) -> tuple[Array, Array]:
-        """Pressure for the gap in x on the set in mask, and what each bin adds to it on the set."""
+    def apply(self, x: Array) -> tuple[Array, Array]:
+        """Pressure for the gap x on the set in mask, and what each bin adds to it on the set."""
         ...
 
     def mean_settlement(self) -> float:
@@ -77,7 +79,7 @@ class Conditioner(Protocol):
 
 
 class Descent:
-    """Buffers and steps of the iteration, in one precision.
+    """The iteration on one set of nodes in one precision, ready to be run.
 
     `gap` (ny, nx) is all or a part of the surface, `local` the scale of the error for unit force.
     """
@@ -85,34 +87,56 @@ class Descent:
     def __init__(
         self, gap: Array, cap: float, operator: Operator, precondition: Conditioner, local: float, kind: Any
     ) -> None:
-        self.kind = kind
         self.gap = np.ascontiguousarray(gap, dtype=kind)
-        self.cap = kind(cap)
-        self.operator, self.precondition, self.local = operator, precondition, local
-        self.rows, self.columns = precondition.rows, precondition.columns
-        self.blocks, self.size = precondition.bins[0], gap.size
-        self.p, self.old, self.t, self.r, self.u = (np.zeros(gap.shape, dtype=kind) for _ in range(5))
-        self.sums = np.zeros((self.blocks, 8))
-        self.precise = float(np.finfo(kind).eps)
-
-    def run(self, function: Any, *arguments: Any) -> Array:
-        """Run a pass over all blocks and add up its sums, block after block."""
-        in_bands(function, self.blocks, self.size, self.rows, *arguments, self.sums)
-        return np.asarray(self.sums.sum(axis=0))
+        self.cap, self.kind, self.local = kind(cap), kind, local
+        self.operator, self.precondition = operator, precondition
 
     def solve(self, start: Array, control: Control, tolerance: float, *, certify: bool = True) -> Solution:
         """Iterate from `start` until the residual is at most `tolerance`.
 
         With `certify` the residual is that of a settlement computed anew from the pressure.
         """
-        self.control = control
-        self.begin(start)
-        best, stale, reason = np.inf, 0, "iteration limit"
-        iteration = 0
-        for iteration in range(GREATEST_ITERATIONS + 1):
+        run = Run(self, start, control)
+        del start
+        return run.solve(tolerance, certify)
+
+
+class Run:
+    """One run: the arrays of the iteration and its steps.
+
+    p pressure, u settlement, t direction. `spare` holds, in turn, the plane of the preconditioner (a free
+    body has a wider one), the settlement under t, and the pressure before a step that was cut: with the gap
+    and the modes inside a transform these are all the arrays there are.
+    """
+
+    def __init__(self, setting: Descent, start: Array, control: Control) -> None:
+        self.gap, self.cap, self.kind, self.local = setting.gap, setting.cap, setting.kind, setting.local
+        self.operator, self.pre, self.control = setting.operator, setting.precondition, control
+        self.forced = control.total is not None
+        self.blocks, self.size = self.pre.bins[0], self.gap.size
+        self.sums = np.zeros((self.blocks, 8))
+        self.precise = float(np.finfo(self.kind).eps)
+        self.begun = self.operator.transforms + self.pre.transforms
+        shape = self.gap.shape
+        self.p, self.t, self.spare = (np.zeros(shape, dtype=self.kind) for _ in range(3))
+        self.wide = None if self.pre.plane == shape else np.zeros(self.pre.plane, dtype=self.kind)
+        self.u = self.p
+        self.last, self.halved, self.clipped, self.product, self.step = np.inf, 0, False, 0.0, 0.0
+        np.clip(start, 0, self.cap, out=self.p, casting="same_kind")
+
+    def run(self, function: Any, *arguments: Any) -> Array:
+        """Run a pass over all blocks and add up its sums, block after block."""
+        in_bands(function, self.blocks, self.size, self.pre.rows, *arguments, self.sums)
+        return np.asarray(self.sums.sum(axis=0))
+
+    def solve(self, tolerance: float, certify: bool) -> Solution:
+        """Iterate."""
+        self.begin()
+        best, stale, iteration, reason = np.inf, 0, 0, "iteration limit"
+        while iteration <= GREATEST_ITERATIONS:
             balance = self.weigh()
             if self.clipped and balance.objective > self.last + balance.noise and self.halved < HALVINGS:
-                self.halve(control)
+                self.halve()
                 continue
             self.last, self.halved, self.clipped = balance.objective, 0, False
             inner, outer, residual = self.inspect(balance)
@@ -128,49 +152,47 @@ class Descent:
                 reason = "rounding" if rounded else "stagnated"
                 break
             self.advance()
+            iteration += 1
         if not self.fresh and certify:
             self.refresh()
             balance = self.weigh()
             residual = self.inspect(balance)[2]
+        spent = self.operator.transforms + self.pre.transforms - self.begun
         return Solution(
-            self.p.astype(np.float64),
-            self.u.astype(np.float64),
+            self.p,
+            self.u,
             balance.closure,
             balance.force,
             iteration,
-            self.operator.transforms + self.precondition.transforms - self.begun,
+            spent,
             residual,
             reason,
+            balance.work,
         )
 
-    def begin(self, start: Array) -> None:
-        """Take a pressure to start from, with the force that is wanted."""
-        self.begun = self.operator.transforms + self.precondition.transforms
-        np.clip(start, 0, self.cap, out=self.p, casting="same_kind")
-        self.last, self.halved, self.clipped, self.curvature, self.step = np.inf, 0, False, 0.0, 0.0
-        if self.control.total is not None:
+    def begin(self) -> None:
+        """Give the first pressure the force that is wanted, or the best multiple under the closure."""
+        if self.forced:
             sums = self.run(_kernels.rescale, self.p, self.kind(1), self.cap)
             self.restore_force(sums[0], sums[1])
+            self.refresh()
+            return
         self.refresh()
-        if self.control.closure is not None:
-            self.scale_start(self.control.closure)
-
-    def scale_start(self, closure: float) -> None:
-        """Scale the first pressure to the best multiple of itself under this closure."""
         force, work, height = self.run(_kernels.weigh, self.gap, self.u, self.p, self.cap)[:3]
-        factor = (closure * force - height) / work if work > 0 else 0.0
+        factor = (self.control.value * force - height) / work if work > 0 else 0.0
         if factor > 0 and float(self.p.max()) * factor < self.cap:
             self.p *= self.kind(factor)
-            self.u = self.u * self.kind(factor)
+            self.u *= self.kind(factor)
 
     def refresh(self) -> None:
         """Settlement of the pressure, anew."""
+        self.u = self.p  # lets go of the old one first
         self.u = self.operator.apply(self.p)
         self.fresh = True
 
     def restore_force(self, force: float, capped: float) -> None:
         """Scale the pressures below the cap until their sum is what is wanted."""
-        wanted = float(self.control.total or 0.0)
+        wanted = self.control.value
         for _ in range(CAPPINGS):
             if abs(force - wanted) <= self.precise * wanted:
                 return
@@ -180,17 +202,18 @@ class Descent:
             force, capped = self.run(_kernels.rescale, self.p, factor, self.cap)[:2]
             if self.cap == np.inf:
                 return
-        self.p[...] = lowest(self.u + self.gap, wanted, float(self.cap))
+        level = self.gap if self.u is self.p else self.u + self.gap
+        self.p[...] = lowest(level, wanted, float(self.cap))
 
     def weigh(self) -> Balance:
         """Closure, objective and the scale of the error."""
         force, work, height, below, level = self.run(_kernels.weigh, self.gap, self.u, self.p, self.cap)[:5]
-        if self.control.closure is not None:
-            closure = self.control.closure
-            objective = 0.5 * work + height - closure * force
-        else:
+        objective = 0.5 * work + height
+        if self.forced:
             closure = level / below if below > 0 else self.saturated_closure()
-            objective = 0.5 * work + height
+        else:
+            closure = self.control.value
+            objective -= closure * force
         scale = max(work / force if force > 0 else 0.0, force * self.local)
         noise = 8 * self.precise * (abs(work) + abs(height) + abs(closure) * force)
         floor = 64 * self.precise * abs(closure) / scale if scale > 0 else 0.0
@@ -210,102 +233,97 @@ class Descent:
         return sums[2:5], sums[5:8], (float(sums[0]) / balance.force + overlap) / balance.scale
 
     def turn(self, balance: Balance, inner: Array, outer: Array) -> bool:
-        """Choose the free set and the direction; False where there is none."""
-        forced = self.control.total is not None
-        spread = inner[2] - (inner[1] ** 2 / inner[0] if forced and inner[0] else 0.0)
+        """Choose the free set, the direction and the length of the step; False where there is none."""
+        spread = inner[2] - (inner[1] ** 2 / inner[0] if self.forced and inner[0] else 0.0)
         admit = bool(outer[2] > GATE**2 * max(spread, 0.0) or outer[0] < FEW * inner[0])
         count, gap = (inner + outer)[:2] if admit else inner[:2]
         if count == 0:
             return False
-        shift = gap / count if forced else 0.0
         closure = self.kind(balance.closure)
-        pre = self.precondition
-        state = (self.gap, self.u, self.p, self.cap, closure, admit, self.kind(shift))
-        changes = self.run(_kernels.select, self.columns, *state, pre.mask, pre.x, pre.sums, pre.counts)[0]
-        pressed, extra = pre.apply()
-        sums = self.run(
-            _kernels.correct, self.columns, pre.mask, extra, self.gap, self.u, self.r, closure, pressed
-        )
-        # what is taken off the direction: its mean, or less than nothing where the mean must be driven
-        mean = sums[0] / count if forced else -self.uniform(gap)
-        beta = 0.0
-        if changes == 0 and self.curvature > 0:
-            beta = max(0.0, -(sums[2] - mean * sums[3]) / self.curvature)
-        in_bands(
-            _kernels.turn, self.blocks, self.size, self.rows, pre.mask, pressed, self.kind(mean), self.kind(beta), self.t
-        )
-        self.r = self.operator.apply(self.t)
-        along, self.curvature = self.run(_kernels.slope, self.gap, self.u, self.t, self.r, closure)[:2]
-        self.step = along / self.curvature if self.curvature > 0 and along > 0 else np.inf
-        if not forced and along > 0:
+        pressed, mean, beta = self.conditioned(closure, admit, count, gap)
+        taken = (self.kind(mean), self.kind(beta))
+        relieved = self.run(_kernels.turn, self.pre.mask, pressed, *taken, self.t)[0]
+        del pressed
+        out = self.release()
+        self.spare = self.operator.apply(self.t, out)
+        along, curvature = self.run(_kernels.slope, self.gap, self.u, self.t, self.spare, closure)[:2]
+        self.step = along / curvature if curvature > 0 and along > 0 else np.inf
+        if not self.forced and along > 0 and relieved > 0:
             # full contact of a periodic body costs nothing to relieve: no further than to no force at all
-            relieved = float(np.sum(np.sum(self.t, axis=1, dtype=np.float64)))
-            self.step = min(self.step, 1.01 * balance.force / relieved if relieved > 0 else np.inf)
+            self.step = min(self.step, 1.01 * balance.force / relieved)
         return self.step < np.inf
+
+    def release(self) -> Array | None:
+        """Give the spare array to a transform that writes in place; let go of it otherwise."""
+        out, self.spare = (self.spare if fft.writes_in_place() else None), self.t
+        return out
+
+    def conditioned(self, closure: Any, admit: bool, count: float, gap: float) -> tuple[Array, float, float]:
+        """Return the preconditioned gap of the free set, what is to be taken off it, and beta.
+
+        Taken off is its mean under force control, and less than nothing where the mean must be driven; beta
+        is how much of the last direction is kept: none where the set has changed.
+        """
+        pre, shift = self.pre, self.kind(gap / count if self.forced else 0.0)
+        plane = self.spare if self.wide is None else self.wide
+        if self.wide is not None:  # the margin of a free body
+            plane[self.gap.shape[0] :] = 0
+            plane[:, self.gap.shape[1] :] = 0
+        state = (self.gap, self.u, self.p, self.cap, closure, admit, shift)
+        changes = self.run(_kernels.select, pre.columns, *state, pre.mask, plane, pre.sums, pre.counts)[0]
+        plane, extra = pre.apply(plane)
+        if self.wide is None:
+            self.spare = plane
+        else:
+            self.wide = plane
+        sums = self.run(_kernels.correct, pre.columns, pre.mask, extra, self.gap, self.u, closure, plane)
+        mean = sums[0] / count if self.forced else -self.uniform(gap)
+        before, self.product = self.product, float(sums[1] - mean * gap)
+        return plane, mean, self.product / before if changes == 0 and before > 0 else 0.0
 
     def uniform(self, gap: float) -> float:
         """Uniform pressure on the free set that would close the summed gap (periodic bodies, else zero).
 
         Their compliance knows nothing of the mean, whose stiffness grows without bound as the last gap closes.
         """
-        settled = self.precondition.mean_settlement()
+        settled = self.pre.mean_settlement()
         return gap / settled if settled > 0 else 0.0
 
     def advance(self) -> None:
-        """Take the step, cut to the bounds."""
-        self.p, self.old = self.old, self.p
+        """Take the step: as it is, and the settlement follows; or cut to the bounds."""
         step = self.kind(self.step)
-        if self.control.total is not None and self.cap < np.inf:
-            self.advance_capped(self.control.total)
-            return
-        clipped, force, capped = self.run(_kernels.advance, self.old, self.t, step, self.cap, self.p)[:3]
+        clipped, force, capped = self.run(_kernels.survey, self.p, self.t, step, self.cap)[:3]
         self.clipped = clipped > 0
-        if not self.clipped:
-            in_bands(_kernels.follow, self.blocks, self.size, self.rows, self.u, self.r, step)
+        if self.clipped:
+            self.cut(force, capped)
+        else:
+            self.run(_kernels.move, self.p, self.t, self.u, self.spare, step)
             self.fresh = False
-            return
-        if self.control.total is not None:
+
+    def cut(self, force: float, capped: float) -> None:
+        """Take the step, cut to the bounds; the pressure before it stays in `spare`."""
+        shared = self.forced and self.cap < np.inf
+        if shared:
+            self.share(self.control.value)
+        else:
+            self.run(_kernels.cut, self.p, self.t, self.kind(self.step), self.cap, self.spare)
+        self.p, self.spare = self.spare, self.p
+        if self.forced and not shared:
             self.restore_force(force, capped)
         self.refresh()
 
-    def advance_capped(self, wanted: float) -> None:
-        """Take the step under a cap, keeping the force: what is cut off is shared by the free set."""
-        free = self.precondition.mask[: self.gap.shape[0], : self.gap.shape[1]]
-        np.copyto(self.p, self.old)
-        values = self.old[free] - self.step * self.t[free].astype(np.float64)
-        rest = float(np.sum(np.sum(np.where(free, 0, self.old), axis=1, dtype=np.float64)))
-        self.p[free] = shifted(values, wanted - rest, float(self.cap))
-        self.clipped = True
-        self.refresh()
+    def share(self, wanted: float) -> None:
+        """Take the step cut to the bounds; under a cap what that takes off the force the free set shares."""
+        free = self.pre.mask[: self.gap.shape[0], : self.gap.shape[1]]
+        np.copyto(self.spare, self.p)
+        values = self.p[free] - self.step * self.t[free].astype(np.float64)
+        rest = float(np.sum(np.sum(np.where(free, 0, self.p), axis=1, dtype=np.float64)))
+        self.spare[free] = shifted(values, wanted - rest, float(self.cap))
 
-    def halve(self, control: Control) -> None:
+    def halve(self) -> None:
         """Go back half of the last step, because it went too far."""
         self.halved += 1
         self.step /= 2
-        self.p, self.old = self.old, self.p
-        self.curvature = 0.0
-        self.advance()
-
-
-def lowest(level: Array, wanted: float, cap: float) -> Array:
-    """Even pressure on the lowest nodes, as many as can carry what is wanted with some to spare."""
-    enough = min(level.size, int(np.ceil(1.1 * wanted / cap)))
-    pressure = np.zeros(level.shape)
-    pressure.ravel()[np.argpartition(level.ravel(), enough - 1)[:enough]] = wanted / enough
-    return pressure
-
-
-def shifted(values: Array, wanted: float, cap: float) -> Array:
-    """Shift values by one amount so that, cut to 0 .. cap, they add up to what is wanted."""
-    low, high, shift = float(values.min()) - cap, float(values.max()), 0.0
-    for _ in range(200):
-        moved = np.clip(values - shift, 0.0, cap)
-        excess = float(np.sum(moved)) - wanted
-        low, high = (shift, high) if excess > 0 else (low, shift)
-        slack = int(np.count_nonzero((moved > 0) & (moved < cap)))
-        better = shift + excess / slack if slack else np.inf
-        better = better if low < better < high else 0.5 * (low + high)
-        if better == shift or abs(excess) <= 1e-15 * wanted:
-            break
-        shift = better
-    return moved
+        self.product = 0.0
+        self.p, self.spare = self.spare, self.p
+        self.cut(*self.run(_kernels.survey, self.p, self.t, self.kind(self.step), self.cap)[1:3])

@@ -181,4 +181,5 @@ class Elimination:
             total=float(balance.pressure.sum()),
             iterations=balance.rounds,
             residual=residual(pressure, settlement, gap, self.problem.body.spacing),
+            work=float(np.sum(pressure * settlement)),
         )

@@ -197,7 +197,9 @@ class Fast:
             start = cold_start(self.problem, control, np.float32)[0]
         if self.plane is None or self.plane.window != window:
             self.plane = Plane(self.problem, window)
-        return self.count(self.plane.solve(start[window], control, self.tolerance))
+        handed = [start if window == WHOLE_PLANE else start[window]]
+        del start
+        return self.count(self.plane.solve(handed, control, self.tolerance))
 
 
 class Plane:
@@ -209,18 +211,17 @@ class Plane:
         body = replace(problem.body, shape=(gap.shape[0], gap.shape[1]))
         self.part = Problem(body, gap, problem.cap)
         self.local = problem.local
-        self.single: Descent | None = None
-        self.double: Descent | None = None
+        self.kept: dict[Any, Descent] = {}
 
-    def solve(self, start: Array, control: Control, tolerance: float) -> Solution:
-        """Solve from `start`."""
+    def solve(self, handed: list[Array], control: Control, tolerance: float) -> Solution:
+        """Solve from the pressure in `handed`, which is taken out: nobody else shall keep so large an array."""
         before = (0, 0)
         if self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
-            self.single = self.single or self.descent(np.float32)
-            rough = self.single.solve(start, control, SINGLE_ENOUGH, certify=False)
-            start, before = rough.pressure, (rough.iterations, rough.transforms)
-        self.double = self.double or self.descent(np.float64)
-        solution = self.double.solve(start, control, tolerance)
+            rough = self.descent(np.float32).solve(handed.pop(), control, SINGLE_ENOUGH, certify=False)
+            before = (rough.iterations, rough.transforms)
+            handed.append(rough.pressure)
+            del rough
+        solution = self.descent(np.float64).solve(handed.pop(), control, tolerance)
         return replace(
             solution,
             iterations=solution.iterations + before[0],
@@ -228,7 +229,11 @@ class Plane:
         )
 
     def descent(self, kind: Any) -> Descent:
-        """Return the iteration in one precision."""
+        """Return the iteration in one precision; kept for a free body, whose kernel takes time to make."""
+        if kind in self.kept:
+            return self.kept[kind]
         descent = plane_descent(self.part, kind)
         descent.local = self.local
+        if not self.part.body.periodic:
+            self.kept[kind] = descent
         return descent

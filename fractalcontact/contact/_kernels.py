@@ -1,14 +1,15 @@
 """Loops of the contact solver: influence tables and the fused passes of the iteration.
 
 Every pass runs over bands of blocks; a block is as many rows as a bin of the preconditioner. Sums go to one
-row of `out` for each block and are added up by the caller, so that they do not depend on the bands.
+row of `out` for each block and are added up by the caller, so that they do not depend on the bands. The inner
+loops are written without branches, so that they run in vector lanes.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fractalcontact.base.jit import kernel
+from fractalcontact.base.jit import kernel, sum_kernel
 
 # ruff: noqa: D103 (each pass is described where it is used, in _descent.py)
 
@@ -53,26 +54,18 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
 def scale_modes(start, stop, modes, qy2, qx2, factor, invert, mean):  # type: ignore[no-untyped-def]
     """Multiply modes by factor * |q|, or by factor / |q|; by `mean` where q = 0."""
     for i in range(start, stop):
-        for j in range(modes.shape[1]):
-            q2 = qy2[i] + qx2[j]
-            q = np.sqrt(q2)
-            if q2 == 0:
-                modes[i, j] *= mean
-            elif invert:
-                modes[i, j] *= factor / q
-            else:
-                modes[i, j] *= factor * q
+        first = modes[i, 0]
+        if invert:
+            for j in range(modes.shape[1]):
+                modes[i, j] *= factor / np.sqrt(qy2[i] + qx2[j])
+        else:
+            for j in range(modes.shape[1]):
+                modes[i, j] *= factor * np.sqrt(qy2[i] + qx2[j])
+        if qy2[i] == 0:
+            modes[i, 0] = first * mean
 
 
-@kernel
-def multiply(start, stop, modes, symbol):  # type: ignore[no-untyped-def]
-    """Multiply modes by a real symbol."""
-    for i in range(start, stop):
-        for j in range(modes.shape[1]):
-            modes[i, j] *= symbol[i, j]
-
-
-@kernel
+@sum_kernel
 def weigh(start, stop, rows, gap, u, p, cap, out):  # type: ignore[no-untyped-def]
     """Sum p, p u, p gap over all nodes, and p, p (u + gap) over those below the cap."""
     ny, nx = p.shape
@@ -80,131 +73,147 @@ def weigh(start, stop, rows, gap, u, p, cap, out):  # type: ignore[no-untyped-de
         force, work, height, below, level = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                value = p[i, j]
-                if value > 0:
-                    pu, ph = np.float64(value) * u[i, j], np.float64(value) * gap[i, j]
-                    force += value
-                    work += pu
-                    height += ph
-                    if value < cap:
-                        below += value
-                        level += pu + ph
+                value = np.float64(p[i, j])
+                pu, ph = value * u[i, j], value * gap[i, j]
+                force += value
+                work += pu
+                height += ph
+                if value < cap:
+                    below += value
+                    level += pu + ph
         out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = force, work, height, below, level
 
 
-@kernel
+@sum_kernel
 def inspect(start, stop, rows, gap, u, p, cap, closure, out):  # type: ignore[no-untyped-def]
     """Measure the error: sum p g+, greatest overlap; and how it divides between the set and outside.
 
     Inside (0 < p < cap) and outside (p = 0 overlapping, p = cap open): count, sum g, sum g^2.
     """
     ny, nx = p.shape
+    nothing = 0 * closure
+    low = np.empty(nx, p.dtype)
     for k in range(start, stop):
-        opened, overlap, n_in, s_in, q_in, n_out, s_out, q_out = 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0
+        opened, n_in, s_in, q_in, n_out, s_out, q_out = 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0
+        low[:] = 0
         for i in range(k * rows, min(k * rows + rows, ny)):
+            for j in range(nx):  # on its own: a greatest value among the sums would stop the lanes
+                g = u[i, j] + gap[i, j] - closure
+                g = g if p[i, j] < cap else nothing
+                low[j] = g if g < low[j] else low[j]
             for j in range(nx):
                 g = np.float64(u[i, j] + gap[i, j] - closure)
                 value = p[i, j]
-                if value > 0:
-                    if g > 0:
-                        opened += value * g
-                    if value < cap:
-                        n_in += 1
-                        s_in += g
-                        q_in += g * g
-                        overlap = max(overlap, -g)
-                    elif g > 0:
-                        n_out += 1
-                        s_out += g
-                        q_out += g * g
-                elif g < 0:
-                    n_out += 1
-                    s_out += g
-                    q_out += g * g
-                    overlap = max(overlap, -g)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = opened, overlap, n_in, s_in, q_in
+                inside = (value > 0) & (value < cap)
+                outside = ((value <= 0) & (g < 0)) | ((value >= cap) & (g > 0))
+                within, without = g if inside else 0.0, g if outside else 0.0
+                opened += value * (g if g > 0 else 0.0)
+                n_in += inside
+                s_in += within
+                q_in += within * within
+                n_out += outside
+                s_out += without
+                q_out += without * without
+        least = nothing
+        for j in range(nx):
+            least = low[j] if low[j] < least else least
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = opened, -least, n_in, s_in, q_in
         out[k, 5], out[k, 6], out[k, 7] = n_out, s_out, q_out
 
 
-@kernel
+@sum_kernel
 def select(start, stop, rows, columns, gap, u, p, cap, closure, admit, shift, mask, x, bins, counts, out):  # type: ignore[no-untyped-def]
     """Choose the free set, put its gap less `shift` into x, and sum both over the bins.
 
     Free are 0 < p < cap and, where `admit`, the nodes outside that want in. Counts the changes of `mask`.
     """
     ny, nx = p.shape
+    nothing = 0 * shift
+    wide, many = np.empty(nx, x.dtype), np.empty(nx, x.dtype)
     for k in range(start, stop):
-        bins[k, :] = 0.0
-        counts[k, :] = 0.0
-        changes = 0
+        wide[:], many[:], changes = 0, 0, 0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 g = u[i, j] + gap[i, j] - closure
                 value = p[i, j]
-                free = value > 0 and value < cap
-                if not free and admit:
-                    free = (value <= 0 and g < 0) or (value >= cap and g > 0)
+                wanting = ((value <= 0) & (g < 0)) | ((value >= cap) & (g > 0))
+                free = ((value > 0) & (value < cap)) | (wanting & admit)
+                x[i, j] = g - shift if free else nothing
+                many[j] += 1 if free else 0
                 changes += free != mask[i, j]
                 mask[i, j] = free
-                if free:
-                    x[i, j] = g - shift
-                    bins[k, j // columns] += g - shift
-                    counts[k, j // columns] += 1
+            for j in range(nx):
+                wide[j] += x[i, j]
+        bins[k, :], counts[k, :] = 0, 0
+        for j in range(nx):
+            bins[k, j // columns] += wide[j]
+            counts[k, j // columns] += many[j]
         out[k, 0] = changes
 
 
-@kernel
+@sum_kernel
 def extend(start, stop, rows, columns, mask, bins, x):  # type: ignore[no-untyped-def]
-    """Fill x outside the free set with the value of the bin."""
+    """Fill x, zero outside the free set, with the value of the bin there."""
     my, mx = mask.shape
+    wide = np.empty(mx, x.dtype)
     for k in range(start, stop):
+        for j in range(mx):
+            wide[j] = bins[k, j // columns]
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
-                if not mask[i, j]:
-                    x[i, j] = bins[k, j // columns]
+                x[i, j] += 0 * wide[j] if mask[i, j] else wide[j]
 
 
-@kernel
+@sum_kernel
 def collect(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-untyped-def]
     """Sum x outside the free set over the bins."""
     my, mx = mask.shape
+    wide = np.empty(mx, x.dtype)
     for k in range(start, stop):
-        bins[k, :] = 0.0
+        wide[:] = 0
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
-                if not mask[i, j]:
-                    bins[k, j // columns] += x[i, j]
+                wide[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
+        bins[k, :] = 0
+        for j in range(mx):
+            bins[k, j // columns] += wide[j]
 
 
-@kernel
-def correct(start, stop, rows, columns, mask, bins, gap, u, r, closure, x, out):  # type: ignore[no-untyped-def]
-    """Add the bin to x on the free set; sum x, x g, x r and r there."""
+@sum_kernel
+def correct(start, stop, rows, columns, mask, bins, gap, u, closure, x, out):  # type: ignore[no-untyped-def]
+    """Add the bin to x; on the free set sum x and x g."""
     ny, nx = gap.shape
+    wide = np.empty(nx, x.dtype)
     for k in range(start, stop):
-        z_sum, zg, zr, r_sum = 0.0, 0.0, 0.0, 0.0
+        total, along = 0.0, 0.0
+        for j in range(nx):
+            wide[j] = bins[k, j // columns]
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                if mask[i, j]:
-                    z = x[i, j] + bins[k, j // columns]
-                    x[i, j] = z
-                    z_sum += z
-                    zg += np.float64(z) * (u[i, j] + gap[i, j] - closure)
-                    zr += np.float64(z) * r[i, j]
-                    r_sum += r[i, j]
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = z_sum, zg, zr, r_sum
+                z = x[i, j] + wide[j]
+                x[i, j] = z
+                free = np.float64(z) if mask[i, j] else 0.0
+                total += free
+                along += free * (u[i, j] + gap[i, j] - closure)
+        out[k, 0], out[k, 1] = total, along
 
 
-@kernel
-def turn(start, stop, rows, mask, x, mean, beta, t):  # type: ignore[no-untyped-def]
-    """Direction t = x - mean + beta t on the free set, zero outside."""
+@sum_kernel
+def turn(start, stop, rows, mask, x, mean, beta, t, out):  # type: ignore[no-untyped-def]
+    """Direction t = x - mean + beta t on the free set, zero outside; its sum."""
     ny, nx = t.shape
+    nothing = 0 * mean
     for k in range(start, stop):
+        total = 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                t[i, j] = x[i, j] - mean + beta * t[i, j] if mask[i, j] else 0.0
+                value = x[i, j] - mean + beta * t[i, j] if mask[i, j] else nothing
+                t[i, j] = value
+                total += value
+        out[k, 0] = total
 
 
-@kernel
+@sum_kernel
 def slope(start, stop, rows, gap, u, t, r, closure, out):  # type: ignore[no-untyped-def]
     """Sum g t and t r."""
     ny, nx = t.shape
@@ -218,55 +227,79 @@ def slope(start, stop, rows, gap, u, t, r, closure, out):  # type: ignore[no-unt
         out[k, 0], out[k, 1] = gt, tr
 
 
-@kernel
-def advance(start, stop, rows, p, t, step, cap, new, out):  # type: ignore[no-untyped-def]
-    """Step along -t and clip to 0 .. cap; count what was clipped, sum what is new (all, and at the cap)."""
+@sum_kernel
+def survey(start, stop, rows, p, t, step, cap, out):  # type: ignore[no-untyped-def]
+    """Count what a step along -t would push over the bounds; sum what it would leave (all, and at the cap)."""
     ny, nx = t.shape
+    nothing = 0 * step
     for k in range(start, stop):
         clipped, force, capped = 0, 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = p[i, j] - step * t[i, j]
-                if value < 0:
-                    value = p[i, j] * 0
-                    clipped += 1
-                elif value >= cap:
-                    clipped += p[i, j] < cap
-                    value = cap
-                    capped += value
-                new[i, j] = value
+                clipped += (value < 0) | ((value >= cap) & (p[i, j] < cap))
+                value = value if value > 0 else nothing
+                over = value >= cap
+                value = cap if over else value
                 force += value
+                capped += value if over else nothing
         out[k, 0], out[k, 1], out[k, 2] = clipped, force, capped
 
 
-@kernel
+@sum_kernel
+def move(start, stop, rows, p, t, u, r, step, out):  # type: ignore[no-untyped-def]
+    """Step along -t, and the settlement with it."""
+    ny, nx = t.shape
+    for k in range(start, stop):
+        for i in range(k * rows, min(k * rows + rows, ny)):
+            for j in range(nx):
+                p[i, j] -= step * t[i, j]
+            for j in range(nx):
+                u[i, j] -= step * r[i, j]
+        out[k, 0] = 0.0
+
+
+@sum_kernel
+def cut(start, stop, rows, p, t, step, cap, new, out):  # type: ignore[no-untyped-def]
+    """Step along -t, cut to 0 .. cap."""
+    ny, nx = t.shape
+    nothing = 0 * step
+    for k in range(start, stop):
+        for i in range(k * rows, min(k * rows + rows, ny)):
+            for j in range(nx):
+                value = p[i, j] - step * t[i, j]
+                value = value if value > 0 else nothing
+                new[i, j] = value if value < cap else cap
+        out[k, 0] = 0.0
+
+
+@sum_kernel
 def rescale(start, stop, rows, p, factor, cap, out):  # type: ignore[no-untyped-def]
     """Scale what is below the cap; sum all, and what is at the cap."""
     ny, nx = p.shape
+    nothing = 0 * factor
     for k in range(start, stop):
         force, capped = 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = p[i, j]
-                if value < cap:
-                    value = value * factor
-                    if value >= cap:
-                        value = cap
-                    p[i, j] = value
-                if value >= cap:
-                    capped += value
+                value = value * factor if value < cap else value
+                value = value if value < cap else cap
+                p[i, j] = value
                 force += value
+                capped += value if value >= cap else nothing
         out[k, 0], out[k, 1] = force, capped
 
 
-@kernel
-def follow(start, stop, rows, u, r, step):  # type: ignore[no-untyped-def]
-    """Settlement after a step that was not clipped."""
-    ny, nx = u.shape
-    for k in range(start, stop):
-        for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):
-                u[i, j] -= step * r[i, j]
+@sum_kernel
+def open_gap(start, stop, gap, u, p, closure, out):  # type: ignore[no-untyped-def]
+    """Sum the gap of every row: zero under pressure, never negative."""
+    for i in range(start, stop):
+        total = 0.0
+        for j in range(gap.shape[1]):
+            g = gap[i, j] + u[i, j] - closure
+            total += g if (g > 0) & (p[i, j] <= 0) else 0.0
+        out[i] = total
 
 
 @kernel

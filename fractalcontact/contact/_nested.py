@@ -43,7 +43,8 @@ def cold_start(problem: Problem, control: Control, kind: Any) -> tuple[Array, fl
 def plane_descent(problem: Problem, kind: Any) -> Descent:
     """Return the iteration on the whole plane of a problem."""
     body = problem.body
-    operator, precondition = body.operator(kind), Preconditioner(body, kind)
+    operator = body.operator(kind)
+    precondition = Preconditioner(body, kind, getattr(operator, "wavenumbers", None))
     return Descent(problem.gap, problem.cap, operator, precondition, problem.local, kind)
 
 
@@ -61,7 +62,9 @@ def coarser(problem: Problem, factors: tuple[int, ...]) -> Problem:
             starts = np.arange(0, gap.shape[axis], factor)
             members = np.diff(np.append(starts, gap.shape[axis]))
             gap = np.add.reduceat(gap, starts, axis=axis) / np.expand_dims(members, 1 - axis)
-    return Problem(Body(shape, spacing, body.periodic, body.influence, _plate(body, spacing)), gap, problem.cap)
+    return Problem(
+        Body(shape, spacing, body.periodic, body.influence, _plate(body, spacing)), gap, problem.cap
+    )
 
 
 def _plate(body: Body, spacing: tuple[float, float]) -> float:

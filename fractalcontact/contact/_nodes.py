@@ -26,7 +26,7 @@ class PairSum:
         self.every = np.arange(iy.size)
         self.transforms = 0
 
-    def apply(self, value: Array) -> Array:
+    def apply(self, value: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Sum over all nodes of table[distance] times value, for every node."""
         return self.sum(value, self.every)
 
@@ -46,15 +46,14 @@ class NodePreconditioner:
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.pairs = PairSum(table, iy, ix)
         self.rows, self.columns, self.bins = 1, iy.size, (1, 1)
-        self.mask = np.zeros((1, iy.size), dtype=np.bool_)
-        self.x = np.zeros((1, iy.size))
+        self.plane = (1, int(iy.size))
+        self.mask = np.zeros(self.plane, dtype=np.bool_)
         self.sums, self.counts, self.nothing = (np.zeros(self.bins) for _ in range(3))
         self.transforms = 0
 
-    def apply(self) -> tuple[Array, Array]:
-        """Pressure for the gap in x on the set in mask."""
-        self.x[~self.mask] = 0.0
-        return self.pairs.sum(self.x, np.flatnonzero(self.mask)), self.nothing
+    def apply(self, x: Array) -> tuple[Array, Array]:
+        """Pressure for the gap x on the set in mask."""
+        return self.pairs.sum(x, np.flatnonzero(self.mask)), self.nothing
 
     def mean_settlement(self) -> float:
         """Infinite: the mean needs no help."""

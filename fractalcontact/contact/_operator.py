@@ -17,8 +17,8 @@ class Operator(Protocol):
 
     transforms: int
 
-    def apply(self, pressure: Array) -> Array:
-        """Return the settlement under `pressure`; both (ny, nx)."""
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the settlement under `pressure`, both (ny, nx); it may be written into `out`."""
         ...
 
 
@@ -27,18 +27,27 @@ class Wavenumbers:
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.shape = shape
+        self.modes: Array | None = None
         self.qy2 = fft.wavenumbers(shape[0], spacing[0]) ** 2
         self.qx2 = fft.wavenumbers(shape[1], spacing[1], real=True) ** 2
 
-    def apply(self, plane: Array, factor: float, *, invert: bool, mean: float) -> Array:
-        """Return the plane with its modes times factor |q| (or factor / |q|), its mean times `mean`."""
+    def apply(
+        self, plane: Array, factor: float, *, invert: bool, mean: float, out: Array | None = None
+    ) -> Array:
+        """Return the plane with its modes times factor |q| (or factor / |q|), its mean times `mean`.
+
+        Where the library can, it writes into `out`, which may be the plane itself.
+        """
         from fractalcontact.contact._kernels import scale_modes
 
-        modes = fft.rfft2(plane)
         kind = plane.dtype.type
+        modes = fft.rfft2(plane, self.modes)
         qy2, qx2 = self.qy2.astype(kind), self.qx2.astype(kind)
         in_bands(scale_modes, modes.shape[0], modes.size, modes, qy2, qx2, kind(factor), invert, kind(mean))
-        return fft.irfft2(modes, self.shape, overwrite=True)
+        if not fft.writes_in_place():
+            return fft.irfft2(modes, self.shape, overwrite=True)
+        self.modes = modes
+        return fft.irfft2(modes, self.shape, out, overwrite=True)
 
 
 class PeriodicOperator:
@@ -48,10 +57,10 @@ class PeriodicOperator:
         self.wavenumbers = Wavenumbers(shape, spacing)
         self.transforms = 0
 
-    def apply(self, pressure: Array) -> Array:
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the settlement under `pressure`, without its mean."""
         self.transforms += 1
-        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0)
+        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
 
 
 class FreeOperator:
@@ -63,7 +72,7 @@ class FreeOperator:
         self.symbol = convolution_symbol(table, self.padded).astype(kind)
         self.transforms = 0
 
-    def apply(self, pressure: Array) -> Array:
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Return the settlement under `pressure`."""
         self.transforms += 1
         return np.ascontiguousarray(fft.convolve(pressure, self.symbol, self.padded))

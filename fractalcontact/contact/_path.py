@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.jit import in_bands
 from fractalcontact.contact._flat import flat_block
 from fractalcontact.contact._problem import Body, Control, Problem, Solution, serial_sum
 from fractalcontact.contact._setup import Units
@@ -76,9 +77,20 @@ class Step:
         return np.where(self.solution.pressure > 0, 0.0, np.maximum(scaled, 0.0)) * self.units.height
 
     @property
+    def mean_gap(self) -> float:
+        """Mean gap in m."""
+        from fractalcontact.contact._kernels import open_gap
+
+        solution, gap = self.solution, self.problem.gap
+        rows = np.empty(gap.shape[0])
+        closure = np.float64(solution.closure)
+        in_bands(open_gap, rows.size, gap.size, gap, solution.settlement, solution.pressure, closure, rows)
+        return float(np.sum(rows)) / gap.size * self.units.height
+
+    @property
     def elastic_energy(self) -> float:
         """Elastic energy in J."""
-        return 0.5 * serial_sum(self.solution.pressure * self.solution.settlement) * self.units.energy
+        return 0.5 * self.solution.work * self.units.energy
 
 
 def solve_path(path: Path) -> Iterator[Step]:
@@ -132,6 +144,7 @@ def _flat(path: Path, value: float) -> Solution:
         block.iterations,
         block.transforms,
         block.residual,
+        work=block.compliance * total * total,
     )
 
 

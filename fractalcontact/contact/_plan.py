@@ -36,7 +36,7 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
     method = problems.choice("method", call["method"], METHODS)
     if method == "elimination":
         problems.require(not np.isfinite(hardness), "hardness", "None with method='elimination'", hardness)
-    keep = problems.choices("keep", call["keep"], MAPS) if len(call["keep"]) else ()
+    keep = () if call["keep"] is None else problems.choices("keep", call["keep"], MAPS)
     problems.require(
         isinstance(call["progress"], (bool, np.bool_)), "progress", "True or False", call["progress"]
     )

@@ -39,13 +39,13 @@ MARGIN = 8  # a free body has n/MARGIN more nodes for the extension beyond its e
 class Preconditioner:
     """Extension, |q|/2, and the transpose of the extension, on the plane of a body."""
 
-    def __init__(self, body: Body, kind: Any) -> None:
+    def __init__(self, body: Body, kind: Any, wavenumbers: Wavenumbers | None = None) -> None:
         self.rows, self.columns = (bin_edge(body, axis) for axis in (0, 1))
         self.plane = body.shape
         if not body.periodic:
             self.plane = (wider(body.shape[0], self.rows), wider(body.shape[1], self.columns))
         self.bins = (-(-self.plane[0] // self.rows), -(-self.plane[1] // self.columns))
-        self.wavenumbers = Wavenumbers(self.plane, body.spacing)
+        self.wavenumbers = wavenumbers or Wavenumbers(self.plane, body.spacing)
         edge = (self.rows * body.spacing[0], self.columns * body.spacing[1])
         q = np.hypot(
             fft.wavenumbers(self.bins[0], edge[0])[:, None],
@@ -59,7 +59,6 @@ class Preconditioner:
         # of a flat block under a rigid flat; a periodic body has no stiffness of its own for the mean
         self.mean_stiffness = 1.0 / float(extent)
         self.mask = np.zeros(self.plane, dtype=np.bool_)
-        self.x = np.zeros(self.plane, dtype=kind)
         self.sums, self.counts = (np.zeros(self.bins, dtype=kind) for _ in range(2))
         self.kind = kind
         self.transforms = 0
@@ -70,10 +69,10 @@ class Preconditioner:
         modes *= self.smooth
         return fft.irfft2(modes, self.bins, overwrite=True)
 
-    def apply(self) -> tuple[Array, Array]:
-        """Turn x, the gap on the set with its sums and counts over the bins, into the pressure.
+    def apply(self, x: Array) -> tuple[Array, Array]:
+        """Turn the gap x on the set, its sums and counts over the bins, into the pressure.
 
-        Returns the plane and, over the bins, what is to be added to it on the set.
+        Returns the plane (x is used up) and, over the bins, what is to be added to it on the set.
         """
         self.transforms += 1
         cells = self.kind(self.rows * self.columns)
@@ -82,8 +81,8 @@ class Preconditioner:
         inside *= weight
         size = self.plane[0] * self.plane[1]
         grid = (self.rows, self.columns, self.mask)
-        in_bands(_kernels.extend, self.bins[0], size, *grid, inside, self.x)
-        pressed = self.wavenumbers.apply(self.x, 0.5, invert=False, mean=self.mean_stiffness)
+        in_bands(_kernels.extend, self.bins[0], size, *grid, inside, x)
+        pressed = self.wavenumbers.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
         in_bands(_kernels.collect, self.bins[0], size, *grid, pressed, self.sums)
         weight *= self.sums
         return pressed, self.spread(weight)
@@ -104,14 +103,15 @@ class Preconditioner:
         """Precondition a gap that is free on the whole of the body."""
         ny, nx = gap.shape
         self.mask[:ny, :nx] = True
-        self.x[:ny, :nx] = gap
+        x = np.zeros(self.plane, dtype=self.kind)
+        x[:ny, :nx] = gap
         full = np.zeros((self.bins[0] * self.rows, self.bins[1] * self.columns), dtype=self.kind)
         shape = (self.bins[0], self.rows, self.bins[1], self.columns)
         full[:ny, :nx] = gap
         self.sums[...] = full.reshape(shape).sum(axis=(1, 3))
         full[:ny, :nx] = 1
         self.counts[...] = full.reshape(shape).sum(axis=(1, 3))
-        pressed, extra = self.apply()
+        pressed, extra = self.apply(x)
         spread = np.repeat(np.repeat(extra, self.rows, axis=0), self.columns, axis=1)
         return np.asarray(pressed[:ny, :nx] + spread[:ny, :nx])
 

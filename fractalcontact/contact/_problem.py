@@ -86,6 +86,7 @@ class Solution:
     transforms: int = 0
     residual: float = 0.0
     reason: str = "converged"
+    work: float = 0.0  # sum of pressure times settlement
 
 
 def serial_sum(plane: Array) -> float:

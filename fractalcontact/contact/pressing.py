@@ -15,7 +15,6 @@ from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import CONTACT, OPEN, YIELDED, label
 from fractalcontact.contact._path import Step, solve_path
 from fractalcontact.contact._plan import CONTROLS, Plan, make_plan
-from fractalcontact.contact._problem import serial_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -155,7 +154,7 @@ def _measures(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
         "contact_area": cells * grid.cell_area,
         "contact_fraction": cells / contact.size,
         "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
-        "mean_gap": serial_mean(step.gap),
+        "mean_gap": step.mean_gap,
         "elastic_energy": step.elastic_energy,
         "iterations": step.solution.iterations,
         "transforms": step.solution.transforms,
