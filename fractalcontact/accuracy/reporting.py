@@ -24,7 +24,9 @@ def curves_table(measured: xr.DataTree) -> str:
     for name, node in measured.children.items():
         data = node.to_dataset()
         notes = data["error"].attrs
-        rows: list[tuple[str, ...]] = [("method", notes["knob"], "error", "seconds", "first call", "")]
+        rows: list[tuple[str, ...]] = [
+            ("method", notes["knob"], "error", "seconds", "first call", "frontier")
+        ]
         errors, seconds = data["error"].values, data["run_time"].values
         for row, method in enumerate(data["method"].values):
             for column, knob in enumerate(data["knob"].values):

@@ -86,7 +86,7 @@ def open(path: str | os.PathLike[str]) -> Any:
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
     for node in tree.subtree:
-        node.dataset = encoded(node.to_dataset(inherit=False))
+        node.dataset = encoded(_with_words(node.to_dataset(inherit=False)))
     kind = tree.attrs.get(_KIND, "DataTree" if tree.children else "Dataset")
     if kind == "DataTree":
         return tree
@@ -97,6 +97,16 @@ def open(path: str | os.PathLike[str]) -> Any:
     array = dataset[kind]
     array.attrs.update({key: dataset.attrs[key] for key in _GLOBAL if key in dataset.attrs})
     return array
+
+
+def _with_words(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset with its words as fixed-width strings, as they were before they were written."""
+    words = {
+        name: variable.astype(str) for name, variable in dataset.variables.items() if variable.dtype == object
+    }
+    return dataset.assign_coords(
+        {name: value for name, value in words.items() if name in dataset.coords}
+    ).assign({name: value for name, value in words.items() if name in dataset.data_vars})
 
 
 def as_dataset(array: xr.DataArray) -> xr.Dataset:

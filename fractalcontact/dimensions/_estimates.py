@@ -50,9 +50,13 @@ class Estimate:
     fitted: float = np.nan
 
     def limited(self) -> Estimate:
-        """Limit the exponent and its interval to 0 ... 1, and say so."""
+        """Limit the exponent and its interval to 0 ... 1, and say so; no interval if all of it is outside."""
         hurst = float(np.clip(self.hurst, 0.0, 1.0))
-        note = self.note
+        low, high = float(np.clip(self.low, 0.0, 1.0)), float(np.clip(self.high, 0.0, 1.0))
+        error, note, not_given = self.standard_error, self.note, self.not_given
+        if self.low > 1.0 or self.high < 0.0:
+            low = high = error = np.nan
+            not_given = f"the fitted exponent, {self.hurst:.3f}, is that of no fractal: choose other scales"
         if self.hurst > 1.0 + _NOISE:
             note = _join(note, f"fitted {self.hurst:.3f}: smoother than a fractal surface, limited to 1")
         elif self.hurst < -_NOISE:
@@ -60,9 +64,11 @@ class Estimate:
         return replace(
             self,
             hurst=hurst,
-            low=float(np.clip(self.low, 0.0, 1.0)),
-            high=float(np.clip(self.high, 0.0, 1.0)),
+            standard_error=error,
+            low=low,
+            high=high,
             note=note,
+            not_given=not_given,
             fitted=self.hurst,
         )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import grid_of
 from fractalcontact.base.progress import track
 from fractalcontact.joints._checks import block_coords
@@ -99,14 +100,18 @@ def _press(crack: Crack, shear: float, towards: Direction, load: Load, where: st
     surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack, crack.layout))
     boundary = "periodic" if all(crack.layout.periodic) else "free"
     imposed: dict[str, Any] = {load.control: load.values}
-    pressed = press(
-        surface,
-        contact_modulus=crack.contact_modulus,
-        boundary=boundary,
-        keep=load.keep,
-        **imposed,
-        **load.solver,
-    )
+    try:
+        pressed = press(
+            surface,
+            contact_modulus=crack.contact_modulus,
+            boundary=boundary,
+            keep=load.keep,
+            **imposed,
+            **load.solver,
+        )
+    except InvalidInput as error:
+        lines = [f"{line} (at a shear of {shear:g} m towards {towards.name})" for line in error.problems]
+        raise InvalidInput(where, lines) from error
     with Problems(where) as problems:
         # the spacing as the solver reads it, so that a flat block is the same to the last bit
         spacing = grid_of(surface, problems, "delta-surface").spacing

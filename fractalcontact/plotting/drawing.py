@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.netcdf import PARTIAL
+from fractalcontact.base.progress import track
 from fractalcontact.plotting import closing, domain_maps, lacunar, leakage, roughness, sliding
 from fractalcontact.plotting._reading import words
 from fractalcontact.plotting.paper import group, has_figure, paper_figure, shown_shear
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 PAPER = {1: "face", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
 
 
-def draw(tree: xr.DataTree, folder: str | os.PathLike[str]) -> list[Path]:
+def draw(tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = False) -> list[Path]:
     """Draw every figure that a study has data for and write each as PNG.
 
     Parameters
@@ -28,6 +29,8 @@ def draw(tree: xr.DataTree, folder: str | os.PathLike[str]) -> list[Path]:
         From `fractalcontact.scenes.run` or `fractalcontact.open`.
     folder : path-like
         Made if need be. Figures of the same name are replaced, each only when the new one is complete.
+    progress : bool
+        Show a bar.
 
     Returns
     -------
@@ -37,7 +40,7 @@ def draw(tree: xr.DataTree, folder: str | os.PathLike[str]) -> list[Path]:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, drawing in drawings(tree):
+    for name, drawing in track(list(drawings(tree)), progress, "figures", unit="figure"):
         figure = drawing()
         written.append(_write(figure, folder / f"{name}.png"))
         figure.clear()

@@ -38,7 +38,7 @@ def box_dimension(
 ) -> Figure:
     """Draw the box dimension of the contact domain against load, and against shear under one force.
 
-    The bands are the 95 % intervals, drawn where the curve stands alone; a point whose interval is wider
+    The bands are the intervals, drawn where the curve stands alone; a point whose interval is wider
     than 0.5, or that has none, is open. The broken lines are a random dust of equal coverage: the number that
     contacts scattered without any structure would have.
 
@@ -87,7 +87,7 @@ def _dimension_notes(data: xr.Dataset) -> list[Any]:
 
     notes = [_style.line_entry("contact domain", marker="o")]
     if "ci_low" in data and "ci_high" in data:
-        notes.append(Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label="95 % interval"))
+        notes.append(Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label="interval"))
         if bool(_unsure(data).any()):
             label = f"interval wider\nthan {UNSURE:g}, or none"
             notes.append(_style.line_entry(label, ls="", marker="o", mfc="white"))

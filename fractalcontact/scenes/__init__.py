@@ -1,12 +1,30 @@
 """A study declared in one file: what is given, and which results are wanted.
 
+grammar    what a scene may say
 reading    the scene file, parsed and checked
 planning   the stages that the wanted results need, and why
 stages     what each stage computes, by calling the rooms
 running    the plan carried out: kept stages, resuming, one NetCDF, the figures
 reporting  the summary on the screen
 
-Nothing is computed, imported, compiled or stored that no wanted result needs.
+Nothing is computed, imported, compiled or stored that no wanted result needs. A scene is TOML:
+
+``[surface]``     the face: ``read`` a file (with spacing, units, channel), ``sample`` a shipped one, or
+                  ``generate`` with fbm, spectral, midpoint or weierstrass and its arguments; ``level`` and
+                  ``fill`` prepare it
+``[upper]``       the facing one, the same way; without it the faces match perfectly
+``[material]``    young, poisson, basic_friction_angle, hardness
+``[joint]``       block, direction, shear, normal_force and other arguments of the functions of `joints`;
+                  ``[joint.closure]`` and so on give one stage values of its own; ``register = true`` brings
+                  two measured faces into mated position
+``[contact]``     the arguments of `contact.press`
+``[dimensions]``  the arguments of `dimensions.estimate`
+``[domains.lacunarity]`` and so on: the arguments of the functions of `domains`
+``[want]``        surfaces, dimensions, contact, joints, domains: lists of results; keep: maps to store;
+                  figures: true or false
+
+A list of numbers may be a range: ``{start, stop, step}``, or ``{first, last, count}`` evenly spaced in the
+logarithm.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
 from .planning import plan as plan
-from .reading import Scene as Scene
 from .reading import load as load
 from .running import run as run
+from .scene import Scene as Scene
 
 __all__ = [
     "Scene",

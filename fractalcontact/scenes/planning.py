@@ -10,7 +10,7 @@ from fractalcontact.base.text import table
 from fractalcontact.scenes.grammar import LOADS
 
 if TYPE_CHECKING:
-    from fractalcontact.scenes.reading import Scene
+    from fractalcontact.scenes.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -179,15 +179,28 @@ def _maps(scene: Scene, *, of_contact: bool) -> tuple[str, ...]:
 
 
 def check_loads(scene: Scene, problems: list[str]) -> None:
-    """Note which stages of the joint lack their shear or their load."""
+    """Note which stages of the joint lack their shear or their load, or have more than one."""
     for stage in plan(scene):
         room, _, name = stage.name.partition("/")
         if room != "joints":
             continue
         given = scene.options("joint", name, ("shear", *LOADS))
         if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in given:
-            problems.append(f"joint.shear: expected a value for {name}, got none")
+            problems.append(f"joint.shear: expected a value for {name} ({stage.reason}), got none")
         if name == "elastic_dilatancy" and "normal_force" not in given:
             problems.append(f"joint.normal_force: expected a value for {name}, got none")
-        if name == "closure" and not set(LOADS) & set(given):
-            problems.append("joint.closure: expected a closure, normal_force or nominal_pressure, got none")
+        direction = scene.options("joint", name, ("direction",)).get("direction", "E")
+        if name in ("closure", "delta_surface", "decorrelation_length") and not isinstance(direction, str):
+            problems.append(f"joint.direction: expected one direction for {name}, got {direction}")
+        if name == "closure" and len(loads_of(scene)) != 1:
+            words = "a closure, normal_force or nominal_pressure"
+            found = ", ".join(loads_of(scene)) or "none"
+            problems.append(f"joint.closure: expected one of {words} ({stage.reason}), got {found}")
+
+
+def loads_of(scene: Scene) -> list[str]:
+    """Return the loads of the closure laws: those of [joint.closure], else those of [joint]."""
+    joint = scene.table("joint")
+    table = joint.get("closure")
+    own = [key for key in LOADS if key in table] if isinstance(table, dict) else []
+    return own or [key for key in LOADS if key in joint and not isinstance(joint[key], dict)]

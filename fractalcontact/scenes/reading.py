@@ -6,7 +6,6 @@ import difflib
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,49 +15,8 @@ from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes import grammar
-
-Table = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A study: what is given, and what is wanted.
-
-    Attributes
-    ----------
-    name : str
-        Stem of the scene file.
-    tables : mapping
-        The file as parsed; ranges are spelled out as lists.
-    folder : Path
-        Where relative paths of the scene start.
-    """
-
-    name: str
-    tables: Table
-    folder: Path
-
-    def table(self, name: str) -> Table:
-        """Return one table, empty if it is not given."""
-        return self.tables.get(name) or {}
-
-    def wanted(self, room: str) -> tuple[str, ...]:
-        """Return the words that `[want]` gives for a room."""
-        words = self.table("want").get(room, ())
-        return (words,) if isinstance(words, str) else tuple(words)
-
-    @property
-    def figures(self) -> bool:
-        """Whether figures are wanted."""
-        return bool(self.table("want").get("figures", False))
-
-    def options(self, table: str, stage: str, keys: Iterable[str]) -> dict[str, Any]:
-        """Return the values of `keys` from a table, those of its sub-table `stage` first."""
-        whole = self.table(table)
-        own = whole.get(stage, {})
-        # a stage may bear the name of an argument ([joint.closure]), so sub-tables are no values
-        common = {key: value for key, value in whole.items() if not isinstance(value, dict)}
-        return {key: own.get(key, common.get(key)) for key in keys if key in own or key in common}
+from fractalcontact.scenes.planning import check_loads
+from fractalcontact.scenes.scene import Scene, Table
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
@@ -93,6 +51,8 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
     tables = {key: _spelled_out(value, key, problems) for key, value in tables.items()}
     scene = Scene(source.stem, tables, source.resolve().parent)
     _check(scene, problems)
+    if not problems.found:
+        check_loads(scene, problems.found)
     return scene, problems.found
 
 
@@ -109,22 +69,42 @@ def _find(path: Path) -> Path:
     )
 
 
+EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
+LONGEST = 1_000_000  # entries of a range
+
+
 def _spelled_out(value: Any, key: str, problems: Problems) -> Any:
     """Turn ranges {start, stop, step} or {first, last, count} (log-spaced) into lists."""
     if not isinstance(value, dict):
         return value
-    if set(value) == {"start", "stop", "step"}:
-        start, stop, step = (value[word] for word in ("start", "stop", "step"))
-        if not (step > 0 and stop >= start):
-            problems.add(key, "a range with step > 0 and stop >= start", value)
-            return []
-        return (start + step * np.arange(round((stop - start) / step) + 1)).tolist()
-    if set(value) == {"first", "last", "count"}:
-        if not (value["first"] > 0 and value["last"] > 0 and value["count"] >= 1):
-            problems.add(key, "a logarithmic range with first, last > 0 and count >= 1", value)
-            return []
-        return np.geomspace(value["first"], value["last"], int(value["count"])).tolist()
+    for words in (EVEN, LOGARITHMIC):
+        if value and set(value) <= set(words):
+            return _range(value, words, key, problems)
     return {word: _spelled_out(item, f"{key}.{word}", problems) for word, item in value.items()}
+
+
+def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -> list[float]:
+    before = len(problems.found)
+    for word in words:
+        if problems.require(
+            word in value, f"{key}.{word}", f"a number (a range has {', '.join(words)})", "none"
+        ):
+            problems.number(f"{key}.{word}", value[word])
+    if len(problems.found) > before:
+        return [0.0]
+    if words is EVEN:
+        start, stop, step = (float(value[word]) for word in words)
+        sound = step > 0 and stop >= start and (stop - start) / step < LONGEST
+        if problems.require(
+            sound, key, "a range with step > 0, stop >= start and at most 10^6 entries", value
+        ):
+            return [start + step * number for number in range(round((stop - start) / step) + 1)]
+        return [0.0]
+    first, last, count = (float(value[word]) for word in words)
+    sound = first > 0 and last > 0 and 1 <= count < LONGEST and count == int(count)
+    if problems.require(sound, key, "a logarithmic range with first, last > 0 and a whole count >= 1", value):
+        return [float(entry) for entry in np.geomspace(first, last, int(count))]
+    return [0.0]
 
 
 def _check(scene: Scene, problems: Problems) -> None:
@@ -165,6 +145,8 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
             problems.add(f"{name}.{key}", f"a value for {generator}", "none")
     else:
         _known_keys(table, grammar.READING, name, problems)
+        if ways == ["read"]:
+            problems.require(isinstance(table["read"], str), f"{name}.read", "a path", table["read"])
         if ways == ["sample"]:
             problems.choice(f"{name}.sample", table["sample"], grammar.SAMPLES)
 
@@ -202,7 +184,13 @@ def _check_wanted(scene: Scene, problems: Problems) -> None:
         for key in ("young", "poisson"):
             problems.require(key in scene.table("material"), f"material.{key}", "a value", "none")
     if scene.wanted("contact"):
-        given = scene.table("contact")
+        given, material = scene.table("contact"), scene.table("material")
+        problems.require(
+            "contact_modulus" in given or {"young", "poisson"} <= set(material),
+            "contact.contact_modulus",
+            "a value, or young and poisson in [material]",
+            "none",
+        )
         problems.require(
             sum(key in given for key in grammar.LOADS) == 1,
             "contact",

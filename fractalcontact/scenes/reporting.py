@@ -20,6 +20,7 @@ def summary(tree: xr.DataTree) -> str:
     parts = [
         str(tree.attrs.get("title", tree.name or "result")),
         _dimensions(tree),
+        _contact(tree),
         _closure(tree),
         _dilatancy(tree),
         _friction(tree),
@@ -40,7 +41,7 @@ def contents(result: xr.DataTree | xr.Dataset | xr.DataArray) -> str:
     lines = [str(result.attrs.get("title", "untitled")), str(result.attrs.get("source", ""))]
     for path, dataset in groups.items():
         if dataset.variables:
-            lines += ["", path, *_variable_lines(dataset)]
+            lines += ["", path, *_variable_lines(dataset), *_reason_lines(dataset)]
     stages = stage_table(result)
     return "\n".join(lines) + (f"\n\n{stages}" if stages else "")
 
@@ -85,6 +86,14 @@ def _variable_lines(dataset: xr.Dataset) -> Iterable[str]:
         )
 
 
+def _reason_lines(dataset: xr.Dataset) -> Iterable[str]:
+    for name, variable in dataset.variables.items():
+        for key in ("note", "not_given"):
+            if key in variable.attrs:
+                for methods, reason in _reasons(dataset[name], key).items():
+                    yield f"    {name}, {methods}: {reason}"
+
+
 def _group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
     try:
         node: Any = tree[path]
@@ -97,20 +106,59 @@ def _dimensions(tree: xr.DataTree) -> str:
     found = _group(tree, "dimensions")
     if found is None or "method" not in found.dims:
         return ""
-    rows = [("fractal dimension", "D", "95 % interval of D", "scales")]
+    rows = [("fractal dimension", "D", "95 % interval of D", "scales", "departure from the model")]
     for method in found["method"].values:
         one = found.sel({"method": method})
         low, high, dimension, hurst = (
             float(one[k]) for k in ("ci_low", "ci_high", "fractal_dimension", "hurst")
         )
-        top = dimension + hurst
-        interval = (
-            f"{top - high:.3f} ... {top - low:.3f}"
-            if np.isfinite(low)
-            else "none: see the reason in the file"
+        misfit, top = float(one["misfit"]), dimension + hurst
+        rows.append(
+            (
+                str(method),
+                f"{dimension:.3f}",
+                f"{top - high:.3f} ... {top - low:.3f}" if np.isfinite(low) else "none",
+                f"{length(one['scale_min'])} ... {length(one['scale_max'])}",
+                f"{abs(misfit):.1f} standard deviations" if np.isfinite(misfit) else "",
+            )
         )
-        scales = f"{float(one['scale_min']):.2g} ... {float(one['scale_max']):.2g} m"
-        rows.append((str(method), f"{dimension:.3f}", interval, scales))
+    notes = _reasons(found["hurst"], "note") | _reasons(found["ci_low"], "not_given")
+    return "\n".join([table(rows), *(f"  {method}: {reason}" for method, reason in notes.items() if reason)])
+
+
+def _reasons(variable: xr.DataArray, key: str) -> dict[str, str]:
+    """Return the reasons that a variable gives, by method; one for several methods is told once."""
+    reasons: dict[str, list[str]] = {}
+    for method, reason in json.loads(variable.attrs.get(key, "{}")).items():
+        reasons.setdefault(str(reason), []).append(method)
+    return {", ".join(methods): reason for reason, methods in reasons.items()}
+
+
+def length(value: Any) -> str:
+    """Return a length in the unit in which it reads well."""
+    metres = float(value)
+    for factor, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm"), (1e-6, "um")):
+        if abs(metres) >= factor:
+            return f"{metres / factor:.3g} {unit}"
+    return f"{metres * 1e9:.3g} nm" if metres == metres else "-"
+
+
+def _contact(tree: xr.DataTree) -> str:
+    found = _group(tree, "contact")
+    if found is None:
+        return ""
+    rows = [("contact", "nominal pressure", "closure", "area", "corrected")]
+    for step in range(found.sizes["step"]):
+        one = found.isel(step=step)
+        rows.append(
+            (
+                f"step {step}",
+                f"{float(one['nominal_pressure']):.3g} Pa",
+                length(one["closure"]),
+                f"{float(one['contact_fraction']) * 100:.3g} %",
+                f"{float(one['corrected_contact_fraction']) * 100:.3g} %",
+            )
+        )
     return table(rows)
 
 
@@ -179,10 +227,19 @@ def _domains(tree: xr.DataTree) -> str:
     found = _group(tree, "domains/box_dimension")
     if found is None:
         return ""
-    rows = [("contact domain", "box dimension", "of a random dust")]
+    rows = [("contact domain", "box dimension", "interval", "of a random dust", "differs")]
     last = found.isel(step=-1) if "step" in found.dims else found
     for shear in np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]:
         one = last.sel(shear=shear) if shear is not None and "shear" in last.dims else last
         place = "last step" if shear is None else f"last step, {float(shear) * 1e3:.3g} mm"
-        rows.append((place, f"{float(one['box_dimension']):.3f}", f"{float(one['dust_dimension']):.3f}"))
+        low, high = float(one["ci_low"]), float(one["ci_high"])
+        rows.append(
+            (
+                place,
+                f"{float(one['box_dimension']):.2f}",
+                f"{low:.2f} ... {high:.2f}" if np.isfinite(low) else "none",
+                f"{float(one['dust_dimension']):.2f}",
+                "yes" if bool(one["differs_from_dust"]) else "no",
+            )
+        )
     return table(rows)

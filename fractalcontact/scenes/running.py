@@ -10,12 +10,15 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fractalcontact.base import netcdf, provenance, schema
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
 from fractalcontact.scenes import stages
 from fractalcontact.scenes.planning import Plan, Stage, plan
-from fractalcontact.scenes.reading import Scene, load
+from fractalcontact.scenes.reading import load
+from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +77,7 @@ def run(
         }
     tree = _assemble(scene, todo, results, record)
     if folder is not None:
-        _write(tree, scene, folder, record)
+        _write(tree, scene, folder, record, progress)
         store.clear()
     return tree
 
@@ -89,7 +92,8 @@ def achieved(result: xr.Dataset) -> dict[str, Any]:
     if "iterations" in result:
         found["iterations"] = int(result["iterations"].sum())
     if "standard_error" in result:
-        found["standard_error"] = [round(float(v), 6) for v in result["standard_error"].values.ravel()]
+        errors = [f"{float(v):.4f}" for v in result["standard_error"].values.ravel() if np.isfinite(v)]
+        found["standard error of H"] = " ".join(errors) or "none"
     return found
 
 
@@ -166,7 +170,7 @@ def _digest(stage: Stage, scene: Scene, digests: dict[str, str]) -> str:
     if room == "dimensions":
         tables["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
     if room == "contact":
-        tables["contact"] = scene.table("contact")
+        tables["contact"] = stages.contact_options(scene)
     if room == "domains":
         tables["domains"] = scene.table("domains").get(name, {})
     tables["needs"] = [digests[need] for need in stage.needs]
@@ -228,12 +232,14 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _write(tree: xr.DataTree, scene: Scene, folder: Path, record: dict[str, dict[str, Any]]) -> None:
+def _write(
+    tree: xr.DataTree, scene: Scene, folder: Path, record: dict[str, dict[str, Any]], progress: bool
+) -> None:
     if scene.figures:
         from fractalcontact import plotting
 
         start = time.perf_counter()
-        plotting.draw(tree, folder)
+        plotting.draw(tree, folder, progress=progress)
         record["figures"] = {"run_time": time.perf_counter() - start, "origin": "computed"}
         entry = json.loads(tree.attrs["provenance"])
         tree.attrs["provenance"] = json.dumps(entry | {"stages": provenance.plain(record)})

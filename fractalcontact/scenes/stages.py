@@ -7,6 +7,7 @@ dilatancy) whose results are joined. Parts may run anywhere and in any order; th
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -20,8 +21,8 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
-from fractalcontact.scenes.planning import check_loads
-from fractalcontact.scenes.reading import Scene, Table
+from fractalcontact.scenes.planning import loads_of, plan
+from fractalcontact.scenes.scene import Scene, Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     Results = Mapping[str, xr.Dataset]
 
+VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 Part = Callable[[], "xr.Dataset"]
 
 
@@ -69,7 +71,7 @@ def work(stage: Stage, scene: Scene, results: Results) -> Work:
     if room == "dimensions":
         return _dimension_work(name, scene, results)
     if room == "contact":
-        return Work((partial(_press, results["surfaces"], dict(scene.table("contact")), stage.keep),))
+        return Work((partial(_press, results["surfaces"], contact_options(scene), stage.keep),))
     if room == "joints":
         return _joint_work(name, stage, scene, results)
     return _domain_work(name, stage, scene, results)
@@ -84,7 +86,6 @@ def preflight(scene: Scene) -> None:
         Lists the problems of the faces, the block, the material and the loads together.
     """
     with Problems(f"scene {scene.name}") as problems:
-        check_loads(scene, problems.found)
         faces = {}
         for name in ("surface", "upper"):
             if name in scene.tables and (name == "surface" or scene.wanted("joints")):
@@ -100,7 +101,6 @@ def preflight(scene: Scene) -> None:
 
 def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:
     from fractalcontact import joints
-    from fractalcontact.scenes.planning import plan
 
     crack = None
     with _gather(problems, "joint"):
@@ -115,7 +115,7 @@ def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Pro
 
 def _check_travel(crack: Crack, given: dict[str, Any], place: str, problems: Problems) -> None:
     """Note the shears that would push the block off its face."""
-    directions = given.get("direction", ("E", "N", "W", "S"))
+    directions = given.get("direction", ("E", "N", "W", "S") if place.endswith("dilatancy") else "E")
     longest = max(given["shear"]) if isinstance(given["shear"], list) else given["shear"]
     for word in [directions] if isinstance(directions, str) else directions:
         travel = crack.travel(word)
@@ -171,7 +171,10 @@ def locate(path: str, folder: Path) -> Path:
     """
     expanded = os.path.expandvars(path)
     if "$" in expanded:
-        raise InvalidInput("surface", [f"read: expected a path whose variables are set, got {path!r}"])
+        unset = " and ".join(word for word in VARIABLE.findall(expanded))
+        raise InvalidInput(
+            "surface", [f"read: expected {unset} to name a folder, got a variable that is not set"]
+        )
     for candidate in (folder / expanded, datasets_folder() / expanded):
         if candidate.is_file():
             return candidate
@@ -196,6 +199,18 @@ def _dimension_work(name: str, scene: Scene, results: Results) -> Work:
     return Work((partial(_call, "dimensions", "estimate", _height(results), methods, **options),))
 
 
+def contact_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `press`: those of `[contact]`, and what the material says of the rest."""
+    from fractalcontact.contact import effective_modulus
+
+    options, material = dict(scene.table("contact")), scene.table("material")
+    if "contact_modulus" not in options:
+        options["contact_modulus"] = effective_modulus(material["young"], material["poisson"])
+    if "hardness" in material:
+        options.setdefault("hardness", material["hardness"])
+    return options
+
+
 def _press(faces: xr.Dataset, options: dict[str, Any], keep: tuple[str, ...]) -> xr.Dataset:
     return _call("contact", "press", faces["height"], keep=keep, **options)
 
@@ -217,7 +232,7 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     if name == "delta_surface" and name not in scene.wanted("joints"):
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
     if name == "closure":
-        return _closure_work(crack, options, scene.table("joint").get("closure", {}), stage.keep)
+        return _closure_work(crack, options, loads_of(scene)[0], stage.keep)
     if name == "elastic_dilatancy":
         directions = options.pop("direction", ("E", "N", "W", "S"))
         directions = [directions] if isinstance(directions, str) else list(directions)
@@ -228,11 +243,8 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     return Work((partial(_call, "joints", JOINT_STAGES[name], crack, **options),))
 
 
-def _closure_work(crack: Crack, options: dict[str, Any], own: Table, keep: tuple[str, ...]) -> Work:
-    given = [key for key in LOADS if key in options]
-    # a load of the stage itself goes before one that the whole joint has
-    chosen = next((key for key in given if key in own), given[0])
-    options = {key: value for key, value in options.items() if key not in LOADS or key == chosen}
+def _closure_work(crack: Crack, options: dict[str, Any], load: str, keep: tuple[str, ...]) -> Work:
+    options = {key: value for key, value in options.items() if key not in LOADS or key == load}
     shears = options.pop("shear")
     shears = shears if isinstance(shears, list) else [shears]
     parts = (partial(_call, "joints", "closure", crack, shear=[v], keep=keep, **options) for v in shears)

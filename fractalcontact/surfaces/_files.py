@@ -37,6 +37,10 @@ def opened(path: Path) -> IO[bytes]:
         raise UnreadableFile("fractalcontact.surfaces.read", [message]) from error
 
 
+class NoNumbers(ValueError):
+    """A text file is empty."""
+
+
 def read_table(path: Path) -> Array:
     """Return the numbers of a text file, one row to a line; raise ValueError where it is not such a table.
 
@@ -53,7 +57,7 @@ def read_table(path: Path) -> Array:
             io.StringIO(text), delimiter=delimiter, converters=_number, ndmin=2, encoding="utf-8"
         )
     if table.size == 0:
-        raise ValueError("no numbers in it")
+        raise NoNumbers("no numbers in it")
     return np.asarray(table)
 
 

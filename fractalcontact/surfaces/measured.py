@@ -221,7 +221,7 @@ def _table(
     try:
         values = _files.read_npy(path) if suffix == ".npy" else _files.read_table(path)
     except ValueError as error:
-        if suffix in TABLES:
+        if suffix in TABLES and not isinstance(error, _files.NoNumbers):
             return None
         raise UnreadableFile(
             "fractalcontact.surfaces.read", [f"path: {path.name!r} is corrupt ({error})"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.scenes.reading import Scene
+from fractalcontact.scenes.scene import Scene
 
 
 def test_a_land_surface_is_described_without_a_download():

@@ -65,6 +65,13 @@ def test_everything_wrong_is_listed_at_once(write):
         ("[want]", "[want]\ndimensions = ['guess']", "guess"),
         ("[want]", "[want]\ncontact = ['press']", "exactly one of closure"),
         ('["closure", "rigid_dilatancy"]', '["closure"]\nkeep = ["everything"]', "everything"),
+        ("[1e-4, 4e-4]", "{ start = 0.0, stop = 4e-4 }", "joint.shear.step"),
+        ("[1e-4, 4e-4]", "{ start = 0.0, stop = inf, step = 1e-4 }", "joint.shear.stop"),
+        ("[1e-4, 4e-4]", "{ start = 0.0, stop = 4e-4, step = 1e-15 }", "10.6 entries"),
+        ("[1e-4, 4e-4]", "[]", "empty"),
+        ("[1.0, 10.0]", "[1.0, 10.0]\nnominal_pressure = [1e5]", "normal_force, nominal_pressure"),
+        ('direction = "W"', 'direction = ["W", "E"]', "one direction for closure"),
+        ('generate = "fbm"', "read = 3", "surface.read"),
     ],
 )
 def test_each_fault_is_named(write, old, new, word):
@@ -95,6 +102,10 @@ def test_the_shipped_scenes_are_found_by_name_and_are_sound(name, tmp_path, monk
         ("normal_force = [1.0, 10.0]", "", ("closure, normal_force or nominal_pressure",)),
         ("young = 30e9", "young = -1.0\nfoo = 2", ("material.young", "material.foo")),
         ("block = 2.4e-3", "block = 1.0\nblokk = 2", ("joint.blokk", "block: expected")),
+        ("young = 30e9", "yuong = 30e9", ("material.yuong", "did you mean 'young'", "material.young")),
+        ("hurst = 0.8", "hirst = 0.8", ("surface.hirst", "surface.hurst")),
+        ('generate = "fbm"', 'read = "x.npy"\nspacng = 1', ("surface.spacng", "surface.shape")),
+        ("shear = [1e-4, 4e-4]", 'shear = "1e-4"', ("joint.shear",)),
     ],
 )
 def test_the_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, new, words):
@@ -112,7 +123,7 @@ def test_an_unset_variable_and_a_missing_file_are_named(write, tmp_path):
         text = f"[surface]\nread = '{name}'\nspacing = 1e-4\n[want]\nsurfaces = ['describe']\n"
         done = command("run", write(text), "-o", tmp_path / "out")
         assert done.returncode == 2
-        assert name in done.stderr
+        assert name.removeprefix("${").partition("}")[0] in done.stderr
 
 
 def test_the_plan_is_printed_and_nothing_runs(write, tmp_path):
@@ -120,3 +131,15 @@ def test_the_plan_is_printed_and_nothing_runs(write, tmp_path):
     assert done.returncode == 0
     assert "joints/closure" in done.stdout
     assert not (tmp_path / "out").exists()
+
+
+def test_a_load_of_the_whole_joint_may_be_a_closure(write):
+    scene = fc.scenes.load(write(SOUND.replace("normal_force = [1.0, 10.0]", "closure = [1e-7, 1e-6]")))
+    closure = fc.scenes.run(scene, progress=False)["joints/closure"]
+    assert closure["closure"].values.ravel() == pytest.approx([1e-7, 1e-6] * 2)
+
+
+def test_a_pressed_face_takes_its_modulus_from_the_material(write):
+    text = SOUND[: SOUND.index("[joint]")] + "[contact]\nnormal_force = 1.0\n[want]\ncontact = ['press']\n"
+    pressed = fc.scenes.run(fc.scenes.load(write(text)), progress=False)["contact"]
+    assert float(pressed["contact_modulus"]) == pytest.approx(30e9 / (2 * (1 - 0.2**2)))
