@@ -107,46 +107,39 @@ def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     return scipy.fft.dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
-def convolve(plane: Array, symbol: Array, padded: tuple[int, int]) -> Array:
-    """Return the plane convolved with the kernel of a real symbol, on a plane padded with zeros.
+def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
+    """Transform a real plane (ny, nx) padded with zeros to (my, mx): to (my, mx//2 + 1).
 
-    Parameters
-    ----------
-    plane : ndarray, shape (ny, nx)
-    symbol : ndarray, shape (my, mx//2 + 1)
-        Transform of the kernel on the padded plane (my, mx).
-    padded : (my, mx)
-        Shape of the padded plane.
-
-    Returns
-    -------
-    ndarray, shape (ny, nx)
-        A view of a larger array. Rows of zeros are never transformed along x.
+    The rows of zeros are never transformed along x. `out` is used where the library can write into it.
     """
-    ny, nx = plane.shape
     if library() == "ducc0":
-        return _convolve_ducc0(plane, symbol, padded)
+        ny, nx = plane.shape
+        rows = np.zeros((ny, padded[1]), dtype=plane.dtype)
+        rows[:, :nx] = plane
+        if out is None:
+            kind = np.result_type(plane.dtype, np.complex64)
+            out = np.empty((padded[0], padded[1] // 2 + 1), dtype=kind)
+        out[ny:] = 0
+        _ducc0().r2c(rows, axes=(1,), forward=True, nthreads=_ducc_threads(), out=out[:ny])
+        return _ducc0().c2c(out, axes=(0,), forward=True, nthreads=_ducc_threads(), out=out)  # type: ignore[no-any-return]
     threads = thread_count()
     modes = scipy.fft.rfft(plane, n=padded[1], axis=1, workers=threads)
-    modes = scipy.fft.fft(modes, n=padded[0], axis=0, workers=threads)
-    modes *= symbol
+    return scipy.fft.fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
+
+
+def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]) -> Array:
+    """Undo a transform of the padded plane (my, mx), keeping its corner (ny, nx); the modes are used up."""
+    ny, nx = shape
+    if library() == "ducc0":
+        threads = _ducc_threads()
+        _ducc0().c2c(modes, axes=(0,), forward=False, inorm=2, nthreads=threads, out=modes)
+        rows = _ducc0().c2r(
+            modes[:ny], axes=(1,), lastsize=padded[1], forward=False, inorm=2, nthreads=threads
+        )
+        return np.ascontiguousarray(rows[:, :nx])
+    threads = thread_count()
     modes = scipy.fft.ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
-    return scipy.fft.irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx]  # type: ignore[no-any-return]
-
-
-def _convolve_ducc0(plane: Array, symbol: Array, padded: tuple[int, int]) -> Array:
-    ny, nx = plane.shape
-    transform, threads = _ducc0(), _ducc_threads()
-    rows = np.zeros((ny, padded[1]), dtype=plane.dtype)
-    rows[:, :nx] = plane
-    modes = np.zeros(symbol.shape, dtype=np.result_type(plane.dtype, np.complex64))
-    transform.r2c(rows, axes=(1,), forward=True, nthreads=threads, out=modes[:ny])
-    transform.c2c(modes, axes=(0,), forward=True, nthreads=threads, out=modes)
-    modes *= symbol
-    transform.c2c(modes, axes=(0,), forward=False, inorm=2, nthreads=threads, out=modes)
-    return transform.c2r(  # type: ignore[no-any-return]
-        modes[:ny], axes=(1,), lastsize=padded[1], forward=False, inorm=2, nthreads=threads, out=rows
-    )[:, :nx]
+    return np.ascontiguousarray(scipy.fft.irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx])
 
 
 def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:

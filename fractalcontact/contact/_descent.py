@@ -284,7 +284,7 @@ class Run:
     def uniform(self, gap: float) -> float:
         """Uniform pressure on the free set that would close the summed gap (periodic bodies, else zero).
 
-        Their compliance knows nothing of the mean, whose stiffness grows without bound as the last gap closes.
+        Their compliance knows nothing of the mean, whose stiffness grows without bound towards full contact.
         """
         settled = self.pre.mean_settlement()
         return gap / settled if settled > 0 else 0.0

@@ -1,4 +1,4 @@
-"""The paper's own method: a dense system on the nodes that may touch, tension nodes dropped until none is left.
+"""The paper's own method: a dense system on the nodes that may touch, tension nodes dropped in turns.
 
 It is the slow, readable reference for small faces. Under an imposed closure w the nodes of the trial set D
 settle by w - gap; the system K f = w - gap on D is solved, nodes in tension leave D, and so on: D only
@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,9 @@ class Balance:
 
 def at_closure(dense: Dense, nodes: Array, closure: float) -> Balance:
     """Drop tension nodes from `nodes` under an imposed closure."""
-    for rounds in count(1):
+    rounds = 0
+    while True:
+        rounds += 1
         right = np.stack([closure - dense.gap[nodes], np.ones(nodes.size)], axis=1)
         both = solve_dense(dense.matrix(nodes, nodes), right, assume_a="pos", check_finite=False)
         pressure = both[:, 0]
@@ -85,7 +86,9 @@ def at_closure(dense: Dense, nodes: Array, closure: float) -> Balance:
 
 def at_force(dense: Dense, nodes: Array, total: float) -> Balance:
     """Drop tension nodes from `nodes` while their pressures add up to `total`."""
-    for rounds in count(1):
+    rounds = 0
+    while True:
+        rounds += 1
         n = nodes.size
         matrix = np.ones((n + 1, n + 1))
         matrix[:n, :n] = dense.matrix(nodes, nodes)

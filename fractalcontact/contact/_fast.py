@@ -15,17 +15,14 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.contact._descent import Descent
-from fractalcontact.contact._nested import cold_start, plane_descent
+from fractalcontact.contact._nested import cold_start
 from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
 from fractalcontact.contact._operator import Operator
+from fractalcontact.contact._plane import WHOLE_PLANE, Plane, Window
 from fractalcontact.contact._problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Window = tuple[slice, slice]
-WHOLE_PLANE = (slice(None), slice(None))
 
-SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
-SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
 GREATEST_REACH = 2.0  # extrapolation along the path, in steps
 FEW_NODES = 1000  # candidates up to which sums over pairs are faster than transforms
 FIRST_NODES = 256  # candidates to begin with
@@ -81,8 +78,8 @@ class Fast:
         if len(self.known) == 2 and self.known[0][0] != value:
             reach = np.log(control.value / value) / np.log(value / self.known[0][0])
             if abs(reach) <= GREATEST_REACH:
-                return np.maximum(pressure + reach * (pressure - self.known[0][2]), 0.0)
-        return pressure * (control.value / value)
+                return np.asarray(np.maximum(pressure + reach * (pressure - self.known[0][2]), 0.0))
+        return np.asarray(pressure * (control.value / value))
 
     def expected_closure(self, control: Control) -> float | None:
         """Closure given, or extrapolated as a power of the force."""
@@ -178,7 +175,7 @@ class Fast:
             start, window = pressure, self.window(solution.closure)
 
     def window(self, closure: float) -> Window:
-        """Box of the nodes whose gap is below `closure`, with some room; the whole where it is not much less."""
+        """Box of the nodes whose gap is below `closure`; the whole plane where that is not much more."""
         near = self.problem.gap < closure
         box = []
         for axis, n in enumerate(near.shape):
@@ -200,40 +197,3 @@ class Fast:
         handed = [start if window == WHOLE_PLANE else start[window]]
         del start
         return self.count(self.plane.solve(handed, control, self.tolerance))
-
-
-class Plane:
-    """The iteration on a window of the plane, first in single and then in double precision."""
-
-    def __init__(self, problem: Problem, window: Window) -> None:
-        self.window = window
-        gap = problem.gap[window]
-        body = replace(problem.body, shape=(gap.shape[0], gap.shape[1]))
-        self.part = Problem(body, gap, problem.cap)
-        self.local = problem.local
-        self.kept: dict[Any, Descent] = {}
-
-    def solve(self, handed: list[Array], control: Control, tolerance: float) -> Solution:
-        """Solve from the pressure in `handed`, which is taken out: nobody else shall keep so large an array."""
-        before = (0, 0)
-        if self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
-            rough = self.descent(np.float32).solve(handed.pop(), control, SINGLE_ENOUGH, certify=False)
-            before = (rough.iterations, rough.transforms)
-            handed.append(rough.pressure)
-            del rough
-        solution = self.descent(np.float64).solve(handed.pop(), control, tolerance)
-        return replace(
-            solution,
-            iterations=solution.iterations + before[0],
-            transforms=solution.transforms + before[1],
-        )
-
-    def descent(self, kind: Any) -> Descent:
-        """Return the iteration in one precision; kept for a free body, whose kernel takes time to make."""
-        if kind in self.kept:
-            return self.kept[kind]
-        descent = plane_descent(self.part, kind)
-        descent.local = self.local
-        if not self.part.body.periodic:
-            self.kept[kind] = descent
-        return descent

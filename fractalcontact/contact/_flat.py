@@ -43,7 +43,8 @@ def flat_block(body: Body) -> FlatBlock:
     operator, precondition = body.operator(), Preconditioner(body, np.float64)
     u = operator.apply(p)
     t, product, best = np.zeros_like(p), 0.0, (np.inf, p, u)
-    for iteration in range(GREATEST_ITERATIONS):
+    iteration = 0
+    while iteration < GREATEST_ITERATIONS:
         closure = serial_sum(p * u) / serial_sum(p)
         g = u - closure
         error = float(np.abs(g).max()) / closure
@@ -59,6 +60,7 @@ def flat_block(body: Body) -> FlatBlock:
         r = operator.apply(t)
         step = serial_sum(g * t) / serial_sum(t * r)
         p, u = p - step * t, u - step * r
+        iteration += 1
     error, p, _ = best
     p = p / serial_sum(p)
     u = operator.apply(p)

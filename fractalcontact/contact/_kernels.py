@@ -11,8 +11,6 @@ import numpy as np
 
 from fractalcontact.base.jit import kernel, sum_kernel
 
-# ruff: noqa: D103 (each pass is described where it is used, in _descent.py)
-
 
 @kernel
 def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ignore[no-untyped-def]
@@ -63,6 +61,14 @@ def scale_modes(start, stop, modes, qy2, qx2, factor, invert, mean):  # type: ig
                 modes[i, j] *= factor * np.sqrt(qy2[i] + qx2[j])
         if qy2[i] == 0:
             modes[i, 0] = first * mean
+
+
+@kernel
+def multiply(start, stop, modes, symbol):  # type: ignore[no-untyped-def]
+    """Multiply modes by a real symbol."""
+    for i in range(start, stop):
+        for j in range(modes.shape[1]):
+            modes[i, j] *= symbol[i, j]
 
 
 @sum_kernel
@@ -229,7 +235,7 @@ def slope(start, stop, rows, gap, u, t, r, closure, out):  # type: ignore[no-unt
 
 @sum_kernel
 def survey(start, stop, rows, p, t, step, cap, out):  # type: ignore[no-untyped-def]
-    """Count what a step along -t would push over the bounds; sum what it would leave (all, and at the cap)."""
+    """Count what a step along -t would push over the bounds; sum what it leaves (all, and at the cap)."""
     ny, nx = t.shape
     nothing = 0 * step
     for k in range(start, stop):

@@ -12,8 +12,7 @@ import numpy as np
 
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
-from fractalcontact.contact._descent import Descent
-from fractalcontact.contact._precondition import Preconditioner
+from fractalcontact.contact._plane import plane_descent
 from fractalcontact.contact._problem import Body, Control, Problem
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -38,14 +37,6 @@ def cold_start(problem: Problem, control: Control, kind: Any) -> tuple[Array, fl
     ny, nx = problem.body.shape
     finer = np.repeat(np.repeat(pressure, factors[0], axis=0), factors[1], axis=1)[:ny, :nx]
     return finer, solution.closure
-
-
-def plane_descent(problem: Problem, kind: Any) -> Descent:
-    """Return the iteration on the whole plane of a problem."""
-    body = problem.body
-    operator = body.operator(kind)
-    precondition = Preconditioner(body, kind, getattr(operator, "wavenumbers", None))
-    return Descent(problem.gap, problem.cap, operator, precondition, problem.local, kind)
 
 
 def coarser(problem: Problem, factors: tuple[int, ...]) -> Problem:

@@ -70,12 +70,18 @@ class FreeOperator:
         shape = table.shape
         self.padded = (padded_length(shape[0]), padded_length(shape[1]))
         self.symbol = convolution_symbol(table, self.padded).astype(kind)
+        self.modes: Array | None = None
         self.transforms = 0
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Return the settlement under `pressure`."""
+        from fractalcontact.contact._kernels import multiply
+
         self.transforms += 1
-        return np.ascontiguousarray(fft.convolve(pressure, self.symbol, self.padded))
+        modes = fft.rfft2_padded(pressure, self.padded, self.modes)
+        self.modes = modes if fft.writes_in_place() else None
+        in_bands(multiply, modes.shape[0], modes.size, modes, self.symbol)
+        return fft.irfft2_cropped(modes, self.padded, (pressure.shape[0], pressure.shape[1]))
 
 
 def padded_length(n: int) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fractalcontact.base.jit import in_bands
 from fractalcontact.contact._flat import flat_block
-from fractalcontact.contact._problem import Body, Control, Problem, Solution, serial_sum
+from fractalcontact.contact._problem import Body, Control, Problem, Solution
 from fractalcontact.contact._setup import Units
 
 Array = np.ndarray[Any, np.dtype[Any]]

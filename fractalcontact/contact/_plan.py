@@ -89,7 +89,7 @@ def _boundary(given: Any, grid: Grid, problems: Problems) -> bool:
 
 
 def _limits(path: Path, grid: Grid, problems: Problems) -> None:
-    """Refuse what has no solution: more force than the hardness bears, periodic closure beyond the mean plane."""
+    """Refuse what has no solution: too much force for the hardness, too much closure of a periodic body."""
     most = max(path.values)
     if path.control == "normal_force":
         greatest = path.hardness * grid.nominal_area

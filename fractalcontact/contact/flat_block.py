@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.contact._setup import make_body, length_unit
+from fractalcontact.contact._setup import length_unit, make_body
 
 
 def flat_stiffness(
@@ -20,7 +20,7 @@ def flat_stiffness(
 ) -> float:
     """Force per closure of two perfectly mating faces, in N/m.
 
-    The bulk part of a closure is force / stiffness, and `press` returns exactly that for a face of zero range.
+    The bulk part of a closure is force / stiffness; `press` returns exactly that for a face of zero range.
 
     Parameters
     ----------
@@ -58,8 +58,9 @@ def flat_stiffness(
         modulus = problems.number("contact_modulus", contact_modulus, above=0)
         problems.choice("boundary", boundary, ("free", "periodic"))
         problems.choice("settlement", settlement, ("rigid", "uniform"))
-        whole = len(shape) == 2 and all(problems.integer("shape", n, at_least=3) > 0 for n in shape)
-        problems.require(whole, "shape", "(ny, nx), both at least 3", shape)
+        if problems.require(len(shape) == 2, "shape", "(ny, nx)", shape):
+            for n in shape:
+                problems.integer("shape", n, at_least=3)
         steps = problems.numbers("spacing", spacing, above=0)
         problems.require(steps.size in (1, 2), "spacing", "one length or (dy, dx)", spacing)
         pair = (float(steps[0]), float(steps[-1]))

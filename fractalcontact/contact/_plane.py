@@ -1,0 +1,64 @@
+"""The iteration on a plane or on a window of it, first in single and then in double precision."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.contact._descent import Descent
+from fractalcontact.contact._precondition import Preconditioner
+from fractalcontact.contact._problem import Control, Problem, Solution
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Window = tuple[slice, slice]
+WHOLE_PLANE = (slice(None), slice(None))
+
+SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
+SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
+
+
+def plane_descent(problem: Problem, kind: Any) -> Descent:
+    """Return the iteration on the whole plane of a problem."""
+    body = problem.body
+    operator = body.operator(kind)
+    precondition = Preconditioner(body, kind, getattr(operator, "wavenumbers", None))
+    return Descent(problem.gap, problem.cap, operator, precondition, problem.local, kind)
+
+
+class Plane:
+    """The iteration on a window of the plane, first in single and then in double precision."""
+
+    def __init__(self, problem: Problem, window: Window) -> None:
+        self.window = window
+        gap = problem.gap[window]
+        body = replace(problem.body, shape=(gap.shape[0], gap.shape[1]))
+        self.part = Problem(body, gap, problem.cap)
+        self.local = problem.local
+        self.kept: dict[Any, Descent] = {}
+
+    def solve(self, handed: list[Array], control: Control, tolerance: float) -> Solution:
+        """Solve from the pressure in `handed`, which is taken out: nobody else shall hold that array."""
+        before = (0, 0)
+        if self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
+            rough = self.descent(np.float32).solve(handed.pop(), control, SINGLE_ENOUGH, certify=False)
+            before = (rough.iterations, rough.transforms)
+            handed.append(rough.pressure)
+            del rough
+        solution = self.descent(np.float64).solve(handed.pop(), control, tolerance)
+        return replace(
+            solution,
+            iterations=solution.iterations + before[0],
+            transforms=solution.transforms + before[1],
+        )
+
+    def descent(self, kind: Any) -> Descent:
+        """Return the iteration in one precision; kept for a free body, whose kernel takes time to make."""
+        if kind in self.kept:
+            return self.kept[kind]
+        descent = plane_descent(self.part, kind)
+        descent.local = self.local
+        if not self.part.body.periodic:
+            self.kept[kind] = descent
+        return descent
