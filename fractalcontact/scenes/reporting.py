@@ -21,6 +21,7 @@ def summary(tree: xr.DataTree) -> str:
         str(tree.attrs.get("title", tree.name or "result")),
         _dimensions(tree),
         _contact(tree),
+        _faces(tree),
         _closure(tree),
         _dilatancy(tree),
         _friction(tree),
@@ -160,6 +161,23 @@ def _contact(tree: xr.DataTree) -> str:
             )
         )
     return table(rows)
+
+
+def _faces(tree: xr.DataTree) -> str:
+    found, lower = _group(tree, "joints/faces"), _group(tree, "surfaces")
+    if found is None or "mismatch" not in found:
+        return ""
+    told = [
+        f"mated position: shift {length(found['shift_x'])} along x and {length(found['shift_y'])} along y, "
+        f"turn {float(found['rotation']):.3g} degree",
+        f"mismatch {length(found['mismatch'])} rms, correlation {float(found['correlation']):.3f}",
+    ]
+    if lower is not None and "height" in lower:
+        opening = found["height"] - lower["height"]
+        told.append(
+            f"opening {length(opening.mean())} on average, from {length(opening.min())} (overlap if negative)"
+        )
+    return "\n".join(told)
 
 
 def _closure(tree: xr.DataTree) -> str:
