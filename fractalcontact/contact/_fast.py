@@ -28,6 +28,7 @@ FEW_NODES = 1000  # candidates up to which sums over pairs are faster than trans
 FIRST_NODES = 256  # candidates to begin with
 WHOLE = 0.75  # part of the extent from which a window is not worth having
 TRIAL = 1e-2  # residual at which a closure is known well enough to tell the candidates
+DUST = 1e-13  # part of the greatest pressure that is rounding
 ROOM = 1.1  # candidates for this much more than the expected closure
 
 
@@ -62,8 +63,18 @@ class Fast:
             solution = self.on_plane(control, WHOLE_PLANE, self.guess(control))
         else:
             solution = self.on_nodes(control) or self.on_window(control)
+        solution = self.without_dust(solution)
         self.known = [*self.known[-1:], (control.value, solution.closure, solution.pressure)]
         return replace(solution, iterations=self.spent[0], transforms=self.spent[1])
+
+    def without_dust(self, solution: Solution) -> Solution:
+        """Open the nodes that bear no more than rounding and are apart: left by an extrapolation, say."""
+        pressure = solution.pressure
+        dust = (pressure > 0) & (pressure <= DUST * pressure.max(initial=0.0))
+        if not dust.any():
+            return solution
+        apart = self.problem.gap + solution.settlement > solution.closure
+        return replace(solution, pressure=np.where(dust & apart, 0.0, pressure))
 
     def count(self, solution: Solution) -> Solution:
         """Add up the work of the attempts of a step."""
