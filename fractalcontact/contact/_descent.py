@@ -35,8 +35,9 @@ from fractalcontact.contact._problem import Control, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-GATE = 0.3
-FEW = 0.003
+GATE = 0.4  # error outside over error inside from which nodes enter
+FEW = 0.003  # share of the set that may always enter
+SLIGHT = 0.001  # share of the set that may change without losing the conjugacy
 GREATEST_ITERATIONS = 2000
 PATIENCE = 40  # iterations without progress
 HALVINGS = 20
@@ -279,7 +280,8 @@ class Run:
         sums = self.run(_kernels.correct, pre.columns, pre.mask, extra, self.gap, self.u, closure, plane)
         mean = sums[0] / count if self.forced else -self.uniform(gap)
         before, self.product = self.product, float(sums[1] - mean * gap)
-        return plane, mean, self.product / before if changes == 0 and before > 0 else 0.0
+        kept = changes <= SLIGHT * count and before > 0
+        return plane, mean, self.product / before if kept else 0.0
 
     def uniform(self, gap: float) -> float:
         """Uniform pressure on the free set that would close the summed gap (periodic bodies, else zero).
