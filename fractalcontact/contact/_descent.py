@@ -277,11 +277,13 @@ class Run:
             self.spare = plane
         else:
             self.wide = plane
-        sums = self.run(_kernels.correct, pre.columns, pre.mask, extra, self.gap, self.u, closure, plane)
+        bodies = (self.gap, self.u, self.t, closure, plane)
+        sums = self.run(_kernels.correct, pre.columns, pre.mask, extra, *bodies)
         mean = sums[0] / count if self.forced else -self.uniform(gap)
         before, self.product = self.product, float(sums[1] - mean * gap)
-        kept = changes <= SLIGHT * count and before > 0
-        return plane, mean, self.product / before if kept else 0.0
+        beta = self.product / before if changes <= SLIGHT * count and before > 0 else 0.0
+        # the part of the last direction that is kept must not change the force either
+        return plane, mean + (beta * sums[2] / count if self.forced else 0.0), beta
 
     def uniform(self, gap: float) -> float:
         """Uniform pressure on the free set that would close the summed gap (periodic bodies, else zero).

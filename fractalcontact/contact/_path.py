@@ -17,7 +17,7 @@ from fractalcontact.contact._setup import Units
 Array = np.ndarray[Any, np.dtype[Any]]
 Solver = Callable[[Control], Solution]
 
-BALANCE = 1e-6  # greatest share of a given force that the pressures may miss
+BALANCE = 1e-9  # greatest share of a given force that the pressures may miss
 
 
 @dataclass(frozen=True)
