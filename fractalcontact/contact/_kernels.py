@@ -186,12 +186,12 @@ def collect(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-untyp
 
 
 @sum_kernel
-def correct(start, stop, rows, columns, mask, bins, gap, u, closure, x, out):  # type: ignore[no-untyped-def]
-    """Add the bin to x; on the free set sum x and x g."""
+def correct(start, stop, rows, columns, mask, bins, gap, u, t, closure, x, out):  # type: ignore[no-untyped-def]
+    """Add the bin to x; on the free set sum x, x g and t."""
     ny, nx = gap.shape
     wide = np.empty(nx, x.dtype)
     for k in range(start, stop):
-        total, along = 0.0, 0.0
+        total, along, last = 0.0, 0.0, 0.0
         for j in range(nx):
             wide[j] = bins[k, j // columns]
         for i in range(k * rows, min(k * rows + rows, ny)):
@@ -201,7 +201,8 @@ def correct(start, stop, rows, columns, mask, bins, gap, u, closure, x, out):  #
                 free = np.float64(z) if mask[i, j] else 0.0
                 total += free
                 along += free * (u[i, j] + gap[i, j] - closure)
-        out[k, 0], out[k, 1] = total, along
+                last += np.float64(t[i, j]) if mask[i, j] else 0.0
+        out[k, 0], out[k, 1], out[k, 2] = total, along, last
 
 
 @sum_kernel

@@ -83,7 +83,10 @@ def _checked_radius(
             return 1.0
         radius = _influence.disc_radius(word, spacing)
     else:
+        known = len(problems.found)
         radius = problems.number("disc_radius", choice, above=0) / unit
+        if len(problems.found) > known:
+            return 1.0
     least = _symbol(radius / float(np.sqrt(spacing[0] * spacing[1])), ratio)
     problems.require(
         least > 0,
