@@ -1,0 +1,180 @@
+"""The parts of the fast method: preconditioner, nodes and windows, precision, paths, the meaning of the residual."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
+from fractalcontact.contact import _fast, _plane
+from fractalcontact.contact._precondition import Preconditioner
+from fractalcontact.contact._problem import Body
+
+MODULUS = 1e9
+
+
+def rough(n=64, periodic=True, **options):
+    surface = fc.surfaces.spectral((n, n), 1e-4, hurst=0.8, rms_slope=0.1, rng=3, **options)
+    return surface if periodic else fc.surfaces.from_array(surface.values, 1e-4)
+
+
+def press(surface, **options):
+    return fc.contact.press(
+        surface, contact_modulus=MODULUS, **{"keep": ("state", "pressure", "gap"), **options}
+    )
+
+
+def preconditioned(body, free):
+    """Matrix of the preconditioner on a set."""
+    precondition = Preconditioner(body, np.float64)
+    rows, columns = precondition.rows, precondition.columns
+    nodes = np.argwhere(free)
+    matrix = np.empty((len(nodes), len(nodes)))
+    for k, (i, j) in enumerate(nodes):
+        precondition.mask[: free.shape[0], : free.shape[1]] = free
+        plane = np.zeros(precondition.plane)
+        plane[i, j] = 1.0
+        precondition.sums[...], precondition.counts[...] = 0.0, 0.0
+        precondition.sums[i // rows, j // columns] = 1.0
+        np.add.at(precondition.counts, (nodes[:, 0] // rows, nodes[:, 1] // columns), 1.0)
+        plane, extra = precondition.apply(plane)
+        full = plane[: free.shape[0], : free.shape[1]].copy()
+        full += extra[np.arange(free.shape[0])[:, None] // rows, np.arange(free.shape[1])[None, :] // columns]
+        matrix[:, k] = full[free]
+    return matrix
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_the_preconditioner_is_symmetric_and_no_smaller_than_the_inverse(periodic):
+    shape = (24, 32)
+    body = Body(shape, (1.0, 1.0), periodic, "spectral" if periodic else "disc", 0.4365941)
+    free = np.random.default_rng(0).random(shape)
+    free = (free + np.roll(free, 1, 0) + np.roll(free, 1, 1)) > 1.8
+    matrix = preconditioned(body, free)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
+    nodes = np.flatnonzero(free)
+    compliance = np.empty((nodes.size, nodes.size))
+    operator = body.operator()
+    for k, node in enumerate(nodes):
+        unit = np.zeros(shape)
+        unit.ravel()[node] = 1.0
+        compliance[:, k] = operator.apply(unit).ravel()[nodes]
+    ones = np.ones((nodes.size, nodes.size)) / nodes.size
+    zero_sum = np.eye(nodes.size) - ones  # under force control only pressures that add up to nothing move
+    product = zero_sum @ matrix @ zero_sum @ compliance @ zero_sum
+    values = np.sort(np.linalg.eigvals(product).real)[1:]
+    assert values.min() > 0.85
+    assert values.max() < 3.0
+
+
+@pytest.mark.parametrize("pressure", [1e3, 1e5, 3e6])
+def test_few_nodes_give_what_the_plane_gives(monkeypatch, pressure):
+    surface = rough(80, periodic=False)
+    nodes = press(surface, nominal_pressure=pressure, tolerance=1e-12)
+    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    plane = press(surface, nominal_pressure=pressure, tolerance=1e-12)
+    np.testing.assert_array_equal(nodes["state"], plane["state"])
+    np.testing.assert_allclose(
+        nodes["pressure"], plane["pressure"], atol=1e-9 * float(plane["pressure"].max())
+    )
+    np.testing.assert_allclose(nodes["closure"], plane["closure"], rtol=1e-12)
+    np.testing.assert_allclose(nodes["mean_gap"], plane["mean_gap"], rtol=1e-10)
+
+
+def ball(n):
+    x = (np.arange(n) - n // 3) * 1e-5
+    return fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2, 1e-5)
+
+
+@pytest.mark.parametrize("control", [{"closure": [1e-9, 4e-8]}, {"normal_force": [1e-6, 0.01]}])
+def test_a_window_gives_what_the_whole_plane_gives(monkeypatch, control):
+    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    window = press(ball(192), tolerance=1e-12, **control)
+    monkeypatch.setattr(_fast, "WHOLE", 0.0)
+    whole = press(ball(192), tolerance=1e-12, **control)
+    np.testing.assert_array_equal(window["state"], whole["state"])
+    np.testing.assert_allclose(window["normal_force"], whole["normal_force"], rtol=1e-11)
+    np.testing.assert_allclose(window["closure"], whole["closure"], rtol=1e-11)
+    np.testing.assert_allclose(window["gap"], whole["gap"], atol=1e-18)
+
+
+def test_single_precision_first_changes_nothing_that_counts(monkeypatch):
+    surface = rough(128)
+    mixed = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
+    monkeypatch.setattr(_plane, "SINGLE_FROM", 10**9)
+    double = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
+    np.testing.assert_array_equal(mixed["state"], double["state"])
+    np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
+
+
+def test_every_step_of_a_path_is_what_it_is_alone():
+    surface, path = rough(96), [1e5, 3e5, 1e6, 1e6, 4e6, 2e5, 0.0, 1e5]
+    along = press(surface, nominal_pressure=path, tolerance=1e-12)
+    for step, pressure in enumerate(path):
+        alone = press(surface, nominal_pressure=pressure, tolerance=1e-12)
+        np.testing.assert_array_equal(along["state"][step], alone["state"][0])
+        assert float(along["closure"][step]) == pytest.approx(float(alone["closure"][0]), rel=1e-11)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-4])
+@pytest.mark.parametrize("control", ["nominal_pressure", "closure"])
+def test_the_residual_bounds_the_energy_of_the_error(periodic, tolerance, control):
+    surface = rough(64, periodic)
+    exact = press(surface, nominal_pressure=1e6, tolerance=1e-12)
+    given = 1e6 if control == "nominal_pressure" else float(exact["closure"][0])
+    coarse = press(surface, **{control: given}, tolerance=tolerance)
+    assert float(coarse["residual"][0]) <= tolerance
+    body = Body((64, 64), (1e-4, 1e-4), periodic, "spectral" if periodic else "disc", 0.4365941e-4)
+    operator = body.operator()
+    error = (coarse["pressure"] - exact["pressure"]).values[0]
+    pressure = coarse["pressure"].values[0]
+    energy = np.sum(error * operator.apply(error)) / np.sum(pressure * operator.apply(pressure))
+    assert 0 < energy <= float(coarse["residual"][0])
+
+
+def test_a_tolerance_beyond_rounding_is_said_not_to_be_met():
+    with pytest.warns(ConvergenceWarning, match="rounding|stagnated"):
+        found = press(rough(64), nominal_pressure=1e6, tolerance=1e-30)
+    assert not bool(found["converged"][0])
+    assert str(found["stop_reason"].values[0]) in ("rounding", "stagnated")
+    assert float(found["residual"][0]) < 1e-11
+
+
+@pytest.mark.parametrize("heights", ["spike", "plateaus", "quantised", "noise", "step", "offset"])
+@pytest.mark.parametrize("periodic", [True, False])
+def test_hard_faces_converge(heights, periodic):
+    n, rng = 40, np.random.default_rng(2)
+    base = rough(n).values
+    face = {
+        "spike": np.where(np.arange(n * n).reshape(n, n) == 777, 1e-6, 0.0),
+        "plateaus": np.minimum(base, 0.0),
+        "quantised": np.round(base / 2e-6) * 2e-6,
+        "noise": 1e-6 * rng.normal(size=(n, n)),
+        "step": np.where(np.arange(n)[None, :] > n // 2, 1e-6, 0.0) * np.ones((n, 1)),
+        "offset": base + 1e3,
+    }[heights]
+    surface = fc.surfaces.from_array(face, 1e-4, periodic=periodic)
+    found = press(surface, nominal_pressure=[1.0, 1e4, 1e6, 1e8, 1e10])
+    assert bool(found["converged"].all())
+    assert (found["gap"] >= 0).all()
+    assert (found["pressure"] >= 0).all()
+    assert (np.diff(found["closure"]) >= -1e-12 * float(found["closure"].max())).all()
+
+
+def test_beyond_full_contact_the_body_is_linear():
+    surface = rough(48)
+    found = press(surface, nominal_pressure=[1e9, 2e9], tolerance=1e-12)
+    assert (found["contact_fraction"] == 1).all()
+    np.testing.assert_allclose(np.diff(found["pressure"], axis=0), 1e9, rtol=1e-9)
+    np.testing.assert_allclose(found["elastic_energy"][0], found["elastic_energy"][1], rtol=1e-9)
+    np.testing.assert_allclose(found["mean_gap"], 0.0, atol=1e-18)
+
+
+def test_a_periodic_face_cannot_be_closed_beyond_its_mean():
+    surface = rough(32)
+    depth = float(surface.max() - surface.mean())
+    with pytest.raises(InvalidInput, match="mean height"):
+        press(surface, closure=1.001 * depth)
+    nearly = press(surface, closure=0.97 * depth)
+    assert bool(nearly["converged"].all())
+    assert float(nearly["mean_gap"][0]) == pytest.approx(0.03 * depth, rel=1e-6)
