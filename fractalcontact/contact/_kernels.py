@@ -52,15 +52,15 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
 def scale_modes(start, stop, modes, qy2, qx2, factor, invert, mean):  # type: ignore[no-untyped-def]
     """Multiply modes by factor * |q|, or by factor / |q|; by `mean` where q = 0."""
     for i in range(start, stop):
-        first = modes[i, 0]
+        first = 1 if qy2[i] == 0 else 0
+        if first:
+            modes[i, 0] *= mean
         if invert:
-            for j in range(modes.shape[1]):
+            for j in range(first, modes.shape[1]):
                 modes[i, j] *= factor / np.sqrt(qy2[i] + qx2[j])
         else:
-            for j in range(modes.shape[1]):
+            for j in range(first, modes.shape[1]):
                 modes[i, j] *= factor * np.sqrt(qy2[i] + qx2[j])
-        if qy2[i] == 0:
-            modes[i, 0] = first * mean
 
 
 @kernel

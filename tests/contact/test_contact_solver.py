@@ -1,4 +1,4 @@
-"""The parts of the fast method: preconditioner, nodes and windows, precision, paths, the meaning of the residual."""
+"""The parts of the fast method: preconditioner, nodes, windows, precision, paths; what the residual means."""
 
 import numpy as np
 import pytest
