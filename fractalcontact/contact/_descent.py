@@ -16,7 +16,8 @@ free set, precondition its gap, turn the direction, step and clip. What costs ti
   n >= 1024. New nodes are therefore let in only when the error outside exceeds GATE times the error inside
   (proportioning, Dostal and Schoeberl 2005); then the set settles in a few changes. Conjugacy is kept while
   the set stays as it is.
-- Should the objective rise all the same, the step is halved until it does not.
+- Should the objective rise all the same, the step is halved until it does not; should there be no progress,
+  the iteration goes on without the preconditioner, which makes it that of Polonsky and Keer (1999).
 """
 
 from __future__ import annotations
@@ -123,6 +124,7 @@ class Run:
         self.wide = None if self.pre.plane == shape else np.zeros(self.pre.plane, dtype=self.kind)
         self.u = self.p
         self.last, self.halved, self.clipped, self.product, self.step = np.inf, 0, False, 0.0, 0.0
+        self.plain = False  # without the preconditioner, where it should fail
         np.clip(start, 0, self.cap, out=self.p, casting="same_kind")
 
     def run(self, function: Any, *arguments: Any) -> Array:
@@ -149,11 +151,14 @@ class Run:
                 continue
             best, stale = (residual, 0) if residual < 0.9 * best else (best, stale + 1)
             rounded = residual <= balance.floor
-            if stale > (PATIENCE // 8 if rounded else PATIENCE) or not self.turn(balance, inner, outer):
+            iteration += 1
+            if stale <= (PATIENCE // 8 if rounded else PATIENCE) and self.turn(balance, inner, outer):
+                self.advance()
+            elif rounded or self.plain:
                 reason = "rounding" if rounded else "stagnated"
                 break
-            self.advance()
-            iteration += 1
+            else:
+                self.plain, self.product, stale = True, 0.0, 0
         if not self.fresh and certify:
             self.refresh()
             balance = self.weigh()
@@ -272,7 +277,7 @@ class Run:
             plane[:, self.gap.shape[1] :] = 0
         state = (self.gap, self.u, self.p, self.cap, closure, admit, shift)
         changes = self.run(_kernels.select, pre.columns, *state, pre.mask, plane, pre.sums, pre.counts)[0]
-        plane, extra = pre.apply(plane)
+        plane, extra = (plane, np.zeros_like(pre.sums)) if self.plain else pre.apply(plane)
         if self.wide is None:
             self.spare = plane
         else:

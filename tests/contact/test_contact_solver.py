@@ -132,6 +132,27 @@ def test_the_residual_bounds_the_energy_of_the_error(periodic, tolerance, contro
     assert 0 < energy <= float(coarse["residual"][0])
 
 
+@pytest.mark.parametrize("fault", ["sign", "noise"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_preconditioner_that_fails_is_done_without(monkeypatch, fault, boundary):
+    surface = rough(48)
+    options = {"nominal_pressure": 1e6, "boundary": boundary, "tolerance": 1e-9}
+    sound = press(surface, **options)
+    honest, rng = Preconditioner.apply, np.random.default_rng(0)
+
+    def faulty(self, x):
+        plane, extra = honest(self, x)
+        return (-plane, -extra) if fault == "sign" else (rng.normal(size=plane.shape), extra)
+
+    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    monkeypatch.setattr(Preconditioner, "apply", faulty)
+    found = press(surface, **options)
+    assert bool(found["converged"].all())
+    assert int(found["iterations"][0]) > int(sound["iterations"][0])
+    np.testing.assert_array_equal(found["state"], sound["state"])
+    np.testing.assert_allclose(found["closure"], sound["closure"], rtol=1e-9)
+
+
 def test_a_tolerance_beyond_rounding_is_said_not_to_be_met():
     with pytest.warns(ConvergenceWarning, match="rounding|stagnated"):
         found = press(rough(64), nominal_pressure=1e6, tolerance=1e-30)
