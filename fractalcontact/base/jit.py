@@ -8,6 +8,7 @@ the kernel and added up serially, by the kernel or by its caller.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -77,12 +78,13 @@ def in_bands(function: Callable[..., None], count: int, work: int, *arguments: A
 
 
 SHARE = 32768  # elements that are worth a thread
-_pools: dict[int, ThreadPoolExecutor] = {}
+_pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
 _lock = threading.Lock()
 
 
 def _pool(helpers: int) -> ThreadPoolExecutor:
+    key = (os.getpid(), helpers)  # threads do not survive a fork
     with _lock:
-        if helpers not in _pools:
-            _pools[helpers] = ThreadPoolExecutor(helpers, thread_name_prefix="fractalcontact")
-        return _pools[helpers]
+        if key not in _pools:
+            _pools[key] = ThreadPoolExecutor(helpers, thread_name_prefix="fractalcontact")
+        return _pools[key]

@@ -120,7 +120,9 @@ def press(
         plan = make_plan(call, problems)
     measures: list[dict[str, Any]] = []
     maps: dict[str, list[Array]] = {name: [] for name in plan.keep}
-    for step in track(solve_path(plan.path), progress, "press"):
+    steps = solve_path(plan.path)
+    for _ in track(plan.path.values, progress, "press"):
+        step = next(steps)
         measures.append(_measures(step, plan.grid, plan.path.body.periodic))
         for name in plan.keep:
             maps[name].append(_state(step) if name == "state" else getattr(step, name))
