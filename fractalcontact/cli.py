@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import signal
 import sys
 import warnings
@@ -30,8 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return WRONG_INPUT
     except KeyboardInterrupt:
-        print("stopped; finished stages are kept, and the same command goes on from them", file=sys.stderr)
-        return STOPPED
+        print(
+            "stopped; finished stages are kept, and the same command goes on from them",
+            file=sys.stderr,
+            flush=True,
+        )
+        os._exit(STOPPED)  # no waiting for threads that the stop left in the middle of their work
     except BrokenPipeError:
         sys.stderr.close()
         return 0
