@@ -244,7 +244,7 @@ def survey(start, stop, rows, p, t, step, cap, out):  # type: ignore[no-untyped-
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = p[i, j] - step * t[i, j]
-                clipped += (value < 0) | ((value >= cap) & (p[i, j] < cap))
+                clipped += (value < 0) | (value > cap)
                 value = value if value > 0 else nothing
                 over = value >= cap
                 value = cap if over else value

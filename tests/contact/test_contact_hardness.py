@@ -81,3 +81,15 @@ def test_a_very_high_cap_changes_nothing_and_a_path_has_no_memory():
 def test_more_than_the_cap_can_carry_is_refused():
     with pytest.raises(InvalidInput, match="hardness"):
         fc.contact.press(face(), contact_modulus=MODULUS, nominal_pressure=1.01e7, hardness=1e7)
+
+
+def test_a_step_that_leaves_the_bounds_is_seen_and_one_that_reaches_them_is_not():
+    from fractalcontact.contact._kernels import survey
+
+    pressure = np.array([[1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0]])
+    direction = np.array([[-0.1, 0.0, -0.5, -0.6, 0.5, 0.6, 0.0]])  # beyond the cap: 0, 3; below zero: 5
+    out = np.zeros((1, 8))
+    survey(0, 1, 1, pressure, direction, 1.0, 1.0, out)
+    assert out[0, 0] == 3
+    assert out[0, 1] == pytest.approx(4.0)
+    assert out[0, 2] == pytest.approx(4.0)
