@@ -61,11 +61,21 @@ def _parser() -> argparse.ArgumentParser:
 
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
     accuracy.add_argument(
-        "parts", nargs="*", help="surfaces, dimensions, contact, domains, joints; all if none is named"
+        "parts",
+        nargs="*",
+        help="surfaces, dimensions, contact, domains, joints; all if none is named; or estimators alone: "
+        "bias, error over the least possible one and coverage of every estimator of roughness",
     )
     accuracy.add_argument("-o", "--out", help="folder for accuracy.nc and its figures")
     accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
     accuracy.add_argument("--extreme", action="store_true", help="run the catalogue of extreme cases instead")
+    bench = accuracy.add_argument_group("of estimators")
+    bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
+    bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (64 256 1024)")
+    bench.add_argument("--families", nargs="+", help="fbm, spectral; both if none is named")
+    bench.add_argument("--methods", nargs="+", help="names out of `fractalcontact methods`; all of them")
+    bench.add_argument("--members", type=int, nargs="+", help="surfaces of each case (25600 over the size)")
+    bench.add_argument("--seed", type=int, help="of the random stream")
     accuracy.set_defaults(action=_accuracy)
 
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
@@ -130,6 +140,8 @@ def _accuracy(options: argparse.Namespace) -> int:
         findings = {name: accuracy.examine(case) for name, case in accuracy.cases.items()}
         print(cases_table(findings))
         return 0 if all(one.ok for found in findings.values() for one in found) else 1
+    if options.parts == ["estimators"]:
+        return _estimators(options)
     result = accuracy.measure(options.parts or None, budget=options.budget)
     print(curves_table(result))
     if options.out is not None:
@@ -141,6 +153,25 @@ def _accuracy(options: argparse.Namespace) -> int:
         for name, part in result.children.items():
             written.append(f"{name}.png")
             error_against_time(part.to_dataset()).savefig(folder / written[-1], dpi=150)
+        print(f"\nwritten to {options.out}: {', '.join(written)}")
+    return 0
+
+
+def _estimators(options: argparse.Namespace) -> int:
+    from fractalcontact import accuracy
+    from fractalcontact.accuracy.reporting import estimators_table
+
+    asked = {name: getattr(options, name) for name in ("hurst", "sizes", "families", "methods", "members")}
+    given = {name: values for name, values in asked.items() if values is not None}
+    result = accuracy.estimators(**given, rng=options.seed, progress=True)
+    print(estimators_table(result))
+    if options.out is not None:
+        from fractalcontact.base.netcdf import save
+        from fractalcontact.plotting import estimator_errors
+
+        folder = Path(options.out)
+        written = [save(result, folder / "estimators.nc").name, "estimators.png"]
+        estimator_errors(result).savefig(folder / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     return 0
 

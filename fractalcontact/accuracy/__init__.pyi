@@ -1,3 +1,4 @@
+from .bench import estimators as estimators
 from .catalogue import Case as Case
 from .catalogue import cases as cases
 from .examination import examine as examine
@@ -6,6 +7,7 @@ from .measuring import measure as measure
 __all__ = [
     "Case",
     "cases",
+    "estimators",
     "examine",
     "measure",
 ]

@@ -35,6 +35,20 @@ _STATE = {
     "flag_meanings": "open contact yielded",
 }
 
+_STOP_REASONS = (
+    "converged",
+    "rounding",
+    "stagnated",
+    "iteration_limit",
+    "force_missed",
+    "beyond_full_contact",
+)
+STOP_REASONS = {name: np.int8(value) for value, name in enumerate(_STOP_REASONS)}
+_STOP = {
+    "flag_values": np.array(list(STOP_REASONS.values()), dtype=np.int8),
+    "flag_meanings": " ".join(STOP_REASONS),
+}
+
 _NO_INTERVAL = {"comment": "NaN where no honest interval can be given"}
 _NO_CENTRE = {"comment": "NaN where an island winds around the whole period"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
@@ -117,11 +131,12 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "mean_gap": Quantity("m", "mean gap"),
     "elastic_energy": Quantity("J", "elastic energy"),
+    "plastic_work": Quantity("J", "work spent on indentation at the hardness, since the start of the path"),
     "iterations": Quantity("1", "number of iterations"),
     "transforms": Quantity("1", "number of pairs of Fourier transforms"),
     "residual": Quantity("1", "optimality error reached"),
     "converged": Quantity("1", "the tolerance was met"),
-    "stop_reason": Quantity(None, "why the solver stopped"),
+    "stop_reason": Quantity("1", "why the solver stopped", _STOP),
     "state": Quantity("1", "contact state", _STATE),
     "pressure": Quantity("Pa", "contact pressure"),
     "gap": Quantity("m", "gap between the bodies"),
@@ -232,6 +247,19 @@ QUANTITIES: dict[str, Quantity] = {
     "memory": Quantity("byte", "peak memory"),
     "first_run_time": Quantity("s", "run time of the first call, with compilation"),
     "knob": Quantity("1", "setting that trades error for time"),
+    "family": Quantity(None, "family of surfaces"),
+    "size": Quantity("1", "points along an edge"),
+    "bias": Quantity("1", "mean error of the Hurst exponent"),
+    "rms_error": Quantity("1", "root mean square error of the Hurst exponent"),
+    "least_error": Quantity("1", "least standard deviation of the Hurst exponent (Cramer-Rao bound)"),
+    "error_ratio": Quantity("1", "root mean square error over the least one"),
+    "error_ratio_low": Quantity("1", "lower end of the 95 % interval of the error over the least one"),
+    "error_ratio_high": Quantity("1", "upper end of the 95 % interval of the error over the least one"),
+    "interval_coverage": Quantity("1", "share of the 95 % intervals that hold the true exponent"),
+    "interval_coverage_low": Quantity("1", "lower end of the 95 % interval of the coverage"),
+    "interval_coverage_high": Quantity("1", "upper end of the 95 % interval of the coverage"),
+    "interval_share": Quantity("1", "share of the surfaces that were given an interval"),
+    "member_count": Quantity("1", "number of surfaces"),
 }
 
 T = TypeVar("T", "xr.Dataset", "xr.DataArray")

@@ -1,4 +1,5 @@
 from .accuracy_curves import error_against_time as error_against_time
+from .accuracy_curves import estimator_errors as estimator_errors
 from .closing import closure_laws as closure_laws
 from .closing import contact_area as contact_area
 from .domain_maps import contact_domains as contact_domains
@@ -28,6 +29,7 @@ __all__ = [
     "draw",
     "elastic_dilatancy",
     "error_against_time",
+    "estimator_errors",
     "face",
     "field",
     "friction",
