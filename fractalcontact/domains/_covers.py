@@ -45,18 +45,67 @@ class Curve:
 
 def minimum_cover(planes: Planes, sizes: Array) -> Curve:
     """Fewest boxes over all offsets of the grid."""
-    from fractalcontact.domains._kernels import cover
 
-    wraps = planes.grid.periodic
-
-    def smallest(task: tuple[Array, int]) -> tuple[int, int]:
-        cells, size = task
-        count, _, area, _ = cover(cells, size, *wraps)
-        return count, area
+    def fewest(task: tuple[Array, int]) -> tuple[int, int]:
+        count, area = every_offset(task[0], task[1], planes.grid.periodic)
+        return int(count.min()), int(area.min())
 
     tasks = [(cells, int(size)) for cells in planes.cells for size in sizes]
-    found = np.array(together(smallest, tasks), np.int64).reshape(planes.count, sizes.size, 2)
+    found = np.array(together(fewest, tasks), np.int64).reshape(planes.count, sizes.size, 2)
     return Curve(sizes, found[..., 0], found[..., 1].astype(float))
+
+
+def every_offset(cells: Array, size: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
+    """Return the boxes that meet the set, and their area in cells, for every offset of the grid (y, x)."""
+    from fractalcontact.domains._kernels import cover
+
+    nx = cells.shape[1]
+    rows, across = (bands(n, size, wraps) for n, wraps in zip(cells.shape, periodic, strict=True))
+    whole = across[:, 1] - across[:, 0] == size
+    count, area = np.zeros((2, size, size), np.int64)
+    columns = np.zeros((2, nx), np.int32)
+    prefix = np.zeros((2, nx + 1 + (size if periodic[1] else 0)), np.int32)
+    met, lost = np.zeros((2, size, int(whole.sum())), np.int32)
+    cover(cells, size, rows, across[~whole], columns, prefix, met, lost, count, area)
+    count += _by_offset(met, size)
+    area += size * (size * _by_offset(met, size) - _by_offset(lost, size))
+    return count, area
+
+
+def _by_offset(values: Array, size: int) -> Array:
+    """Add up the positions of boxes that belong to the same offset in x."""
+    ends = -values.shape[1] % size
+    padded = np.pad(values, ((0, 0), (0, ends)))
+    return np.asarray(padded.reshape(size, -1, size).sum(1, dtype=np.int64))
+
+
+def bands(n: int, size: int, wraps: bool) -> Array:
+    """Cut an axis of n cells into bands of `size`, for every offset of the grid.
+
+    Each row is (start, stop, start and stop of the band before, of the band after, offset). Whole bands come
+    first, in order. On a free axis the bands at the ends are cut; on a periodic one there is a remainder
+    between the last band and the first, where starts and stops may lie beyond n. Neighbours are given for
+    cut bands only.
+    """
+    if wraps:
+        start = np.arange(n // size * size)
+        rest = np.arange(size) + n // size * size
+        stop = np.arange(size) + n
+        near, far = (size, size) if n >= size else (0, 0)
+        ends = np.stack([rest, stop, rest - near, rest, stop - n, stop - n + far, np.arange(size)], axis=-1)
+        ends = ends[rest < stop]
+    else:
+        start = np.arange(n - size + 1)
+        low = np.arange(1, size)  # the rows of the band at the low end, or of that at the high end
+        top = np.stack([0 * low, low, low, low + size, low, low, low], axis=-1)
+        bottom = np.stack(
+            [n - low, 0 * low + n, n - low - size, n - low, n - low, n - low, (n - low) % size], -1
+        )
+        ends = np.concatenate([top, bottom[low <= n]])
+        ends[:, :6] = np.clip(ends[:, :6], 0, n)
+    blank = np.zeros_like(start)
+    whole = np.stack([start, start + size, blank, blank, blank, blank, start % size], axis=-1)
+    return np.concatenate([whole, ends]).astype(np.int64)
 
 
 def mean_cover(planes: Planes, sizes: Array) -> Curve:
@@ -64,18 +113,45 @@ def mean_cover(planes: Planes, sizes: Array) -> Curve:
 
     The mean has a measure of its own: boxes that hang over opposite edges by the same cut count once.
     """
-    from fractalcontact.domains import _mean_kernels
-
-    wraps = planes.grid.periodic
     largest = int(sizes.max())
-    pairs = together(lambda cells: _mean_kernels.mean_cover(cells, largest, *wraps), planes.cells)
+    pairs = together(lambda cells: every_position(cells, largest, planes.grid.periodic), planes.cells)
     whole, folded = (np.array([pair[kind][sizes] for pair in pairs], float) for kind in (0, 1))
     return Curve(sizes, whole / sizes.astype(float) ** 2, folded)
 
 
+def every_position(cells: Array, largest: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
+    """Return the positions at which a box meets the set, for all sizes up to `largest` (index 0 is unused).
+
+    Divided by size^2 they are the number of boxes averaged over the offsets of the grid. The first array has
+    every box that hangs over a free edge; in the second, boxes that hang over opposite edges by the same cut
+    count once. No free axis is shorter than `largest`.
+    """
+    from fractalcontact.domains import _mean_kernels as kernels
+
+    (ny, nx), (wrap_y, wrap_x) = cells.shape, periodic
+    histogram = np.zeros(largest + 2, np.int64)
+    kernels.inside(cells, largest, wrap_y, wrap_x, np.full(nx + 1, largest + 1, np.int32), histogram)
+    whole = np.cumsum(histogram)[: largest + 1]
+    folded = whole.copy()
+    top, bottom = np.full((2, nx), ny, np.int64)
+    left, right = np.full((2, ny), nx, np.int64)
+    kernels.from_edges(cells, top, bottom, left, right)
+    nearer, closer = np.minimum(top, bottom), np.minimum(left, right)
+    if not wrap_y:
+        for first, totals in ((top, whole), (bottom, whole), (nearer, folded)):
+            kernels.hanging(first, largest, wrap_x, first.copy(), totals)
+    if not wrap_x:
+        for first, totals in ((left, whole), (right, whole), (closer, folded)):
+            kernels.hanging(first, largest, wrap_y, first.copy(), totals)
+    if not wrap_y and not wrap_x:
+        for first in (left, right, left[::-1], right[::-1]):
+            kernels.corner(np.minimum.accumulate(first[:largest]), whole)
+        kernels.corner(np.minimum.accumulate(np.minimum(closer, closer[::-1])[:largest]), folded)
+    return whole, folded
+
+
 def aligned_cover(planes: Planes, sizes: Array) -> Curve:
     """Boxes of the one grid that starts at the first cell."""
-    from fractalcontact.domains._mean_kernels import coarsen
 
     def counts(cells: Array) -> list[int]:
         levels = {1: cells}
@@ -86,6 +162,19 @@ def aligned_cover(planes: Planes, sizes: Array) -> Curve:
 
     found = np.array(together(counts, planes.cells), np.int64).reshape(planes.count, sizes.size)
     return Curve(sizes, found, found * sizes.astype(float) ** 2)
+
+
+def coarsen(cells: Array, factor: int) -> Array:
+    """Mark the boxes of `factor` cells, on the grid from the first cell, that hold a cell of the set."""
+    from fractalcontact.domains._mean_kernels import halve
+
+    ny, nx = cells.shape
+    if factor == 2 and nx % 2 == 0:
+        coarse = np.empty((-(-ny // 2), nx // 2), np.uint8)
+        halve(cells.view(np.uint16), coarse)
+        return coarse
+    rows = np.bitwise_or.reduceat(cells, np.arange(0, ny, factor), axis=0)
+    return np.bitwise_or.reduceat(rows, np.arange(0, nx, factor), axis=1)
 
 
 def curve(planes: Planes, sizes: Array, cover: str) -> Curve:

@@ -28,15 +28,16 @@ def _glided(planes: Planes, plane: int, size: int) -> float:
     from fractalcontact.domains import _gliding_kernels as kernels
 
     (ny, nx), (wrap_y, wrap_x) = planes.grid.shape, planes.grid.periodic
-    rows, columns = ny if wrap_y else ny - size + 1, nx if wrap_x else nx - size + 1
+    rows, across = ny if wrap_y else ny - size + 1, nx if wrap_x else nx - size + 1
     masses = np.zeros(rows, np.int64)
-    squares = np.zeros(rows, np.int64 if size**4 * columns <= EXACT else np.float64)
+    squares = np.zeros(rows, np.int64 if size**4 * across <= EXACT else np.float64)
+    columns, seen = np.zeros((2, nx), np.int32)
     valid = planes.valid_of(plane)
     if valid is None:
-        kernels.glide(planes.cells[plane], size, wrap_x, masses, squares)
-        return _ratio(rows * columns, masses, squares)
+        kernels.glide(planes.cells[plane], size, wrap_x, columns, masses, squares)
+        return _ratio(rows * across, masses, squares)
     places = np.zeros(rows, np.int64)
-    kernels.glide_observed(planes.cells[plane], valid, size, wrap_x, masses, squares, places)
+    kernels.glide_observed(planes.cells[plane], valid, size, wrap_x, columns, seen, masses, squares, places)
     return _ratio(int(places.sum()), masses, squares)
 
 

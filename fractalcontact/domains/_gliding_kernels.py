@@ -21,25 +21,23 @@ def _slide(columns: Array, leaving: Array, entering: Array) -> None:
 
 
 @kernel
-def _first_band(mask: Array, size: int) -> Array:
-    columns = np.zeros(mask.shape[1], np.int32)
+def _first_band(mask: Array, size: int, columns: Array) -> None:
     for k in range(size):
         for j in range(columns.size):
             columns[j] += np.int32(mask[k, j])
-    return columns
 
 
 @kernel
-def glide(mask: Array, size: int, wrap_x: bool, masses: Array, squares: Array) -> None:
+def glide(mask: Array, size: int, wrap_x: bool, columns: Array, masses: Array, squares: Array) -> None:
     """Add up the mass in the box and its square along every row of positions.
 
     `masses` (int64) and `squares` (int64, or float64 where it could overflow) hold one value per row of
-    positions: ny of them, or ny - size + 1 where y is free.
+    positions: ny of them, or ny - size + 1 where y is free. `columns` (nx) int32 is zeros to work in.
     """
     ny, nx = mask.shape
     last = nx if wrap_x else nx - size + 1
     inner = nx - size  # positions after which the box does not yet go round
-    columns = _first_band(mask, size)
+    _first_band(mask, size, columns)
     for i in range(masses.size):
         inside = np.int64(0)
         for j in range(size):
@@ -66,14 +64,20 @@ def glide_observed(
     valid: Array,
     size: int,
     wrap_x: bool,
+    columns: Array,
+    seen: Array,
     masses: Array,
     squares: Array,
     places: Array,
 ) -> None:
-    """As `glide`, over the positions where every cell of the box was observed; `places` counts them."""
+    """As `glide`, over the positions where every cell of the box was observed; `places` counts them.
+
+    `seen` (nx) int32 is zeros to work in, too.
+    """
     ny, nx = mask.shape
     last = nx if wrap_x else nx - size + 1
-    columns, seen = _first_band(mask, size), _first_band(valid, size)
+    _first_band(mask, size, columns)
+    _first_band(valid, size, seen)
     for i in range(masses.size):
         inside, observed = np.int64(0), np.int64(0)
         for j in range(size):

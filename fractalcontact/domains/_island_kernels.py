@@ -32,15 +32,13 @@ def _root(parent: Array, shift: Array, part: int) -> int:
 
 
 @kernel
-def join(parts: int, links: Array) -> tuple[Array, Array, Array]:
+def join(links: Array, parent: Array, shift: Array, closes: Array) -> None:
     """Join parts by links (part, part, periods down, periods right): where the second part really lies.
 
-    Returns the root of every part, its shift in periods (y, x) against the root, and for every root whether
-    the island closes on itself along y and along x.
+    `parent` (parts), each at first its own, gets the root of every part; `shift` (parts, 2) its shift in
+    periods (y, x) against the root; `closes` (parts, 2), for every root, whether the island closes on itself
+    along y and along x.
     """
-    parent = np.arange(parts)
-    shift = np.zeros((parts, 2), np.int64)
-    closes = np.zeros((parts, 2), np.bool_)
     for link in range(links.shape[0]):
         one, other = links[link, 0], links[link, 1]
         root, below = _root(parent, shift, one), _root(parent, shift, other)
@@ -56,9 +54,8 @@ def join(parts: int, links: Array) -> tuple[Array, Array, Array]:
             shift[under, 0], shift[under, 1] = sign * down, sign * right
             closes[top, 0] |= closes[under, 0]
             closes[top, 1] |= closes[under, 1]
-    for part in range(parts):
+    for part in range(parent.size):
         _root(parent, shift, part)
-    return parent, shift, closes
 
 
 @kernel

@@ -94,7 +94,9 @@ def label_plane(cells: Array, connectivity: int, periodic: Sequence[bool], *, ke
     ends = (rows[0], rows[-1], left, right)
     links += [_pairs(rows[-1], rows[0], step, wrap_x, down=1) for step in steps if wrap_y]
     links += [_pairs(right, left, step, wrap_y, down=1)[:, [0, 1, 3, 2]] for step in steps if wrap_x]
-    root, shift, closes = join(count + 1, np.concatenate([np.empty((0, 4), np.int64), *links]))
+    root, shift = np.arange(count + 1), np.zeros((count + 1, 2), np.int64)
+    closes = np.zeros((count + 1, 2), bool)
+    join(np.concatenate([np.empty((0, 4), np.int64), *links]), root, shift, closes)
     roots, island = np.unique(root, return_inverse=True)
     blank = _blank(1)
     sums, sides, box = (np.concatenate([blank[k], *(each[k] for each in counts)]) for k in range(3))
