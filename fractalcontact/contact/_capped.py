@@ -37,4 +37,10 @@ def shifted(values: Array, wanted: float, cap: float) -> Array:
             break
         shift = better
         moved = np.clip(values - shift, 0.0, cap)
+    # what rounding of the values left is shared in proportion by the nodes inside the bounds
+    inside = (moved > 0) & (moved < cap)
+    bearing = float(np.sum(moved, where=inside))
+    if bearing > 0:
+        factor = (wanted - float(np.sum(moved, where=~inside))) / bearing
+        moved[inside] = np.clip(moved[inside] * factor, 0.0, cap)
     return np.asarray(moved)

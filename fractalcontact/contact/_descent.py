@@ -139,7 +139,7 @@ class Run:
     def solve(self, tolerance: float, certify: bool) -> Solution:
         """Iterate."""
         self.begin()
-        best, stale, iteration, reason = np.inf, 0, 0, "iteration limit"
+        best, stale, iteration, reason = np.inf, 0, 0, "iteration_limit"
         while iteration <= GREATEST_ITERATIONS:
             balance = self.weigh()
             if self.clipped and balance.objective > self.last + balance.noise and self.halved < HALVINGS:

@@ -56,6 +56,11 @@ class Fast:
         """The operator on the whole extent."""
         return self.problem.body.operator()
 
+    def indent(self, gap: Array) -> None:
+        """Go on with another gap, where yielded nodes have been lowered."""
+        self.problem, self.plane = replace(self.problem, gap=gap), None
+        self.__dict__.pop("ordered", None)
+
     def step(self, control: Control) -> Solution:
         """Solve one step of the path."""
         self.spent = (0, 0)

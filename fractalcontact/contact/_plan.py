@@ -13,9 +13,14 @@ from fractalcontact.contact._path import Path
 from fractalcontact.contact._problem import power_of_two
 from fractalcontact.contact._setup import Units, length_unit, make_body
 
+Array = np.ndarray[Any, np.dtype[Any]]
+
 CONTROLS = ("closure", "normal_force", "nominal_pressure")
-MAPS = ("state", "pressure", "gap", "displacement")
+MAPS = ("state", "pressure", "gap", "displacement", "residual_height")
 METHODS = ("fast", "elimination")
+REACH = 2.0**300  # of forces and closures over their scales, so that no product leaves the range of a double
+UNIT_RANGE = (2.0**-900, 2.0**900)
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,7 @@ class Plan:
     grid: Grid
     path: Path
     keep: tuple[str, ...]
+    heights: Array
 
 
 def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
@@ -60,7 +66,8 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
     heights = np.asarray(call["surface"].values, dtype=np.float64)
     gap = heights.max() - heights
     if control == "nominal_pressure":
-        control, values = "normal_force", values * grid.nominal_area
+        with np.errstate(over="ignore"):
+            control, values = "normal_force", values * grid.nominal_area
     length = length_unit((grid.spacing[0], grid.spacing[1]))
     height = float(gap.max())
     if height == 0:  # flat: the step itself is the only height there is
@@ -68,8 +75,13 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
     units = Units(length, power_of_two(height), modulus, body.cell_area)
     gap /= units.height
     path = Path(body, units, gap, control, tuple(float(v) for v in values), hardness, tolerance, method)
-    _limits(path, grid, problems)
-    return Plan(grid, path, tuple(keep))
+    _range(path, problems)
+    if path.control == "normal_force":
+        greatest = path.hardness * grid.nominal_area
+        expected = f"a force of at most hardness times area, {greatest:.6g} N"
+        most = max(path.values)
+        problems.require(most <= greatest * (1 + ROUNDING), "normal_force", expected, most)
+    return Plan(grid, path, tuple(keep), heights)
 
 
 def _boundary(given: Any, grid: Grid, problems: Problems) -> bool:
@@ -88,17 +100,19 @@ def _boundary(given: Any, grid: Grid, problems: Problems) -> bool:
     return bool(word == "periodic")
 
 
-def _limits(path: Path, grid: Grid, problems: Problems) -> None:
-    """Refuse what has no solution: too much force for the hardness, too much closure of a periodic body."""
-    most = max(path.values)
-    if path.control == "normal_force":
-        greatest = path.hardness * grid.nominal_area
-        expected = f"a force of at most hardness times area, {greatest:.6g} N"
-        problems.require(most <= greatest, "normal_force", expected, most)
-    elif path.body.periodic and not np.isfinite(path.hardness):
-        depth = float(path.gap.mean()) * path.units.height
-        expected = f"a closure below top less mean height, {depth:.6g} m, of a periodic body"
-        problems.require(most < depth or most == 0, "closure", expected, most)
+def _range(path: Path, problems: Problems) -> None:
+    """Refuse loads out of all proportion to the surface, and units out of a computer's range."""
+    units = path.units
+    sizes = (units.length, units.height, units.modulus, units.pressure, units.force, units.energy)
+    expected = "spacing, heights and modulus whose products a double can hold"
+    if not problems.require(
+        all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes), "surface", expected, f"scales {sizes}"
+    ):
+        return
+    name, unit = ("closure", units.height) if path.control == "closure" else ("normal_force", units.force)
+    expected = f"0 or between {unit / REACH:.3g} and {unit * REACH:.3g} for this surface and modulus"
+    for value in path.values:
+        problems.require(value == 0 or unit / REACH < value < unit * REACH, name, expected, value)
 
 
 def _nothing(grid: Grid) -> Plan:
@@ -106,4 +120,4 @@ def _nothing(grid: Grid) -> Plan:
 
     body = Body((3, 3), (1.0, 1.0), False, "disc", 0.5)
     path = Path(body, Units(1.0, 1.0, 1.0, 1.0), np.zeros((3, 3)), "closure", (0.0,), np.inf, 1e-8, "fast")
-    return Plan(grid, path, ())
+    return Plan(grid, path, (), path.gap)

@@ -12,7 +12,7 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, contact_edges
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
-from fractalcontact.base.schema import CONTACT, OPEN, YIELDED, label
+from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED, label
 from fractalcontact.contact._path import Step, solve_path
 from fractalcontact.contact._plan import CONTROLS, Plan, make_plan
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.contact.press"
+UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
+BEYOND = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -125,16 +127,26 @@ def press(
         step = next(steps)
         measures.append(_measures(step, plan.grid, plan.path.body.periodic))
         for name in plan.keep:
-            maps[name].append(_state(step) if name == "state" else getattr(step, name))
-    result = _dataset(surface, plan, measures, maps)
+            maps[name].append(_map(step, name, plan.heights))
+    result = label(_dataset(surface, plan, measures, maps))
+    _explain(result)
     _warn(result)
     facts: dict[str, Any] = {
         "boundary": "periodic" if plan.path.body.periodic else "free",
         "influence": plan.path.body.influence,
-        "achieved_residual": float(result["residual"].max()),
+        "achieved_residual": float(np.fmax.reduce(result["residual"].values)),
         "run_time": float(result["run_time"].sum()),
     }
-    return stamp(label(result), WHERE, call, title="Elastic contact of a rough surface", **facts)
+    return stamp(result, WHERE, call, title="Elastic contact of a rough surface", **facts)
+
+
+def _map(step: Step, name: str, heights: Array) -> Array:
+    """One map of one step."""
+    if name == "state":
+        return _state(step)
+    if name == "residual_height":
+        return np.asarray(heights - step.indentation)
+    return np.asarray(getattr(step, name))
 
 
 def _state(step: Step) -> Array:
@@ -158,11 +170,12 @@ def _measures(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
         "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
         "mean_gap": step.mean_gap,
         "elastic_energy": step.elastic_energy,
+        "plastic_work": step.plastic_work,
         "iterations": step.solution.iterations,
         "transforms": step.solution.transforms,
         "residual": step.solution.residual,
-        "converged": step.converged,
-        "stop_reason": step.solution.reason,
+        "converged": step.solution.reason == "converged",
+        "stop_reason": STOP_REASONS[step.solution.reason],
         "run_time": step.run_time,
     }
 
@@ -179,6 +192,8 @@ def _dataset(
     variables: dict[str, Any] = dict(columns)
     variables["nominal_area"] = plan.grid.nominal_area
     variables["contact_modulus"] = plan.path.units.modulus
+    if not np.isfinite(plan.path.hardness):
+        del variables["plastic_work"]
     if plan.path.body.influence == "disc":
         variables["disc_radius"] = plan.path.body.radius * plan.path.units.length
     if maps:
@@ -187,13 +202,22 @@ def _dataset(
     return xr.Dataset(variables, coords)
 
 
+def _explain(result: xr.Dataset) -> None:
+    """Give the reason beside what is not determined."""
+    beyond = result["stop_reason"] == STOP_REASONS["beyond_full_contact"]
+    if beyond.any():
+        for name in UNDETERMINED:
+            if name in result.variables:
+                result[name].attrs["reason"] = BEYOND
+
+
 def _warn(result: xr.Dataset) -> None:
     """Say which steps did not converge."""
     failed = np.flatnonzero(~result["converged"].values)
     if failed.size:
+        words, why = list(STOP_REASONS), result["stop_reason"].values
         reasons = ", ".join(
-            f"step {i}: residual {result['residual'].values[i]:.2g}, {result['stop_reason'].values[i]}"
-            for i in failed[:5]
+            f"step {i}: {words[why[i]]} (residual {result['residual'].values[i]:.2g})" for i in failed[:5]
         )
         more = f" and {failed.size - 5} more" if failed.size > 5 else ""
         warnings.warn(f"{WHERE}: not converged: {reasons}{more}", ConvergenceWarning, stacklevel=3)
