@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fractalcontact.base.checks import Problems
 
 
@@ -15,36 +17,51 @@ def effective_modulus(
     Parameters
     ----------
     young, poisson : float
-        Young's modulus (Pa) and Poisson's ratio of the first body; -1 < nu <= 0.5.
+        Young's modulus (Pa) and Poisson's ratio of the first body; -1 < nu <= 0.5, where 0.5 is an
+        incompressible body, such as rubber.
     young2, poisson2 : float, optional
-        The same of the second body; what is left out is that of the first, so that two equal bodies need
-        to be named once. ``young2=numpy.inf`` is a rigid second body.
+        The same of the second body. Both or neither: without them the bodies are alike. One of the bodies may
+        be rigid, ``young2=numpy.inf``, and then needs no Poisson's ratio.
 
     Returns
     -------
     float
-        E* in Pa; half the plane-strain modulus E/(1 - nu^2) for two equal bodies.
+        E* in Pa; half the plane-strain modulus E/(1 - nu^2) for two equal bodies, all of it against a rigid
+        one.
 
     Raises
     ------
     InvalidInput
-        A modulus is not positive, or a Poisson's ratio is outside (-1, 0.5].
+        A modulus is not positive, a Poisson's ratio is outside (-1, 0.5], one property of the second body
+        is given without the other, or both bodies are rigid.
 
     References
     ----------
     Johnson, K. L. (1985) Contact Mechanics, eq. 3.32 and 4.20.
     """
     with Problems("fractalcontact.contact.effective_modulus") as problems:
-        first = problems.number("young", young, above=0)
-        nu1 = problems.number("poisson", poisson, above=-1, at_most=0.5)
-        nu2 = nu1 if poisson2 is None else problems.number("poisson2", poisson2, above=-1, at_most=0.5)
-        rigid = isinstance(young2, (int, float)) and young2 == float("inf")
-        if young2 is None or rigid:
-            second = first
-        else:
-            second = problems.number("young2", young2, above=0)
-    if rigid:
-        return first / (1.0 - nu1 * nu1)
-    if nu1 == nu2 and first == second:
-        return first / (2.0 * (1.0 - nu1 * nu1))
-    return 1.0 / ((1.0 - nu1 * nu1) / first + (1.0 - nu2 * nu2) / second)
+        first = _compliance(problems, "young", young, "poisson", poisson)
+        second = first
+        if young2 is not None:
+            second = _compliance(problems, "young2", young2, "poisson2", poisson2)
+        elif poisson2 is not None:
+            problems.add("poisson2", "a value with young2, or neither of them for two equal bodies", poisson2)
+        elastic = not (_rigid(young) and (young2 is None or _rigid(young2)))
+        problems.require(elastic, "young / young2", "one of the bodies to be elastic", "two rigid ones")
+    return 1.0 / (first + second)
+
+
+def _rigid(young: object) -> bool:
+    return isinstance(young, (int, float)) and young == math.inf
+
+
+def _compliance(problems: Problems, name: str, young: float, ratio_name: str, poisson: float | None) -> float:
+    """(1 - nu^2)/E of one body, in 1/Pa; zero for a rigid one."""
+    if _rigid(young) and poisson is None:
+        return 0.0
+    modulus = math.inf if _rigid(young) else problems.number(name, young, above=0)
+    if poisson is None:
+        problems.add(ratio_name, f"a Poisson's ratio beside {name}", poisson)
+        return 0.0
+    ratio = problems.number(ratio_name, poisson, above=-1, at_most=0.5)
+    return 0.0 if problems.found else (1.0 - ratio) * (1.0 + ratio) / modulus
