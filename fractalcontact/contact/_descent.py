@@ -230,9 +230,13 @@ class Run:
         return Balance(force, work, height, closure, scale, objective, noise, floor)
 
     def saturated_closure(self) -> float:
-        """Least closure at which every loaded node is at the cap."""
-        loaded = self.p > 0
-        return float((self.u[loaded] + self.gap[loaded]).max()) if loaded.any() else 0.0
+        """Least closure at which every loaded node is at the cap; between the two where nodes must swap."""
+        loaded, level = self.p > 0, self.u + self.gap
+        highest = float(level.max(where=loaded, initial=-np.inf))
+        lowest = float(level.min(where=~loaded, initial=np.inf))
+        if not loaded.any():
+            return 0.0
+        return highest if highest <= lowest else 0.5 * (highest + lowest)
 
     def inspect(self, balance: Balance) -> tuple[Array, Array, float]:
         """Count, sum and square sum of the gap inside the free set and outside, and the residual."""

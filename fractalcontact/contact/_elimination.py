@@ -139,14 +139,16 @@ def solve_closure(dense: Dense, closure: float) -> Balance:
         return verified(dense, nodes, lambda nodes: at_closure(dense, nodes, closure))
     check_size(dense.gap.size)
     total = 0.5 * closure / float(dense.table[0, 0])
-    nodes, rounds = np.arange(dense.gap.size), 0
+    nodes, rounds, last = np.arange(dense.gap.size), 0, np.inf
     while True:
         aim = total
         balance = verified(dense, nodes, lambda nodes: at_force(dense, nodes, aim))  # noqa: B023
         rounds += balance.rounds
-        nodes, miss = balance.nodes, closure - balance.closure
-        if abs(miss) <= 1e-15 * closure or rounds > GREATEST_ROUNDS:
+        same, miss = np.array_equal(nodes, balance.nodes), closure - balance.closure
+        rounded = abs(miss) <= 1e-15 * closure or (same and abs(miss) >= 0.5 * last)
+        if rounded or rounds > GREATEST_ROUNDS:
             return replace(balance, rounds=rounds)
+        nodes, last = balance.nodes, abs(miss)
         total = max(total + miss / balance.rate, total / 16)
 
 
@@ -162,8 +164,8 @@ def check_size(nodes: int) -> None:
 class Elimination:
     """The method on one problem; each step starts anew."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self.dense = problem, Dense(problem)
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        self.problem, self.tolerance, self.dense = problem, tolerance, Dense(problem)
 
     def step(self, control: Control) -> Solution:
         """Solve one step of a path."""
@@ -177,12 +179,15 @@ class Elimination:
         settlement = dense.settlement(balance.nodes, balance.pressure)
         gap = dense.gap + settlement - balance.closure
         shape = self.problem.body.shape
+        error = residual(pressure, settlement, gap, self.problem.body.spacing)
+        reason = "rounding" if balance.rounds <= GREATEST_ROUNDS else "iteration_limit"
         return Solution(
             pressure=pressure.reshape(shape),
             settlement=settlement.reshape(shape),
             closure=balance.closure,
             total=float(balance.pressure.sum()),
             iterations=balance.rounds,
-            residual=residual(pressure, settlement, gap, self.problem.body.spacing),
+            residual=error,
+            reason="converged" if error <= self.tolerance else reason,
             work=float(np.sum(pressure * settlement)),
         )

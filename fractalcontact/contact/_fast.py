@@ -18,7 +18,7 @@ from fractalcontact.contact._descent import Descent
 from fractalcontact.contact._nested import cold_start
 from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
 from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._plane import WHOLE_PLANE, Plane, Window
+from fractalcontact.contact._plane import WHOLE_PLANE, Plane, Window, first_precision
 from fractalcontact.contact._problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -207,7 +207,7 @@ class Fast:
     def on_plane(self, control: Control, window: Window, start: Array | None) -> Solution:
         """Solve on a window of the plane."""
         if start is None:
-            start = cold_start(self.problem, control, np.float32)[0]
+            start = cold_start(self.problem, control, first_precision(self.problem, control))[0]
         if self.plane is None or self.plane.window != window:
             self.plane = Plane(self.problem, window)
         handed = [start if window == WHOLE_PLANE else start[window]]

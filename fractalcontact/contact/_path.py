@@ -44,6 +44,15 @@ class Path:
 
 
 @dataclass(frozen=True)
+class Past:
+    """What a surface remembers, scaled: where it has yielded, and what that has cost."""
+
+    indentation: Array | float = 0.0  # depth (ny, nx)
+    touch: float = 0.0  # closure at which the bodies touch now
+    work: float = 0.0
+
+
+@dataclass(frozen=True)
 class Step:
     """One step in SI units; the maps are made when they are asked for."""
 
@@ -52,13 +61,12 @@ class Step:
     path: Path
     force: float
     run_time: float
-    before: Array | None = None  # scaled indentation before the step
-    spent: float = 0.0  # scaled plastic work before the step
+    past: Past
 
     @property
     def closure(self) -> float:
         """Closure in m."""
-        return self.solution.closure * self.path.units.height
+        return (self.solution.closure + self.past.touch) * self.path.units.height
 
     @property
     def contact(self) -> Array:
@@ -100,20 +108,24 @@ class Step:
         return np.where(yielded, np.maximum(overlap, 0.0), 0.0)
 
     @property
-    def indentation(self) -> Array:
-        """Depth in m by which the surface has been lowered for good, since the start of the path."""
-        parts = [part for part in (self.before, self.overlap) if part is not None]
-        return np.asarray(sum(parts, np.zeros(self.problem.gap.shape)) * self.path.units.height)
+    def past_and_this(self) -> Past:
+        """What the surface remembers after this step."""
+        if self.overlap is None:
+            return self.past
+        indentation = self.past.indentation + self.overlap
+        work = self.past.work + self.problem.cap * serial_sum(self.overlap)
+        return Past(indentation, float((self.path.gap + indentation).min()), work)
 
     @property
-    def dissipated(self) -> float:
-        """Scaled plastic work since the start of the path."""
-        return self.spent + (0.0 if self.overlap is None else self.problem.cap * serial_sum(self.overlap))
+    def indentation(self) -> Array:
+        """Depth in m by which the surface has been lowered for good, since the start of the path."""
+        depth = self.past_and_this.indentation * self.path.units.height
+        return np.broadcast_to(depth, self.problem.gap.shape)
 
     @property
     def plastic_work(self) -> float:
         """Plastic work in J since the start of the path."""
-        return self.dissipated * self.path.units.energy
+        return self.past_and_this.work * self.path.units.energy
 
     @property
     def mean_gap(self) -> float:
@@ -136,50 +148,43 @@ def solve_path(path: Path) -> Iterator[Step]:
     """Yield the steps of a path as they are solved."""
     problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
     solver: Fast | Elimination | None = None
-    before, spent = None, 0.0
+    past = Past()
     for value in path.values:
         begun = perf_counter()
-        solution = _without_solver(problem, path, value)
+        control = _control(path, value, past.touch)
+        solution = _without_solver(problem, control)
         if solution is None:
             solver = solver or _solver(problem, path)
-            solution = solver.step(_control(path, value))
+            solution = solver.step(control)
         carried = solution.total * path.units.force
         force = carried if path.control == "closure" else value
         if abs(carried - force) > BALANCE * force:
             solution = replace(solution, reason="force_missed")
-        step = Step(solution, problem, path, force, perf_counter() - begun, before, spent)
+        step = Step(solution, problem, path, force, perf_counter() - begun, past)
         yield step
         if step.overlap is not None:
-            before = step.overlap if before is None else before + step.overlap
-            spent = step.dissipated
-            problem = replace(problem, gap=path.gap + before)
+            past = step.past_and_this
+            problem = replace(problem, gap=path.gap + past.indentation - past.touch)
             if solver is not None:
                 cast("Fast", solver).indent(problem.gap)  # elimination knows no hardness
 
 
-def _without_solver(problem: Problem, path: Path, value: float) -> Solution | None:
+def _without_solver(problem: Problem, control: Control) -> Solution | None:
     """Solve what has a closed form: no contact, flat faces, and what no elastic body can do."""
-    first, nothing = float(problem.gap.min()), np.zeros(problem.body.shape)
-    if path.control == "closure" and value <= first * path.units.height:
-        return Solution(nothing, nothing, value / path.units.height, 0.0)
-    if value == 0:
-        return Solution(nothing, nothing, first, 0.0)
-    if path.control == "closure" and problem.body.periodic and problem.cap == np.inf:
-        closure = value / path.units.height
-        if closure >= serial_mean(problem.gap):
-            return _beyond(problem, closure)
-    if problem.gap.max() == first:
-        flat = _flat(path, value, first)
-        if flat.pressure.max() <= problem.cap:
-            return flat
-        if problem.body.periodic:
-            return _saturated(problem, value / path.units.height)
+    if control.value <= 0:
+        nothing = np.zeros(problem.body.shape)
+        return Solution(nothing, nothing, control.closure or 0.0, 0.0)
+    rigid = control.closure is not None and problem.body.periodic and problem.cap == np.inf
+    if rigid and control.value >= serial_mean(problem.gap):
+        return _beyond(problem, control.value)
+    if not problem.gap.any():
+        return _flat(problem, control)
     return None
 
 
-def _control(path: Path, value: float) -> Control:
+def _control(path: Path, value: float, touch: float) -> Control:
     if path.control == "closure":
-        return Control(closure=value / path.units.height)
+        return Control(closure=value / path.units.height - touch)
     greatest = path.hardness / path.units.pressure * path.gap.size  # a rounding above it is no more force
     return Control(total=min(value / path.units.force, greatest))
 
@@ -192,30 +197,24 @@ def _beyond(problem: Problem, closure: float) -> Solution:
     )
 
 
-def _saturated(problem: Problem, closure: float) -> Solution:
-    """A flat periodic face under an imposed closure: it yields everywhere."""
-    pressure = np.full(problem.body.shape, problem.cap)
-    return Solution(pressure, np.zeros_like(pressure), closure, problem.cap * pressure.size)
-
-
-def _flat(path: Path, value: float, first: float) -> Solution:
+def _flat(problem: Problem, control: Control) -> Solution | None:
     """A face of zero range: closure = force / stiffness, with the stiffness of `flat_stiffness`.
 
-    `first` is the scaled closure at which it touches, where an indentation has lowered it.
+    Returns None where some nodes yield and others do not.
     """
-    block = flat_block(path.body)
-    stiffness, touch = np.inf, first * path.units.height
-    if block.compliance > 0:
-        stiffness = path.units.modulus * path.units.length * path.body.cell_area / block.compliance
-    if path.control == "closure":
-        force, closure = (value - touch) * stiffness, value
-    else:
-        force, closure = value, value / stiffness + touch
-    total = force / path.units.force
+    block = flat_block(problem.body)
+    stiffness = 1.0 / block.compliance if block.compliance > 0 else np.inf
+    total = control.closure * stiffness if control.closure is not None else control.value
+    if problem.body.periodic:  # uniform pressure; any closure makes it yield, no force more than touch
+        pressure = np.full(problem.body.shape, min(total / problem.gap.size, problem.cap))
+        total = float(pressure[0, 0]) * problem.gap.size
+        return Solution(pressure, block.settlement, control.closure or 0.0, total)
+    if block.pressure.max() * total > problem.cap:
+        return None
     return Solution(
         block.pressure * total,
         block.settlement * total,
-        closure / path.units.height,
+        total / stiffness if control.closure is None else control.closure,
         total,
         block.iterations,
         block.transforms,
@@ -229,7 +228,7 @@ def _solver(problem: Problem, path: Path) -> Fast | Elimination:
     if path.method == "elimination":
         from fractalcontact.contact._elimination import Elimination
 
-        return Elimination(problem)
+        return Elimination(problem, path.tolerance)
     from fractalcontact.contact._fast import Fast
 
     return Fast(problem, path.tolerance)

@@ -109,6 +109,11 @@ def _range(path: Path, problems: Problems) -> None:
         all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes), "surface", expected, f"scales {sizes}"
     ):
         return
+    expected = (
+        f"None or between {units.pressure / REACH:.3g} and {units.pressure * REACH:.3g} for this surface"
+    )
+    cap = path.hardness / units.pressure
+    problems.require(1 / REACH < cap < REACH or cap == np.inf, "hardness", expected, path.hardness)
     name, unit = ("closure", units.height) if path.control == "closure" else ("normal_force", units.force)
     expected = f"0 or between {unit / REACH:.3g} and {unit * REACH:.3g} for this surface and modulus"
     for value in path.values:

@@ -17,6 +17,15 @@ WHOLE_PLANE = (slice(None), slice(None))
 
 SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
 SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
+SINGLE_RANGE = 1e20  # scaled pressures and closures up to which, and down to whose inverse, it may be used
+
+
+def first_precision(problem: Problem, control: Control) -> Any:
+    """Type of number for a first solution: single precision where its range is enough."""
+    load = control.value if control.total is None else control.value / problem.gap.size
+    small = 1 / SINGLE_RANGE < load < SINGLE_RANGE
+    bounded = problem.cap == np.inf or 1 / SINGLE_RANGE < problem.cap < SINGLE_RANGE
+    return np.float32 if small and bounded else np.float64
 
 
 def plane_descent(problem: Problem, kind: Any) -> Descent:
@@ -41,7 +50,8 @@ class Plane:
     def solve(self, handed: list[Array], control: Control, tolerance: float) -> Solution:
         """Solve from the pressure in `handed`, which is taken out: nobody else shall hold that array."""
         before = (0, 0)
-        if self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
+        single = first_precision(self.part, control) is np.float32
+        if single and self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
             rough = self.descent(np.float32).solve(handed.pop(), control, SINGLE_ENOUGH, certify=False)
             before = (rough.iterations, rough.transforms)
             handed.append(rough.pressure)

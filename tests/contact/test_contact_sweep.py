@@ -1,0 +1,145 @@
+"""Varied problems, judged by conditions of contact computed anew: all converge or say why, none is wrong.
+
+`pytest -m slow tests/contact/test_contact_sweep.py` goes through all of them.
+"""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contact_cases import draw, judge, settle
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.threads import limit
+
+pytestmark = pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.ConvergenceWarning")
+ROUNDED = 1  # stop_reason: the tolerance is beyond what rounding leaves
+
+FEW, MANY = range(120), range(1000, 1700)
+
+
+def verdict(case):
+    """What is wrong with the result of a case; a step that stopped at rounding has said why."""
+    found = case.press()
+    excused = {step for step, why in enumerate(found["stop_reason"].values) if why == ROUNDED}
+    return [line for line in judge(case, found) if int(line.split()[1][:-1]) not in excused], len(excused)
+
+
+@pytest.mark.parametrize("tens", range(0, 120, 20))
+def test_small_problems_are_right(tens):
+    wrong = {seed: verdict(draw(seed, largest=40))[0] for seed in range(tens, tens + 20)}
+    assert {seed: lines for seed, lines in wrong.items() if lines} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hundred", range(10))
+def test_large_problems_are_right(hundred):
+    wrong, excused = {}, 0
+    for seed in range(1000 + 70 * hundred, 1070 + 70 * hundred):
+        lines, rounded = verdict(draw(seed, largest=512))
+        excused += rounded > 0
+        if lines:
+            wrong[seed] = lines
+    assert wrong == {}
+    assert excused <= 3
+
+
+def test_the_judge_finds_a_wrong_result():
+    rough = (case for case in map(draw, range(60)) if "rough" in case.name)
+    case = next(case for case in rough if case.options["tolerance"] < 1e-7)
+    found = case.press()
+    assert judge(case, found) == []
+    for name in ("pressure", "gap", "closure", "normal_force", "elastic_energy"):
+        spoilt = found.copy(deep=True)
+        spoilt[name] = spoilt[name] * (1 + 1e-3)
+        assert judge(case, spoilt), name
+
+
+@pytest.mark.parametrize("seed", range(200, 240))
+def test_a_power_of_two_in_units_changes_no_bit(seed):
+    case = draw(seed, largest=64)
+    metre, pascal = 2.0**-13, 2.0**11
+    scale = {
+        "closure": metre,
+        "normal_force": pascal * metre**2,
+        "nominal_pressure": pascal,
+        "hardness": pascal,
+        "contact_modulus": pascal,
+    }
+    scaled = {name: case.options[name] * factor for name, factor in scale.items() if name in case.options}
+    options = case.options | scaled
+    spacing = (case.spacing[0] * metre, case.spacing[1] * metre)
+    other = replace(case, heights=case.heights * metre, spacing=spacing, options=options)
+    ours, theirs = case.press(), other.press()
+    np.testing.assert_array_equal(ours["pressure"] * pascal, theirs["pressure"])
+    np.testing.assert_array_equal(ours["gap"] * metre, theirs["gap"])
+    np.testing.assert_array_equal(ours["closure"] * metre, theirs["closure"])
+    with limit(1):
+        np.testing.assert_array_equal(case.press()["pressure"], ours["pressure"])
+
+
+@pytest.mark.parametrize("seed", range(300, 340))
+def test_elimination_finds_the_same_set_and_force(seed):
+    case = draw(seed, largest=16)
+    case.options.pop("hardness", None)
+    case.options["tolerance"] = 1e-12
+    fast = case.press()
+    paper = case.press(method="elimination")
+    sure = fast["stop_reason"].values == 0
+    np.testing.assert_allclose(paper["normal_force"][sure], fast["normal_force"][sure], rtol=1e-10)
+    for step in np.flatnonzero(sure):
+        one, other = fast.isel(step=step), paper.isel(step=step)
+        doubtful = (one["pressure"] <= 1e-10 * one["pressure"].max()) & (
+            one["gap"] <= 1e-10 * max(float(one["gap"].max()), float(one["closure"]))
+        )
+        np.testing.assert_array_equal(one["state"].where(~doubtful), other["state"].where(~doubtful))
+
+
+@pytest.mark.parametrize("seed", range(400, 430))
+def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
+    case = draw(seed, largest=96)
+    case.options.pop("hardness", None)
+    control = next(name for name in ("closure", "normal_force", "nominal_pressure") if name in case.options)
+    path = case.options[control].max() * np.array([0.03, 0.3, 1.0, 0.31, 1e-3, 1.0])
+    tolerance = 1e-10
+    along = case.press(**{control: path, "tolerance": tolerance})
+    for step in (1, 3, 5):
+        alone = case.press(**{control: path[step], "tolerance": tolerance})
+        scale = float(alone["pressure"].max())
+        p, q = along["pressure"].values[step], alone["pressure"].values[0]
+        assert np.abs(p - q).max() <= 1e-4 * scale
+        radius = float(along["disc_radius"]) if "disc_radius" in along else 0.0
+        energy = np.sum((p - q) * settle(case, p - q, radius))
+        assert energy <= 4 * tolerance * np.sum(q * settle(case, q, radius)) + 1e-13 * scale * np.abs(p).sum()
+        assert float(along["normal_force"][step]) == pytest.approx(float(alone["normal_force"][0]), rel=1e-6)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("control", ["closure", "normal_force", "nominal_pressure"])
+@pytest.mark.parametrize("hardness", [None, 1e6])
+def test_loads_out_of_all_proportion_are_solved_or_refused_in_words(periodic, control, hardness):
+    face = fc.surfaces.from_array(
+        1e-6 * np.random.default_rng(3).normal(size=(100, 100)), 1e-4, periodic=periodic
+    )
+    refused = {}
+    for value in (5e-324, 1e-300, 1e-200, 1e-100, 1e-60, 1e-40, 1e-25, 1e25, 1e40, 1e60, 1e100, 1e200, 1e308):
+        try:
+            found = fc.contact.press(
+                face, contact_modulus=1e9, hardness=hardness, keep=("pressure",), **{control: value}
+            )
+        except InvalidInput as error:
+            refused[value] = str(error)
+            continue
+        if int(found["stop_reason"][0]) == 5:
+            assert periodic
+            assert control == "closure"
+            continue
+        assert float(found["normal_force"][0]) == pytest.approx(
+            float(found["pressure"].sum()) * 1e-8, rel=1e-9
+        )
+        assert float(found[control][0]) == pytest.approx(value, rel=1e-13)
+    for value, words in refused.items():
+        assert re.search("(normal_force|closure): expected (0 or between|a force of at most)", words)
+        assert not 1e-60 <= value <= 1e60 or "hardness" in words
