@@ -3,9 +3,11 @@ from .counting import box_dimension as box_dimension
 from .crossing import percolation as percolation
 from .edges import boundary_dimension as boundary_dimension
 from .gliding import lacunarity as lacunarity
+from .growing import minkowski_dimension as minkowski_dimension
 from .labelling import islands as islands
 from .lineage import evolution as evolution
 from .moments import generalised_dimensions as generalised_dimensions
+from .pairing import correlation_dimension as correlation_dimension
 from .resolving import area_dimension as area_dimension
 from .summary import describe as describe
 
@@ -14,10 +16,12 @@ __all__ = [
     "boundary_dimension",
     "box_counts",
     "box_dimension",
+    "correlation_dimension",
     "describe",
     "evolution",
     "generalised_dimensions",
     "islands",
     "lacunarity",
+    "minkowski_dimension",
     "percolation",
 ]

@@ -23,7 +23,13 @@ SOURCE = (
 )
 
 
-def generalised_dimensions(mask: xr.DataArray, q: Any = ORDERS, *, scales: Any = None) -> xr.Dataset:
+def generalised_dimensions(
+    mask: xr.DataArray,
+    q: Any = ORDERS,
+    *,
+    scales: Any = None,
+    valid: xr.DataArray | None = None,
+) -> xr.Dataset:
     """Generalised (Renyi) dimensions D_q of a set, or of a measure such as the contact pressure.
 
     With mu the share of the measure in each box of size s, tau(q) is the slope of ln sum(mu^q) over ln s
@@ -41,6 +47,9 @@ def generalised_dimensions(mask: xr.DataArray, q: Any = ORDERS, *, scales: Any =
     scales : sequence of int, optional
         Edges of the boxes in cells; by default the powers of two up to the geometric mean of the cell and
         the extent (at least to 8). The grid starts at the first cell; boxes cut by the far edges count.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Cells that were observed. A box of which the share f was observed counts f times, with its measure
+        over f: unobserved cells are taken to be as the others of their box.
 
     Returns
     -------
@@ -60,13 +69,13 @@ def generalised_dimensions(mask: xr.DataArray, q: Any = ORDERS, *, scales: Any =
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.generalised_dimensions") as problems:
         orders = problems.numbers("q", q)
-        planes, measure = _read(mask, problems)
+        planes, measure = _read(mask, valid, problems)
         shape = planes.grid.shape
         default = 2 ** np.arange(
             _covers.default_sizes(shape).max(initial=1).item().bit_length(), dtype=np.int64
         )
         sizes = box_sizes(scales, default, problems, "scales", longest=max(shape))
-    fits = [_moments(plane, orders, sizes) for plane in measure]
+    fits = [_moments(plane, planes.valid_of(k), orders, sizes) for k, plane in enumerate(measure)]
     known = np.array([np.isfinite(fit[0]).any() for fit in fits])
     dimension, half, exponent, strength, spectrum = np.moveaxis(np.array(fits), 1, 0)
     variables = {
@@ -86,13 +95,13 @@ def generalised_dimensions(mask: xr.DataArray, q: Any = ORDERS, *, scales: Any =
     return stamp(
         dataset,
         "fractalcontact.domains.generalised_dimensions",
-        {"mask": mask, "q": orders, "scales": scales},
+        {"mask": mask, "q": orders, "scales": scales, "valid": valid},
         title="Generalised dimensions",
         references=SOURCE,
     )
 
 
-def _read(mask: Any, problems: Problems) -> tuple[Planes, Array]:
+def _read(mask: Any, valid: Any, problems: Problems) -> tuple[Planes, Array]:
     """Return the planes where the measure is not zero, and the measure, (planes, ny, nx) float64."""
     import xarray as xr
 
@@ -104,23 +113,29 @@ def _read(mask: Any, problems: Problems) -> tuple[Planes, Array]:
     wrong = values.size - int(np.count_nonzero(np.isfinite(values) & (values >= 0)))
     if mask.dtype.kind == "f" and wrong:
         problems.add("mask", measure, f"{wrong} of {values.size} NaN, infinite or negative")
-    planes = read_mask(mask > 0, problems)
+    planes = read_mask(mask > 0, problems, valid=valid)
     numbers = values.reshape(planes.cells.shape) if values.size == planes.cells.size else planes.cells
-    return planes, np.asarray(numbers if mask.dtype.kind == "f" else planes.cells, np.float64)
+    # what was not observed is 0 in the cells
+    return planes, np.asarray(numbers * planes.cells if mask.dtype.kind == "f" else planes.cells, np.float64)
 
 
-def _moments(measure: Array, orders: Array, sizes: Array) -> Array:
+def _moments(measure: Array, valid: Array | None, orders: Array, sizes: Array) -> Array:
     """Return dimension, half-width, tau, alpha and f of one plane, (5, orders)."""
     total = float(np.max(measure))
     if total == 0.0 or sizes.size < 2:
         return np.full((5, orders.size), np.nan)
     levels = {1: measure / total}
+    seen = {1: np.ones(1) if valid is None else valid.astype(float)}
     partition, strength = np.empty((orders.size, sizes.size)), np.empty((orders.size, sizes.size))
     for place, size in enumerate(sizes.tolist()):
         finest = max(known for known in levels if size % known == 0)
         levels[size] = _gather(levels[finest], size // finest)
-        share = levels[size][levels[size] > 0]
-        partition[:, place], strength[:, place] = _weigh(np.log(share / share.sum()), orders)
+        held = levels[size] > 0
+        share, part = levels[size][held], np.ones(1)
+        if valid is not None:
+            seen[size] = _gather(seen[finest], size // finest)
+            part = (seen[size] / _gather(np.ones(measure.shape), size))[held]
+        partition[:, place], strength[:, place] = _weigh(np.log(share / share.sum() / part), part, orders)
     x = np.log(sizes)
     exponent, spread, _ = _covers.line(x, partition)
     alpha, alpha_spread, _ = _covers.line(x, strength)
@@ -139,15 +154,15 @@ def _gather(plane: Array, factor: int) -> Array:
     return np.asarray(np.add.reduceat(rows, np.arange(0, nx, factor), axis=1))
 
 
-def _weigh(logs: Array, orders: Array) -> tuple[Array, Array]:
-    """Return ln sum(mu^q), and the mean of ln mu weighed by mu^q, for every order; safe for large orders."""
+def _weigh(logs: Array, part: Array, orders: Array) -> tuple[Array, Array]:
+    """Return ln sum(part mu^q), and the mean of ln mu weighed alike, for every order; safe for large ones."""
     partition, strength = np.empty(orders.size), np.empty(orders.size)
     for place, order in enumerate(orders):
         scaled = order * logs
         top = scaled.max()
-        weight = np.exp(scaled - top)
+        weight = part * np.exp(scaled - top)
         partition[place] = top + np.log(weight.sum())
-        strength[place] = weight @ logs / weight.sum()
+        strength[place] = (weight * logs).sum() / weight.sum()
     return partition, strength
 
 

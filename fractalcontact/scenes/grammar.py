@@ -32,9 +32,13 @@ DOMAIN_STAGES: Mapping[str, str] = {
     name: name
     for name in (
         "box_dimension",
+        "box_counts",
+        "minkowski_dimension",
+        "correlation_dimension",
+        "generalised_dimensions",
+        "boundary_dimension",
         "lacunarity",
         "islands",
-        "boundary_dimension",
         "percolation",
         "describe",
         "evolution",

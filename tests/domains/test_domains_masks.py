@@ -16,11 +16,13 @@ FUNCTIONS = {
     "box_counts": fc.domains.box_counts,
     "box_dimension": fc.domains.box_dimension,
     "boundary_dimension": fc.domains.boundary_dimension,
+    "correlation_dimension": fc.domains.correlation_dimension,
     "describe": fc.domains.describe,
     "evolution": fc.domains.evolution,
     "generalised_dimensions": fc.domains.generalised_dimensions,
     "islands": fc.domains.islands,
     "lacunarity": fc.domains.lacunarity,
+    "minkowski_dimension": fc.domains.minkowski_dimension,
     "percolation": fc.domains.percolation,
 }
 
@@ -96,7 +98,7 @@ def test_masks_that_are_none_are_refused_by_name(name, mask):
             FUNCTIONS[name](bad)
 
 
-@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "generalised_dimensions"])
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_what_was_not_observed_makes_no_difference(name, mask):
     valid = as_mask(np.random.default_rng(2).random((32, 32)) < 0.9, periodic=(True, False))
     one = FUNCTIONS[name](mask & valid, valid=valid).drop_vars("run_time")
@@ -106,7 +108,7 @@ def test_what_was_not_observed_makes_no_difference(name, mask):
     assert one.identical(each.assign_attrs(one.attrs))
 
 
-@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "generalised_dimensions"])
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_valid_must_fit_the_mask(name, mask):
     for bad in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32), bool)):
         with pytest.raises(ValueError, match="valid: expected"):

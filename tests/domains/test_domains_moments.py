@@ -96,3 +96,16 @@ def test_measures_must_be_finite_and_not_negative(bad):
     values[2, 3] = bad
     with pytest.raises(ValueError, match="1 of 64 NaN, infinite or negative"):
         fc.domains.generalised_dimensions(values)
+
+
+def test_gaps_leave_full_planes_full_and_the_orders_alike():
+    rng = np.random.default_rng(9)
+    valid = rng.random((64, 64)) < 0.8
+    result = fc.domains.generalised_dimensions(
+        as_mask(np.ones((64, 64))), [-1.0, 0.0, 1.0, 2.0, 3.0], valid=as_mask(valid)
+    )
+    assert result.generalised_dimension.values == pytest.approx(np.full(5, 2.0), abs=1e-12)
+    weights = fc.domains.generalised_dimensions(
+        as_mask(np.ones((64, 64))).astype(float) * 3.5, [0.0, 2.0], valid=as_mask(valid)
+    )
+    assert weights.generalised_dimension.values == pytest.approx([2.0, 2.0], abs=1e-12)
