@@ -142,7 +142,9 @@ class Run:
         best, stale, iteration, reason = np.inf, 0, 0, "iteration_limit"
         while iteration <= GREATEST_ITERATIONS:
             balance = self.weigh()
-            if self.clipped and balance.objective > self.last + balance.noise and self.halved < HALVINGS:
+            # nodes may change places for ever at one level of the objective: where nothing comes of it, less
+            slack = balance.noise if stale < PATIENCE // 4 else -balance.noise
+            if self.clipped and balance.objective > self.last + slack and self.halved < HALVINGS:
                 self.halve()
                 continue
             self.last, self.halved, self.clipped = balance.objective, 0, False
