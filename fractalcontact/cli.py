@@ -1,6 +1,7 @@
 """The command `fractalcontact`: run a scene, list the methods, tell what a file holds.
 
-Exit codes: 0 done, 2 the input is wrong (nothing was written), 130 stopped (finished stages are kept).
+Exit codes: 0 done, 2 the input is wrong (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM (a run
+finishes its part and keeps what is done; a second signal ends it at once).
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
 import sys
 import warnings
 from collections.abc import Sequence
@@ -16,27 +16,24 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.stopping import Stopped, leaving
 
-WRONG_INPUT, STOPPED = 2, 130
+WRONG_INPUT, STOPPED = 2, 128
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = _parser().parse_args(arguments)
     warnings.showwarning = _say_warning
-    _stop_on_termination()
     try:
-        code: int = options.action(options)
+        with leaving(_leave):
+            code: int = options.action(options)
     except FractalContactError as error:
         print(error, file=sys.stderr)
         return WRONG_INPUT
-    except KeyboardInterrupt:
-        print(
-            "stopped; finished stages are kept, and the same command goes on from them",
-            file=sys.stderr,
-            flush=True,
-        )
-        os._exit(STOPPED)  # no waiting for threads that the stop left in the middle of their work
+    except Stopped as stop:
+        print(stop, file=sys.stderr)
+        return STOPPED + stop.number
     except BrokenPipeError:
         sys.stderr.close()
         return 0
@@ -197,13 +194,10 @@ def _say_warning(message: Any, category: Any, *_: Any, **__: Any) -> None:
     print(f"{getattr(category, '__name__', 'warning')}: {message}", file=sys.stderr)
 
 
-def _stop_on_termination() -> None:
-    """Let a polite kill unwind like an interrupt, so that temporary files go."""
-
-    def stop(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
+def _leave(number: int, _: object) -> None:
+    """End at once, whatever the threads are doing: nothing half written stands under a final name."""
+    os.write(2, b"stopped\n")
+    os._exit(STOPPED + number)
 
 
 if __name__ == "__main__":

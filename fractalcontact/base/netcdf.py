@@ -7,7 +7,9 @@ killed one left.
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PARTIAL = ".partial"
+LEAST_ROOM = 1 << 16  # bytes: a disk with less is full
 _KIND = "fractalcontact_kind"
 _GLOBAL = ("Conventions", "title", "institution", "source", "history", "references", "comment", "provenance")
 
@@ -53,8 +56,8 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
         clear_partial(target.parent)
         _as_file(result).to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
         temporary.replace(target)
-    except OSError as error:
-        reason = error.strerror or str(error)
+    except (OSError, RuntimeError) as error:  # the library tells a full disk as a RuntimeError
+        reason = _why_not(target.parent, error)
         raise InvalidInput(where, [f"path: {target.name!r} cannot be written here: {reason}"]) from error
     finally:
         temporary.unlink(missing_ok=True) if target.parent.is_dir() else None
@@ -97,6 +100,15 @@ def open(path: str | os.PathLike[str]) -> Any:
     array = dataset[kind]
     array.attrs.update({key: dataset.attrs[key] for key in _GLOBAL if key in dataset.attrs})
     return array
+
+
+def _why_not(folder: Path, error: Exception) -> str:
+    """Return why a file could not be written, in the words of the system where it gives any."""
+    with contextlib.suppress(OSError):
+        if shutil.disk_usage(folder).free < LEAST_ROOM:
+            return "no space left on the device"
+    reason = getattr(error, "strerror", None) or str(error)
+    return reason if isinstance(error, OSError) else f"the file could not be completed ({reason})"
 
 
 def _with_words(dataset: xr.Dataset) -> xr.Dataset:

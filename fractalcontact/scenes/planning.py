@@ -84,9 +84,13 @@ def plan(scene: Scene) -> Plan:
     stages += _contact_stages(scene)
     stages += _joint_stages(scene)
     stages += _domain_stages(scene)
+    if scene.figures:
+        stored = tuple(stage.name for stage in stages if stage.stored)
+        stages.append(Stage(FIGURES, stored, "figures are wanted", stored=False))
     return Plan(scene.name, tuple(stages))
 
 
+FIGURES = "figures"
 CURVES = (
     "spectrum",
     "variogram",

@@ -39,7 +39,7 @@ def contents(result: xr.DataTree | xr.Dataset | xr.DataArray) -> str:
         groups = {node.path: node.to_dataset(inherit=False) for node in result.subtree}
     else:
         groups = {"/": result.to_dataset() if isinstance(result, xr.DataArray) else result}
-    lines = [str(result.attrs.get("title", "untitled")), str(result.attrs.get("source", ""))]
+    lines = [str(result.attrs[key]) for key in ("title", "source", "completeness") if key in result.attrs]
     for path, dataset in groups.items():
         if dataset.variables:
             lines += ["", path, *_variable_lines(dataset), *_reason_lines(dataset)]
@@ -49,7 +49,7 @@ def contents(result: xr.DataTree | xr.Dataset | xr.DataArray) -> str:
 
 def stage_table(result: Any) -> str:
     """Return the stages of a study: seconds, origin, and what each says of its accuracy."""
-    entry = json.loads(result.attrs.get("provenance", "{}"))
+    entry = _entry(result)
     stages = entry.get("stages", {})
     if not stages:
         return _single_entry(entry)
@@ -60,6 +60,15 @@ def stage_table(result: Any) -> str:
         rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_told(told)) + note))
     rows.append(("total", f"{sum(facts['run_time'] for facts in stages.values()):.2f}", ""))
     return table(rows)
+
+
+def _entry(result: Any) -> dict[str, Any]:
+    """Return the provenance of a result, empty for a file of another origin."""
+    try:
+        entry = json.loads(result.attrs.get("provenance", "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return entry if isinstance(entry, dict) else {}
 
 
 def _single_entry(entry: dict[str, Any]) -> str:

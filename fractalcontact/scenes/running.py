@@ -1,30 +1,29 @@
-"""A plan carried out: every stage once, kept until the whole is done, resumed where it stopped."""
+"""A plan carried out: every part once, kept until the whole is done, resumed where it stopped."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import shutil
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base import netcdf, provenance, schema
+from fractalcontact.base import netcdf, provenance, schema, stopping
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
 from fractalcontact.scenes import stages
-from fractalcontact.scenes.planning import Plan, Stage, plan
+from fractalcontact.scenes.keeping import Store, digest
+from fractalcontact.scenes.planning import FIGURES, Stage, plan
 from fractalcontact.scenes.reading import load
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
     import xarray as xr
 
-RESULT = "result.nc"
-KEPT = ".stages"
+RESULT, UNFINISHED = "result.nc", "partial.nc"
 
 
 def run(
@@ -40,7 +39,7 @@ def run(
     ----------
     scene : Scene or path-like
     out : path-like, optional
-        Folder for `result.nc` and the figures; nothing is written without it. Finished stages are kept in
+        Folder for `result.nc` and the figures; nothing is written without it. Finished parts are kept in
         `out/.stages` until the whole is done: a run that was stopped goes on where it was.
     progress : bool
         Show a bar for stages of several parts.
@@ -57,28 +56,29 @@ def run(
     ------
     InvalidInput
         The scene, its faces, or the folder: everything wrong at once, before anything is computed.
+    Stopped
+        A `KeyboardInterrupt`: with `out`, SIGINT and SIGTERM let the current part finish; what is there by
+        then is written to `partial.nc`, which says so, and the same call goes on from it. A second signal,
+        half a second later or more, stops at once.
     """
     scene = scene if isinstance(scene, Scene) else load(scene)
     stages.preflight(scene)
     folder = None if out is None else _folder(Path(out))
-    todo = plan(scene)
-    store = _Store(None if folder is None else folder / KEPT)
-    results: dict[str, xr.Dataset] = {}
-    digests: dict[str, str] = {}
-    record: dict[str, dict[str, Any]] = {}
-    for stage in track(todo.stages, progress, scene.name, unit="stage"):
-        start = time.perf_counter()
-        digests[stage.name] = _digest(stage, scene, digests)
-        results[stage.name], computed = _carry_out(stage, scene, results, digests, store, progress, client)
-        record[stage.name] = {
-            "run_time": time.perf_counter() - start,
-            "origin": "computed" if computed else "kept from an earlier run",
-            **achieved(results[stage.name]),
-        }
-    tree = _assemble(scene, todo, results, record)
-    if folder is not None:
-        _write(tree, scene, folder, record, progress)
-        store.clear()
+    study = _Study(scene, Store(folder), progress, client)
+    with stopping.noted(folder is not None) as stop:
+        missing = study.carry_out(stop)
+        tree = study.assemble(missing)
+        if folder is None:
+            return tree
+        if missing:
+            netcdf.save(tree, folder / UNFINISHED)
+            told = f"finished parts are in {UNFINISHED}, and the same run goes on from them"
+            raise stopping.Stopped(stop.number, told)
+        if scene.figures:
+            _draw(tree, folder, progress)
+        netcdf.save(tree, folder / RESULT)
+        (folder / UNFINISHED).unlink(missing_ok=True)
+        study.store.clear()
     return tree
 
 
@@ -97,125 +97,158 @@ def achieved(result: xr.Dataset) -> dict[str, Any]:
     return found
 
 
-class _Store:
-    """Results of finished parts, by digest, in a folder (or nowhere)."""
+class _Study:
+    """One run of a scene: what is done so far, and what that took.
 
-    def __init__(self, folder: Path | None) -> None:
-        self.folder = folder
+    Attributes
+    ----------
+    parts : dict
+        Results of the finished parts of each stage, by number.
+    results : dict
+        Those of the finished stages, joined.
+    """
 
-    def get(self, key: str) -> xr.Dataset | None:
-        if self.folder is None or not (self.folder / f"{key}.nc").is_file():
-            return None
+    def __init__(self, scene: Scene, store: Store, progress: bool, client: Any) -> None:
+        self.scene, self.store, self.progress, self.client = scene, store, progress, client
+        self.plan = plan(scene)
+        self.parts: dict[str, dict[int, xr.Dataset]] = {}
+        self.results: dict[str, xr.Dataset] = {}
+        self.seconds: dict[str, float] = {}
+        self.digests: dict[str, str] = {}
+        self.works: dict[str, stages.Work] = {}
+        for stage in self.plan:
+            self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped(stage))
+
+    def carry_out(self, stop: stopping.Stop) -> list[str]:
+        """Run the stages in order; return what is missing if a stop was asked for."""
+        todo = [stage for stage in self.plan if stage.name != FIGURES]
+        for number, stage in enumerate(track(todo, self.progress, self.scene.name, unit="stage")):
+            count = self._stage(stage, stop)
+            whole = len(self.works[stage.name].parts)
+            if stop:
+                rest = [other.name for other in todo[number + 1 :]]
+                part = [f"{stage.name} ({count} of {whole} parts done)"] if count < whole else []
+                return part + rest + ([FIGURES] if self.scene.figures else [])
+        return []
+
+    def _stage(self, stage: Stage, stop: stopping.Stop) -> int:
+        """Run the parts of a stage that are missing; return how many there are by now."""
+        readers = self._readers(stage)
+        job = self.works[stage.name] = stages.work(stage, self.scene, self.results, self.works)
+        done = self.parts.setdefault(stage.name, {})
+        names = [stage.name, *(reader.name for reader in readers)]
+        for name in names:
+            self._take_kept(name, len(job.parts))
+        missing = [n for n in range(len(job.parts)) if any(n not in self.parts[name] for name in names)]
+        several = self.progress and len(missing) > 1
+        made = self._made(stage, job, readers, missing)
+        for number, (results, seconds) in track(made, several, stage.name, unit="part", total=len(missing)):
+            for name, result in zip(names, results, strict=True):
+                self.store.put(self._key(name, number), result)
+                self.parts[name][number] = result
+            for name, spent in zip(names, seconds, strict=True):
+                self.seconds[name] = self.seconds.get(name, 0.0) + spent
+            if stop:
+                break
+        start = time.perf_counter()
+        joined = job.join(done)
+        if joined is not None:
+            self.results[stage.name] = joined
+        self.seconds.setdefault(stage.name, 0.0)
+        if missing:
+            self.seconds[stage.name] += time.perf_counter() - start
+        return len(done)
+
+    def _take_kept(self, name: str, count: int) -> None:
+        """Take what an earlier run kept of a stage."""
+        found = self.parts.setdefault(name, {})
+        for number in range(count):
+            kept = None if number in found else self.store.get(self._key(name, number))
+            if kept is not None:
+                found[number] = kept
+
+    def _made(
+        self, stage: Stage, job: stages.Work, readers: list[Stage], missing: list[int]
+    ) -> Iterator[tuple[int, tuple[list[xr.Dataset], list[float]]]]:
+        """Yield number, results and seconds of the missing parts as they are done, here or on the workers."""
+        dropped = self._dropped(stage)
+        follow = [stages.measure(reader, self.scene) for reader in readers]
+        parts = {}
+        for number in missing:
+            kept = self.parts[stage.name].get(number)
+            whole = kept is not None and all(name in kept for name in stage.keep)
+            part = stages.Given(kept) if kept is not None and whole else job.parts[number]
+            parts[number] = stages.Followed(part, tuple(follow), dropped)
+        if self.client is None or len(missing) < 2:
+            yield from ((number, part()) for number, part in parts.items())
+            return
+        futures = {number: self.client.submit(part, pure=False) for number, part in parts.items()}
         try:
-            found: xr.Dataset = netcdf.open(self.folder / f"{key}.nc")
-        except InvalidInput:
-            return None
-        return found
+            for number in missing:
+                yield number, futures[number].result()
+                del futures[number]
+        finally:
+            for future in futures.values():
+                future.cancel()
 
-    def put(self, key: str, result: xr.Dataset) -> None:
-        if self.folder is not None:
-            netcdf.save(result, self.folder / f"{key}.nc")
+    def _readers(self, stage: Stage) -> list[Stage]:
+        """Return the stages that read the maps of this one part by part, so that none outlives its part."""
+        return [one for one in self.plan if stage.name in one.needs and stages.reads_part(one)]
 
-    def clear(self) -> None:
-        if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+    def _dropped(self, stage: Stage) -> tuple[str, ...]:
+        """Return the maps of a stage that nothing needs once its readers are done with each part."""
+        stored = set(self.scene.wanted("keep")) | ({"state"} if self.scene.figures else set())
+        for other in self.plan:
+            if stage.name in other.needs and not stages.reads_part(other):
+                stored |= {stages.map_read(other)}
+        return tuple(name for name in stage.keep if name not in stored)
 
+    def _key(self, name: str, number: int) -> str:
+        return f"{name.replace('/', '.')}.{self.digests[name]}.{number:03d}"
 
-def _carry_out(
-    stage: Stage,
-    scene: Scene,
-    results: dict[str, xr.Dataset],
-    digests: dict[str, str],
-    store: _Store,
-    progress: bool,
-    client: Any,
-) -> tuple[xr.Dataset, bool]:
-    """Return the result of a stage, and whether any of it had to be computed."""
-    job = stages.work(stage, scene, results)
-    keys = [
-        f"{stage.name.replace('/', '.')}.{digests[stage.name]}.{number:03d}"
-        for number in range(len(job.parts))
-    ]
-    done = {key: store.get(key) for key in keys}
-    missing = [(key, part) for key, part in zip(keys, job.parts, strict=True) if done[key] is None]
-    several = progress and len(missing) > 1
-    if client is not None and len(missing) > 1:
-        futures = [client.submit(part, pure=False) for _, part in missing]
-        made = ((key, future.result()) for (key, _), future in zip(missing, futures, strict=True))
-    else:
-        made = ((key, part()) for key, part in missing)
-    for key, result in track(made, several, stage.name, unit="part", total=len(missing)):
-        store.put(key, result)
-        done[key] = result
-    return job.join([result for result in done.values() if result is not None]), bool(missing)
-
-
-def _digest(stage: Stage, scene: Scene, digests: dict[str, str]) -> str:
-    """Return a name for the result: whatever could change it goes in, and nothing else."""
-    room, _, name = stage.name.partition("/")
-    tables: dict[str, Any] = {"version": provenance.plain(_version()), "keep": stage.keep}
-    if room == "surfaces" or name == "faces":
-        table = scene.table("upper" if name == "faces" else "surface")
-        tables["surface"] = table
-        if "read" in table:
-            tables["file"] = hashlib.sha256(
-                stages.locate(table["read"], scene.folder).read_bytes()
-            ).hexdigest()
-    if room == "joints":
-        tables["material"] = scene.table("material")
-        joint = scene.table("joint")
-        tables["joint"] = {
-            key: joint[key] for key in joint if not isinstance(joint[key], dict) or key == name
+    def record(self) -> dict[str, dict[str, Any]]:
+        """Return run time, origin and achieved error of every stage so far."""
+        return {
+            name: {
+                "run_time": self.seconds[name],
+                "origin": "computed" if self.seconds[name] else "kept from an earlier run",
+                **achieved(result),
+            }
+            for name, result in self.results.items()
         }
-    if room == "dimensions":
-        tables["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
-    if room == "contact":
-        tables["contact"] = stages.contact_options(scene)
-    if room == "domains":
-        tables["domains"] = scene.table("domains").get(name, {})
-    tables["needs"] = [digests[need] for need in stage.needs]
-    text = json.dumps([stage.name, tables], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+    def assemble(self, missing: list[str]) -> xr.DataTree:
+        """Return the finished results as a tree that says what it lacks."""
+        import xarray as xr
 
-def _version() -> str:
-    import fractalcontact
-
-    return fractalcontact.__version__
-
-
-def _assemble(
-    scene: Scene, todo: Plan, results: dict[str, xr.Dataset], record: dict[str, dict[str, Any]]
-) -> xr.DataTree:
-    import xarray as xr
-
-    groups: dict[str, xr.Dataset] = {"/": xr.Dataset()}
-    kept_maps = set(scene.wanted("keep")) | ({"state"} if scene.figures else set())
-    for stage in todo:
-        if not stage.stored:
-            continue
-        result = results[stage.name].drop_vars(
-            [name for name in stage.keep if name not in kept_maps], errors="ignore"
+        groups: dict[str, xr.Dataset] = {"/": xr.Dataset()}
+        kept_maps = set(self.scene.wanted("keep")) | ({"state"} if self.scene.figures else set())
+        for stage in self.plan:
+            if not stage.stored or stage.name not in self.results:
+                continue
+            unwanted = [name for name in stage.keep if name not in kept_maps]
+            result = stages.without(self.results[stage.name], unwanted)
+            if stage.name == "surfaces/description":
+                merged = groups.get("/surfaces", xr.Dataset()).assign(result.data_vars)
+                merged.attrs = groups["/surfaces"].attrs if "/surfaces" in groups else result.attrs
+                groups["/surfaces"] = merged
+            else:
+                groups[f"/{stage.name}"] = result
+        tree = xr.DataTree.from_dict(
+            {path: schema.encoded(dataset) for path, dataset in groups.items()}, name=self.scene.name
         )
-        if stage.name == "surfaces/description":
-            merged = groups.get("/surfaces", xr.Dataset()).assign(result.data_vars)
-            merged.attrs = groups["/surfaces"].attrs if "/surfaces" in groups else result.attrs
-            groups["/surfaces"] = merged
-        else:
-            groups[f"/{stage.name}"] = result
-    tree = xr.DataTree.from_dict(
-        {path: schema.encoded(dataset) for path, dataset in groups.items()}, name=scene.name
-    )
-    root = xr.Dataset()
-    provenance.stamp(
-        root,
-        "fractalcontact.scenes.run",
-        {"scene": dict(scene.tables)},
-        title=str(scene.tables.get("title", scene.name)),
-        stages=record,
-    )
-    tree.attrs = root.attrs
-    return tree
+        root = xr.Dataset()
+        provenance.stamp(
+            root,
+            "fractalcontact.scenes.run",
+            {"scene": dict(self.scene.tables)},
+            title=str(self.scene.tables.get("title", self.scene.name)),
+            stages=self.record(),
+        )
+        tree.attrs = root.attrs
+        if missing:
+            tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
+        return tree
 
 
 def _folder(out: Path) -> Path:
@@ -232,15 +265,12 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _write(
-    tree: xr.DataTree, scene: Scene, folder: Path, record: dict[str, dict[str, Any]], progress: bool
-) -> None:
-    if scene.figures:
-        from fractalcontact import plotting
+def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> None:
+    """Draw the figures and note the time they took."""
+    from fractalcontact import plotting
 
-        start = time.perf_counter()
-        plotting.draw(tree, folder, progress=progress)
-        record["figures"] = {"run_time": time.perf_counter() - start, "origin": "computed"}
-        entry = json.loads(tree.attrs["provenance"])
-        tree.attrs["provenance"] = json.dumps(entry | {"stages": provenance.plain(record)})
-    netcdf.save(tree, folder / RESULT)
+    start = time.perf_counter()
+    plotting.draw(tree, folder, progress=progress)
+    entry = json.loads(tree.attrs["provenance"])
+    entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
+    tree.attrs["provenance"] = json.dumps(entry)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,48 +34,143 @@ if TYPE_CHECKING:
     Results = Mapping[str, xr.Dataset]
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
+CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
+WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
 Part = Callable[[], "xr.Dataset"]
 
 
 @dataclass(frozen=True)
 class Work:
-    """The parts of one stage, and the dim along which their results are joined."""
+    """The parts of one stage, the dims along which their results are joined, and how many lie along each."""
 
     parts: tuple[Part, ...]
-    along: str | None = None
+    along: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
 
-    def join(self, results: list[xr.Dataset]) -> xr.Dataset:
-        """Return the result of the stage from those of its parts."""
-        if len(results) == 1:
-            return results[0]
-        import xarray as xr
-
-        joined = xr.concat(
-            results,
-            dim=self.along,
-            data_vars="minimal",
-            coords="minimal",
-            compat="override",
-            join="override",
-            combine_attrs="override",
-        )
-        for name, variable in joined.variables.items():
-            variable.encoding = dict(results[0].variables[name].encoding)
-        return joined
+    def join(self, done: Mapping[int, xr.Dataset]) -> xr.Dataset | None:
+        """Return the result of the stage from those of its parts, as far as they reach without a hole."""
+        count = next((n for n in range(len(self.parts)) if n not in done), len(self.parts))
+        found = [done[n] for n in range(count)]
+        for dim, length in zip(reversed(self.along), reversed(self.shape), strict=True):
+            rows = [found[k : k + length] for k in range(0, len(found), length)]
+            # a row that is not complete is left out, unless it is all there is
+            rows = [row for row in rows if len(row) == length] or rows[:1]
+            found = [_joined(row, dim) for row in rows]
+        return found[0] if found else None
 
 
-def work(stage: Stage, scene: Scene, results: Results) -> Work:
-    """Return what is to be done for a stage, given the results of those it needs."""
+@dataclass(frozen=True)
+class Followed:
+    """A part, and the measures of its maps taken before the maps go."""
+
+    part: Part
+    measures: tuple[Callable[[xr.Dataset], xr.Dataset], ...] = ()
+    dropped: tuple[str, ...] = ()
+
+    def __call__(self) -> tuple[list[xr.Dataset], list[float]]:
+        """Return the results and the seconds each took."""
+        start = time.perf_counter()
+        source = self.part()
+        seconds = [time.perf_counter() - start]
+        results = []
+        for one in self.measures:
+            start = time.perf_counter()
+            results.append(one(source))
+            seconds.append(time.perf_counter() - start)
+        return [without(source, self.dropped), *results], seconds
+
+
+@dataclass(frozen=True)
+class Given:
+    """A part that was computed before."""
+
+    result: xr.Dataset
+
+    def __call__(self) -> xr.Dataset:
+        """Return the result."""
+        return self.result
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A function of one map of a part."""
+
+    room: str
+    function: str
+    variable: str
+    options: Mapping[str, Any]
+
+    def __call__(self, source: xr.Dataset) -> xr.Dataset:
+        """Return what the function says of the map."""
+        return _call(self.room, self.function, source[self.variable], **self.options)
+
+
+def without(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
+    """Return a result without some of its maps, and without coordinates that then belong to nothing."""
+    rest = result.drop_vars(list(names), errors="ignore")
+    used = {dim for variable in rest.data_vars.values() for dim in variable.dims}
+    return rest.drop_vars([dim for dim in ("y", "x") if dim in rest.coords and dim not in used])
+
+
+def _joined(results: list[xr.Dataset], dim: str) -> xr.Dataset:
+    """Join results along a dim; seconds are added up."""
+    if len(results) == 1:
+        return results[0]
+    import xarray as xr
+
+    joined = xr.concat(
+        results,
+        dim=dim,
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+        combine_attrs="override",
+    )
+    if "run_time" in joined and dim not in joined["run_time"].dims:
+        joined["run_time"] = results[0]["run_time"].copy(data=sum(one["run_time"].values for one in results))
+    if dim == "step":
+        attributes = dict(joined["step"].attrs)
+        joined = joined.assign_coords(step=("step", np.arange(joined.sizes["step"]), attributes))
+    for name, variable in joined.variables.items():
+        variable.encoding = dict(results[0].variables[name].encoding)
+    return joined
+
+
+def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]) -> Work:
+    """Return what is to be done for a stage, given the results and the work of those it needs."""
     room, _, name = stage.name.partition("/")
+    if reads_part(stage):
+        source = works[stage.needs[0]]
+        return Work(source.parts, source.along, source.shape)
+    if map_read(stage):
+        return Work((partial(measure(stage, scene), results[stage.needs[0]]),))
     if room == "surfaces":
         return _surface_work(name, scene, results)
     if room == "dimensions":
         return _dimension_work(name, scene, results)
     if room == "contact":
-        return Work((partial(_press, results["surfaces"], contact_options(scene), stage.keep),))
-    if room == "joints":
-        return _joint_work(name, stage, scene, results)
-    return _domain_work(name, stage, scene, results)
+        return _contact_work(stage, scene, results)
+    return _joint_work(name, stage, scene, results)
+
+
+def map_read(stage: Stage) -> str:
+    """Return the map that a stage reads from the one it needs, none for most."""
+    if stage.name.startswith("domains/"):
+        return "state"
+    return "gap" if stage.name == "joints/transmissivity" else ""
+
+
+def reads_part(stage: Stage) -> bool:
+    """Whether a stage reads the maps of the one it needs plane by plane, so that no map need be kept."""
+    return bool(map_read(stage)) and stage.name.partition("/")[2] not in WHOLE
+
+
+def measure(stage: Stage, scene: Scene) -> Measure:
+    """Return the function of a map that a stage stands for."""
+    room, _, name = stage.name.partition("/")
+    table = "joint" if room == "joints" else room
+    return Measure(room, name, map_read(stage), scene.options(table, name, stage_keys(room, name)))
 
 
 def preflight(scene: Scene) -> None:
@@ -211,8 +307,24 @@ def contact_options(scene: Scene) -> dict[str, Any]:
     return options
 
 
+def _contact_work(stage: Stage, scene: Scene, results: Results) -> Work:
+    options, faces = contact_options(scene), results["surfaces"]
+    load = next(key for key in LOADS if key in options)
+    paths = _chunks(options.pop(load), faces["height"].size, "hardness" in options)
+    parts = (partial(_press, faces, options | {load: path}, stage.keep) for path in paths)
+    return Work(tuple(parts), ("step",), (len(paths),))
+
+
 def _press(faces: xr.Dataset, options: dict[str, Any], keep: tuple[str, ...]) -> xr.Dataset:
     return _call("contact", "press", faces["height"], keep=keep, **options)
+
+
+def _chunks(path: Any, nodes: int, remembers: bool) -> list[Any]:
+    """Cut a path of load into parts; a body that yields remembers what was, and its path stays whole."""
+    length = max(1, CHUNK // nodes)
+    if not isinstance(path, list) or len(path) <= length or remembers:
+        return [path]
+    return [path[k : k + length] for k in range(0, len(path), length)]
 
 
 def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
@@ -224,8 +336,6 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     options = scene.options("joint", name, stage_keys("joints", name))
     if name == "friction":
         return Work((partial(_call, "joints", name, results[stage.needs[0]], **options),))
-    if name == "transmissivity":
-        return Work((partial(_call, "joints", name, results["joints/closure"]["gap"], **options),))
     crack = _crack(scene, results)
     if name in ("closure", "elastic_dilatancy") and "hardness" in scene.table("material"):
         options.setdefault("hardness", scene.table("material")["hardness"])
@@ -234,21 +344,31 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     if name == "closure":
         return _closure_work(crack, options, loads_of(scene)[0], stage.keep)
     if name == "elastic_dilatancy":
-        directions = options.pop("direction", ("E", "N", "W", "S"))
-        directions = [directions] if isinstance(directions, str) else list(directions)
+        directions = _several(options.pop("direction", ("E", "N", "W", "S")))
+        shears = _several(options.pop("shear"))
         parts = (
-            partial(_call, "joints", "dilatancy", crack, direction=[word], **options) for word in directions
+            partial(_call, "joints", "dilatancy", crack, direction=[word], shear=[v], **options)
+            for word in directions
+            for v in shears
         )
-        return Work(tuple(parts), along="direction")
+        return Work(tuple(parts), ("direction", "shear"), (len(directions), len(shears)))
     return Work((partial(_call, "joints", JOINT_STAGES[name], crack, **options),))
 
 
 def _closure_work(crack: Crack, options: dict[str, Any], load: str, keep: tuple[str, ...]) -> Work:
     options = {key: value for key, value in options.items() if key not in LOADS or key == load}
-    shears = options.pop("shear")
-    shears = shears if isinstance(shears, list) else [shears]
-    parts = (partial(_call, "joints", "closure", crack, shear=[v], keep=keep, **options) for v in shears)
-    return Work(tuple(parts), along="shear")
+    shears, nodes = _several(options.pop("shear")), crack.layout.cells[0] * crack.layout.cells[1]
+    paths = _chunks(options.pop(load), nodes, "hardness" in options)
+    parts = (
+        partial(_call, "joints", "closure", crack, shear=[v], keep=keep, **options, **{load: path})
+        for v in shears
+        for path in paths
+    )
+    return Work(tuple(parts), ("shear", "step"), (len(shears), len(paths)))
+
+
+def _several(given: Any) -> Sequence[Any]:
+    return given if isinstance(given, (list, tuple)) else [given]
 
 
 def _upper_face(table: Table, folder: Path, lower: xr.Dataset, registers: bool) -> xr.Dataset:
@@ -256,12 +376,6 @@ def _upper_face(table: Table, folder: Path, lower: xr.Dataset, registers: bool) 
     if registers:
         return _call("joints", "register", lower["height"], face)
     return as_dataset(face.rename("height"))
-
-
-def _domain_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
-    state = results[stage.needs[0]]["state"]
-    options = scene.options("domains", name, stage_keys("domains", name))
-    return Work((partial(_call, "domains", name, state, **options),))
 
 
 def _crack(scene: Scene, results: Results) -> Crack:

@@ -1,0 +1,214 @@
+"""Nothing is lost: a scene stopped by a signal, a full disk or a damaged file, and what comes after."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import netCDF4
+import numpy as np
+import pytest
+from study import SOUND
+
+import fractalcontact as fc
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput, UnreadableFile
+from fractalcontact.base.stopping import Stopped
+from fractalcontact.scenes import stages
+
+STUDY = SOUND.replace(
+    'joints = ["closure", "rigid_dilatancy"]',
+    'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
+    'joints = ["closure", "elastic_dilatancy", "friction", "transmissivity"]\n'
+    'domains = ["box_dimension", "lacunarity", "islands"]\nkeep = ["state"]\n',
+).replace('direction = "W"', 'direction = "W"\nelastic_dilatancy = { direction = ["E", "W"] }')
+
+
+def variables(path):
+    """Return the bytes of every variable of a file but the run times."""
+    found = {}
+
+    def walk(group, place):
+        for name, variable in group.variables.items():
+            if not name.endswith("run_time"):
+                variable.set_auto_maskandscale(False)
+                found[f"{place}/{name}"] = (variable.dimensions, np.asarray(variable[...]).tobytes())
+        for name, child in group.groups.items():
+            walk(child, f"{place}/{name}")
+
+    with netCDF4.Dataset(path) as file:
+        walk(file, "")
+    return found
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    fc.scenes.run(folder / "study.toml", out=folder, progress=False)
+    return folder / "study.toml", variables(folder / "result.nc")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_at_every_part_it_goes_on_to_the_same_bytes(whole, tmp_path, monkeypatch, number):
+    scene, expected = whole
+    original, asked, numbers, runs = stages._call, [], [], 0
+
+    def once_more(*arguments, **options):
+        """Ask for a stop in the first part that is computed in each run."""
+        if not asked:
+            asked.append(True)
+            signal.raise_signal(number)
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(stages, "_call", once_more)
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    while True:
+        asked.clear()
+        runs += 1
+        try:
+            fc.scenes.run(scene, out=tmp_path, progress=False)
+            break
+        except Stopped as stop:
+            numbers.append(stop.number)
+        assert [path.name for path in tmp_path.glob("*.nc")] == ["partial.nc"]
+        partial = fc.open(tmp_path / "partial.nc")
+        assert "partial" in partial.attrs["completeness"]
+        assert runs < 20
+    assert len(numbers) > 6
+    assert set(numbers) == {number}
+    assert {one: signal.getsignal(one) for one in before} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert variables(tmp_path / "result.nc") == expected
+
+
+def test_a_partial_file_holds_the_finished_part_of_a_stage(whole, tmp_path, monkeypatch):
+    original = stages._call
+
+    def stop_in_closure(*arguments, **options):
+        if arguments[1] == "closure":
+            signal.raise_signal(signal.SIGTERM)
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(stages, "_call", stop_in_closure)
+    with pytest.raises(Stopped, match="SIGTERM"):
+        fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    partial = fc.open(tmp_path / "partial.nc")
+    assert partial["joints/closure"].sizes["shear"] == 1
+    assert "joints/closure (1 of 2 parts done)" in partial.attrs["completeness"]
+    assert "domains/islands" in partial.attrs["completeness"]
+
+
+def test_a_second_signal_is_obeyed_at_once(tmp_path, monkeypatch):
+    from fractalcontact.base import stopping
+
+    monkeypatch.setattr(stopping, "ECHO", 0.0)
+    with pytest.raises(KeyboardInterrupt) as caught, stopping.noted() as stop:
+        signal.raise_signal(signal.SIGINT)
+        assert stop.number == signal.SIGINT
+        time.sleep(0.001)
+        signal.raise_signal(signal.SIGINT)
+    assert not isinstance(caught.value, Stopped)
+
+
+def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
+    from fractalcontact.base import stopping
+
+    with stopping.noted() as stop:
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+    assert stop.number == signal.SIGTERM
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_killed_there_is_no_half_file(whole, tmp_path, number):
+    words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob(".stages/*.nc")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.kill(process.pid, number)
+    _, told = process.communicate(timeout=60)
+    if number != signal.SIGKILL:
+        assert process.returncode == 128 + number
+        assert "goes on" in told
+        assert fc.open(tmp_path / "partial.nc").attrs["completeness"].startswith("partial")
+    assert not (tmp_path / "result.nc").exists()
+    tree = fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    assert "completeness" not in tree.attrs
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert variables(tmp_path / "result.nc") == whole[1]
+
+
+def damaged(folder, how):
+    for path in (folder / ".stages").glob("*.nc"):
+        if how == "truncated":
+            path.write_bytes(path.read_bytes()[:-200])
+        elif how == "foreign":
+            fc.save(fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1), path)
+        else:
+            path.write_text("not a NetCDF file", encoding="utf-8")
+
+
+@pytest.mark.parametrize("how", ["truncated", "foreign", "text"])
+def test_a_damaged_kept_part_is_told_and_computed_again(whole, tmp_path, monkeypatch, how):
+    original = stages._call
+
+    def stop(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        return original(*arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stages, "_call", stop)
+        with pytest.raises(Stopped):
+            fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    damaged(tmp_path, how)
+    with pytest.warns(FractalContactWarning, match="computed again"):
+        fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    assert variables(tmp_path / "result.nc") == whole[1]
+
+
+@pytest.mark.parametrize("cut", [0, 10, 1000, -1])
+def test_a_truncated_file_is_refused(whole, tmp_path, cut):
+    path = tmp_path / "cut.nc"
+    path.write_bytes((whole[0].parent / "result.nc").read_bytes()[:cut])
+    with pytest.raises(UnreadableFile, match=r"cut\.nc"):
+        fc.open(path)
+
+
+def test_a_file_of_another_origin_is_told_for_what_it_is(tmp_path):
+    from fractalcontact.scenes.reporting import contents
+
+    with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
+        file.createDimension("t", 3)
+        file.createVariable("temperature", "f8", ("t",))[:] = 1.0
+        file.provenance = "from a boat"
+    found = fc.open(tmp_path / "other.nc")
+    assert "temperature" in contents(found)
+
+
+def limited(size):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+
+    return limit
+
+
+def test_a_full_disk_is_a_clear_error_and_loses_nothing(whole, tmp_path):
+    words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
+    done = subprocess.run(words, preexec_fn=limited(40_000), capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written here" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("*.nc"))
+    fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    assert variables(tmp_path / "result.nc") == whole[1]
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_runs(whole, tmp_path):
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    for out in (tmp_path / "file", tmp_path / "file" / "below", "/proc/nowhere"):
+        with pytest.raises(InvalidInput, match="folder"):
+            fc.scenes.run(whole[0], out=out, progress=False)
