@@ -1,10 +1,11 @@
-"""Gliding-box lacunarity of planes; arrays in and out."""
+"""Lacunarity of planes, by gliding boxes or on one grid; arrays in and out."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.domains import _covers
 from fractalcontact.domains._masks import Array, Planes, together
 
 MANY = 24  # sizes above which one transform is cheaper than a sum for each
@@ -78,3 +79,41 @@ def dust(coverage: Array, sizes: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(coverage > 0, (1.0 - coverage) / coverage, np.nan)
     return np.asarray(1.0 + excess[:, None] / sizes.astype(float) ** 2)
+
+
+def on_grid(planes: Planes, sizes: Array) -> Array:
+    """Return <M^2> / <M>^2 over the whole, wholly observed boxes of the grid from the first cell."""
+
+    def one(task: tuple[int, int]) -> float:
+        plane, size = task
+        mass = _whole_boxes(planes.cells[plane], size)
+        valid = planes.valid_of(plane)
+        if valid is not None:
+            mass = mass[_whole_boxes(valid, size) == size * size]
+        return _ratio(mass.size, mass.ravel(), mass.ravel() ** 2)
+
+    tasks = [(plane, int(size)) for plane in range(planes.count) for size in sizes]
+    return np.array([one(task) for task in tasks]).reshape(planes.count, sizes.size)
+
+
+def _whole_boxes(cells: Array, size: int) -> Array:
+    """Sum over the boxes that lie wholly inside, int64."""
+    ny, nx = (n // size * size for n in cells.shape)
+    rows = cells[:ny, :nx].reshape(ny // size, size, nx).sum(1, dtype=np.int64)
+    return np.asarray(rows.reshape(ny // size, nx // size, size).sum(2))
+
+
+def normalised(coverage: Array, values: Array) -> Array:
+    """Return the lacunarity less 1 over that of single cells less 1; NaN where the set is full or empty."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        odds = np.where((coverage > 0) & (coverage < 1), coverage / (1.0 - coverage), np.nan)
+    return np.asarray((values - 1.0) * odds[:, None])
+
+
+def numbers(sizes: Array, values: Array) -> tuple[Array, Array]:
+    """Return the slope of ln lacunarity over ln size, and the integral; NaN for one size."""
+    if sizes.size < 2:
+        return np.full(len(values), np.nan), np.full(len(values), np.nan)
+    x, y = np.log(sizes), np.log(values)
+    steps = np.diff(x)
+    return _covers.line(x, y)[0], np.asarray((0.5 * (y[:, 1:] + y[:, :-1]) * steps).sum(-1))

@@ -25,10 +25,11 @@ def lacunarity(
     mask: xr.DataArray,
     box_sizes: Any = None,
     *,
+    boxes: str = "gliding",
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
-    """Gliding-box lacunarity, with that of a random dust of equal coverage beside it.
+    """Lacunarity by gliding boxes or on one grid, with that of a random dust of equal coverage beside it.
 
     A box of r x r cells glides over the plane cell by cell; M is the number of cells of the set in it, and
     the lacunarity is <M^2> / <M>^2 over all positions: 1 for an even set, and the larger the more the set
@@ -40,6 +41,10 @@ def lacunarity(
         Boolean, or integer flags where contact means value > 0.
     box_sizes : sequence of int, optional
         Edges of the box in cells; by default the powers of two up to half the shorter side.
+    boxes : {"gliding", "fixed"}
+        All positions of the box, or those of the one grid that starts at the first cell. On their own grid
+        sets made by a fixed rule have the lacunarity (L/r)^(2 - D) exactly, gliding boxes tell the gaps
+        wherever they lie.
     periodic : bool, optional
         Whether the box goes round over the edges; by default what the axes say. True is refused on a free
         axis, where only positions wholly inside count.
@@ -49,9 +54,14 @@ def lacunarity(
     Returns
     -------
     Dataset
-        Over the leading dims of the mask: `coverage`, and over `box_size` (cells; `box_length` in m, the
-        side of a square as large as the box) too: `lacunarity`; `dust_lacunarity`, 1 + (1 - p) / (p r^2)
-        for cells set independently with the coverage p as probability.
+        Over the leading dims of the mask and `box_size` (cells; `box_length` in m, the side of a square as
+        large as the box): `lacunarity`; `dust_lacunarity`, 1 + (1 - p) / (p r^2) for cells set independently
+        with the coverage p as probability; `relative_lacunarity`, over that of the dust;
+        `normalised_lacunarity`, (lacunarity - 1) p / (1 - p), which is 1 at one cell whatever the coverage.
+        Over the leading dims: `coverage`, and the whole curve as one number: `lacunarity_slope`, the
+        least-squares slope of ln lacunarity over ln r (D - 2 for a power law), `lacunarity_area`, the
+        integral of ln lacunarity over ln r (0 for an even set), with `dust_lacunarity_slope` and
+        `dust_lacunarity_area`.
 
     Raises
     ------
@@ -61,28 +71,37 @@ def lacunarity(
 
     Notes
     -----
-    NaN where the set is empty or no box was wholly observed, with the reason in the attributes. At one cell
-    the lacunarity is 1 / coverage whatever the set.
+    NaN where the set is empty or no box was wholly observed, with the reason in the attributes; the
+    normalised one also where the set is full, and the numbers where some size has none. At one cell the
+    lacunarity is 1 / coverage whatever the set.
     """
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.lacunarity") as problems:
+        problems.choice("boxes", boxes, ("gliding", "fixed"))
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
         sizes = _sizes(box_sizes, planes, problems)
-    values = _gliding.lacunarity(planes, sizes)
+    values = _gliding.lacunarity(planes, sizes) if boxes == "gliding" else _gliding.on_grid(planes, sizes)
+    dust = _gliding.dust(planes.coverage, sizes)
+    numbers = zip(("slope", "area"), _gliding.numbers(sizes, values), strict=True)
+    null = zip(("slope", "area"), _gliding.numbers(sizes, dust), strict=True)
     variables = {
         "coverage": planes.variable(planes.coverage),
         "lacunarity": planes.variable(values, "box_size"),
-        "dust_lacunarity": planes.variable(_gliding.dust(planes.coverage, sizes), "box_size"),
+        "dust_lacunarity": planes.variable(dust, "box_size"),
+        "relative_lacunarity": planes.variable(values / dust, "box_size"),
+        "normalised_lacunarity": planes.variable(_gliding.normalised(planes.coverage, values), "box_size"),
+        **{f"lacunarity_{name}": planes.variable(one) for name, one in numbers},
+        **{f"dust_lacunarity_{name}": planes.variable(one) for name, one in null},
         "run_time": ((), time.perf_counter() - begin),
     }
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
-    dataset = assemble(planes, variables, coords, notes=_notes(planes, values))
-    parameters = {"mask": mask, "box_sizes": box_sizes, "periodic": periodic, "valid": valid}
+    dataset = assemble(planes, variables, coords, notes=_notes(planes, values, boxes))
+    parameters = {"mask": mask, "box_sizes": box_sizes, "boxes": boxes, "periodic": periodic, "valid": valid}
     return stamp(
         dataset,
         "fractalcontact.domains.lacunarity",
         parameters,
-        title="Gliding-box lacunarity",
+        title="Lacunarity",
         references=SOURCE,
     )
 
@@ -93,11 +112,14 @@ def _sizes(given: Any, planes: Planes, problems: Problems) -> Array:
     return box_sizes(given, default, problems, "box_sizes", longest=shorter)
 
 
-def _notes(planes: Planes, values: Array) -> dict[str, dict[str, str]]:
+def _notes(planes: Planes, values: Array, boxes: str) -> dict[str, dict[str, str]]:
     empty = planes.occupied == 0
     reasons = []
     if empty.any():
         reasons.append(f"the set is empty ({int(empty.sum())} planes)")
     if np.isnan(values[~empty]).any():
         reasons.append("no box was wholly observed, or none of those holds a cell")
-    return {"lacunarity": {"comment": "NaN where " + " or where ".join(reasons)}} if reasons else {}
+    attributes = {"long_name": "lacunarity (fixed grid of boxes)"} if boxes == "fixed" else {}
+    if reasons:
+        attributes["comment"] = "NaN where " + " or where ".join(reasons)
+    return {"lacunarity": attributes}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from domains.sets import as_mask, lattice_set, level_set
+from domains.sets import DIMENSION, as_mask, base, lattice_set, level_set
 
 import fractalcontact as fc
 
@@ -162,3 +162,39 @@ def test_a_periodic_axis_may_be_called_free_and_a_free_one_not_periodic():
         fc.domains.lacunarity(as_mask(cells), [5], periodic=True)
     with pytest.raises(ValueError, match="box_sizes: expected a finite number >= 1 and <= 20"):
         fc.domains.lacunarity(as_mask(cells), [21])
+
+
+def test_fixed_grid_of_lattice_sets_is_a_power_law():
+    for name, level in (("carpet", 4), ("cantor_dust", 4), ("vicsek", 4), ("gasket", 6)):
+        ratio = base(name)
+        sizes = ratio ** np.arange(level + 1)
+        result = fc.domains.lacunarity(as_mask(lattice_set(name, level)), sizes, boxes="fixed")
+        want = (ratio**level / sizes) ** (2 - DIMENSION[name])
+        assert result.lacunarity.values == pytest.approx(want, rel=1e-12)
+        assert float(result.lacunarity_slope) == pytest.approx(DIMENSION[name] - 2, abs=1e-12)
+        assert "fixed grid" in result.lacunarity.attrs["long_name"]
+
+
+def test_fixed_grid_counts_whole_observed_boxes_only():
+    rng = np.random.default_rng(20)
+    cells, valid = rng.random((11, 14)) < 0.4, rng.random((11, 14)) < 0.95
+    found = fc.domains.lacunarity(as_mask(cells), [3], boxes="fixed", valid=as_mask(valid))
+    boxes = [(slice(i, i + 3), slice(j, j + 3)) for i in range(0, 9, 3) for j in range(0, 12, 3)]
+    mass = np.array([cells[box].sum() for box in boxes if valid[box].all()])
+    assert float(found.lacunarity[0]) == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-13)
+
+
+def test_numbers_of_the_whole_curve():
+    cells = np.zeros((64, 64))
+    cells[::8, ::8] = 1
+    result = fc.domains.lacunarity(as_mask(cells, periodic=(True, True)), [1, 2, 4, 8])
+    # m^2 / r^2 up to the period m = 8
+    assert float(result.lacunarity_slope) == pytest.approx(-2.0, abs=1e-13)
+    assert float(result.lacunarity_area) == pytest.approx(np.log(8) ** 2, rel=1e-13)
+    assert result.normalised_lacunarity.values == pytest.approx((64 / np.array([1, 4, 16, 64]) - 1) / 63)
+    assert result.relative_lacunarity.values == pytest.approx(
+        (result.lacunarity / result.dust_lacunarity).values
+    )
+    full = fc.domains.lacunarity(as_mask(np.ones((16, 16))))
+    assert (float(full.lacunarity_slope), float(full.lacunarity_area)) == (0.0, 0.0)
+    assert np.isnan(full.normalised_lacunarity).all()
