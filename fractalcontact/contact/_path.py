@@ -59,14 +59,10 @@ class Step:
     solution: Solution
     problem: Problem
     path: Path
+    closure: float
     force: float
     run_time: float
     past: Past
-
-    @property
-    def closure(self) -> float:
-        """Closure in m."""
-        return (self.solution.closure + self.past.touch) * self.path.units.height
 
     @property
     def contact(self) -> Array:
@@ -157,10 +153,11 @@ def solve_path(path: Path) -> Iterator[Step]:
             solver = solver or _solver(problem, path)
             solution = solver.step(control)
         carried = solution.total * path.units.force
-        force = carried if path.control == "closure" else value
+        found = (solution.closure + past.touch) * path.units.height
+        closure, force = (value, carried) if path.control == "closure" else (found, value)
         if abs(carried - force) > BALANCE * force:
             solution = replace(solution, reason="force_missed")
-        step = Step(solution, problem, path, force, perf_counter() - begun, past)
+        step = Step(solution, problem, path, closure, force, perf_counter() - begun, past)
         yield step
         if step.overlap is not None:
             past = step.past_and_this

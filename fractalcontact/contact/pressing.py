@@ -50,7 +50,11 @@ def press(
     The pair of bodies enters through its contact modulus alone, so the flat may stand for a second elastic
     body and the surface for the composite of two rough faces. The highest point of the surface touches at
     closure 0. In the solution gap >= 0, pressure >= 0 and one of them is zero at every node, with
-    gap = (top - height) + settlement - closure.
+
+        gap = (top - height) + settlement - closure.
+
+    Heights count up; closure, settlement and indentation count down, into the surface; pressure is positive
+    in compression.
 
     Parameters
     ----------
@@ -60,8 +64,9 @@ def press(
         E* of the pair in Pa, see `effective_modulus`.
     closure, normal_force, nominal_pressure : float or sequence of float
         Exactly one of them: approach of the bodies from first touch (m), force (N), or force over the whole
-        extent (Pa). A sequence is a path of load, which may go up and down; each step starts from the
-        solution before it.
+        extent (Pa). A sequence is a path of load, which may go up and down. Each step starts from the
+        solution before it, which changes iterations and not answers beyond the tolerance: an elastic surface
+        has no memory.
     boundary : {None, "periodic", "free"}
         None: what the axes of the surface say. A periodic surface may be called free, never the reverse.
     influence : {None, "disc", "square", "spectral"}
@@ -72,16 +77,19 @@ def press(
         Radius of the plate, or a length in m. "second_order" makes the error quadratic in the spacing (0.4366
         of it on a square grid); it exists for spacings in a ratio of up to 2.
     hardness : float, optional
-        Greatest pressure (Pa): nodes that reach it yield, and the bodies may overlap there. The cap has no
-        memory: unloading from a yielded state is elastic on the original surface.
+        Greatest pressure (Pa). Where it is reached the surface yields: the overlap of the bodies there is
+        indentation, which stays. Unloading is elastic, loading back follows it, and yielding goes on where
+        it ended. A force of all of hardness times area determines the indentation from below only.
     tolerance : float
         Bound on `residual`, the scale-free optimality error: weighted open gap plus greatest overlap over the
         mean settlement (see Notes).
     method : {"fast", "elimination"}
         "fast": conjugate gradients with Fourier transforms; "elimination": the dense active set of the paper,
         for small faces.
-    keep : sequence out of "state", "pressure", "gap", "displacement"
-        Maps (step, y, x) to return.
+    keep : sequence out of "state", "pressure", "gap", "displacement", "residual_height"
+        Maps (step, y, x) to return: open, contact or yielded (int8 flags); pressure (Pa); gap (m, zero in
+        contact); settlement (m; without its mean for a periodic body); and the heights (m) that the surface
+        would have if it were unloaded after the step, lower than at first where it has yielded.
     progress : bool
         Show a bar over the steps.
 
@@ -90,26 +98,36 @@ def press(
     Dataset over `step`
         Coordinates closure (m), normal_force (N), nominal_pressure (Pa); contact_area (m2, cells in contact),
         contact_fraction (raw), corrected_contact_fraction (perimeter-corrected), mean_gap (m), elastic_energy
-        (J), iterations, transforms (pairs), residual, converged, stop_reason, run_time (s); and the maps.
+        (J, half of pressure times settlement), with a hardness plastic_work (J, spent on indentation since
+        the start of the path), iterations, transforms (pairs), residual, converged, stop_reason (int8 flags:
+        converged, rounding, stagnated, iteration_limit, force_missed, beyond_full_contact), run_time (s); the
+        maps; and scalars nominal_area (m2), contact_modulus (Pa), disc_radius (m, for "disc").
 
     Raises
     ------
     InvalidInput
-        Lists everything wrong with the call; also a force above hardness times area, and for a periodic body
-        a closure at or beyond the mean plane, where the force is not determined.
+        Lists everything wrong with the call; also a force above hardness times area, and a load more than
+        1e90 times larger or smaller than what the heights and the modulus set as its scale.
 
     Warns
     -----
     ConvergenceWarning
-        A step stopped before its tolerance was met.
+        A step stopped before its tolerance was met, or its force is not determined.
 
     Notes
     -----
     Under force control the closure is the pressure-weighted mean of gap and settlement, whose error is of
     second order in that of the pressure. For a periodic body the settlement has no mean, and
-    closure = top - mean height - mean gap.
+    closure = top - mean height - mean gap (with a hardness, mean residual height). Such a body cannot be
+    closed to its mean plane or beyond: there the force and what hangs on it are NaN, with the reason in their
+    attributes, everything is in contact, and the path goes on.
 
-    The residual bounds the energy of the error of the pressure over that of the pressure (`_optimality`).
+    The energy of the elastic body obeys d(elastic_energy) = normal_force d(closure); with a hardness the work
+    of the force is d(elastic_energy) + d(plastic_work).
+
+    The residual is (mean open gap weighted by pressure + greatest overlap) over the mean settlement weighted
+    by pressure. It bounds the square of the relative error of the pressure in the energy norm; what that
+    means for pressures, areas and closures is measured in the gallery.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The hardness cap: no pressure above it, the force carried, the same as a bounded dense minimisation."""
+"""The hardness cap: a bounded dense minimisation, what a path remembers, where the work goes."""
 
 import numpy as np
 import pytest
@@ -68,14 +68,107 @@ def test_agrees_with_a_bounded_dense_minimisation():
     np.testing.assert_allclose(found["pressure"][0], exact, atol=1e-6 * cap)
 
 
-def test_a_very_high_cap_changes_nothing_and_a_path_has_no_memory():
+def test_a_very_high_cap_changes_nothing():
     options = {"contact_modulus": MODULUS, "nominal_pressure": [1e6, 5e6, 1e6], "keep": ("state", "pressure")}
     free = fc.contact.press(face(), **options)
     capped = fc.contact.press(face(), hardness=1e15, **options)
     np.testing.assert_allclose(capped["pressure"], free["pressure"], atol=1e-4 * 1e7)
+    assert (capped["plastic_work"] == 0).all()
     low = fc.contact.press(face(), hardness=1e7, tolerance=1e-12, **options)
-    np.testing.assert_array_equal(low["state"][0], low["state"][2])
     assert (low["contact_fraction"] > free["contact_fraction"]).all()
+
+
+def test_an_elastic_surface_remembers_nothing():
+    path = np.array([1e5, 1e6, 5e6, 1e6, 1e5])
+    found = fc.contact.press(face(), contact_modulus=MODULUS, nominal_pressure=path, tolerance=1e-12)
+    for name in ("closure", "elastic_energy", "mean_gap"):
+        np.testing.assert_allclose(found[name][::-1], found[name], rtol=1e-9)
+    np.testing.assert_array_equal(found["state"][::-1], found["state"])
+    assert "plastic_work" not in found
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_yielded_surface_unloads_on_another_way_and_loads_back_on_it(boundary):
+    path = np.array([1e6, 3e6, 5e6, 3e6, 1e6, 0.0, 1e6, 3e6, 5e6])
+    maps = ("state", "pressure", "gap", "residual_height")
+    options = {"contact_modulus": MODULUS, "boundary": boundary, "hardness": 1e7, "keep": maps}
+    found = fc.contact.press(face(), nominal_pressure=path, tolerance=1e-12, **options)
+    closure = found["closure"].values
+    assert closure[3] > 1.01 * closure[1]  # hysteresis: more closure for the same force
+    assert closure[4] > 1.05 * closure[0]
+    assert closure[5] > 0  # what is left of it without force
+    np.testing.assert_allclose(closure[6:], closure[4:1:-1], rtol=1e-9)
+    np.testing.assert_allclose(found["pressure"][8], found["pressure"][2], atol=1e-7 * 1e7)
+    work = found["plastic_work"].values
+    assert (np.diff(work[:3]) > 0).all()
+    np.testing.assert_allclose(work[2:], work[2], rtol=1e-9)
+    assert (found["state"][3:7] < 2).all()
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_the_residual_height_is_the_surface_that_is_left(boundary):
+    """Pressed again from its residual height, an unloaded surface answers as it does along the path."""
+    options = {"contact_modulus": MODULUS, "boundary": boundary, "tolerance": 1e-12}
+    maps = {"hardness": 1e7, "keep": ("state", "residual_height", "pressure")}
+    found = fc.contact.press(face(), nominal_pressure=[5e6, 2e6], **options, **maps)
+    left = face().copy(data=found["residual_height"].values[1])
+    lowered = (face() - left).values
+    assert lowered.min() == 0.0
+    assert (lowered[found["state"].values[0] != 2] == 0).all()
+    assert 0 < lowered.max() < float(found["closure"][0])
+    again = fc.contact.press(left, nominal_pressure=2e6, keep=("pressure",), **options)
+    np.testing.assert_allclose(again["pressure"][0], found["pressure"][1], atol=1e-7 * 1e7)
+    offset = float(face().max() - left.max())
+    assert float(again["closure"][0]) + offset == pytest.approx(float(found["closure"][1]), rel=1e-9)
+
+
+def test_the_work_of_the_force_is_stored_or_spent():
+    """Along a fine path the work of the force is the elastic energy and what the indentation takes."""
+    closure = np.linspace(0.0, 2.5e-5, 60)
+    path = np.concatenate([closure, closure[:-16:-1]])
+    found = fc.contact.press(face(), contact_modulus=MODULUS, closure=path, hardness=3e7, keep=())
+    force = found["normal_force"].values
+    work = np.concatenate([[0.0], np.cumsum(np.diff(path) * (force[1:] + force[:-1]) / 2)])
+    stored = (found["elastic_energy"] + found["plastic_work"]).values
+    np.testing.assert_allclose(work, stored, atol=2e-3 * work.max())
+    assert float(found["plastic_work"][-1]) > 0.1 * work.max()
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_flat_faces_yield_where_their_pressure_reaches_the_hardness(boundary):
+    flat = fc.surfaces.from_array(np.zeros((16, 16)), 1e-4, periodic=boundary == "periodic")
+    options = {"contact_modulus": MODULUS, "hardness": 1e7, "keep": ("pressure", "state", "residual_height")}
+    most = 1e7 * 256e-8
+    closed = fc.contact.press(flat, closure=[1e-3, 2e-3, 1e-3], **options)
+    np.testing.assert_allclose(closed["normal_force"], [most, most, 0.0], rtol=1e-12)
+    assert (closed["state"][:2] == 2).all()
+    pressed = fc.contact.press(flat, normal_force=[0.3 * most, 0.97 * most], **options)
+    np.testing.assert_allclose(
+        pressed["pressure"].sum(("y", "x")) * 1e-8, pressed["normal_force"], rtol=1e-12
+    )
+    assert float(pressed["pressure"].max()) <= 1e7
+    if boundary == "periodic":
+        np.testing.assert_allclose(closed["residual_height"][1], -2e-3, rtol=1e-15)
+        assert (pressed["closure"] == 0).all()
+
+
+def test_a_ball_yields_from_its_centre_and_keeps_a_cap():
+    """Yield begins at the greatest pressure of Hertz, 2 E*/pi sqrt(d/R); far beyond it all is at the cap."""
+    n, radius, spacing = 81, 1.0, 1e-3
+    x = (np.arange(n) - n // 2) * spacing
+    ball = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / (2 * radius), spacing)
+    depth = (20 * spacing) ** 2 / radius
+    greatest = 2 * MODULUS / np.pi * np.sqrt(depth / radius)
+    options = {"contact_modulus": MODULUS, "influence": "square", "keep": ("state", "pressure")}
+    below = fc.contact.press(ball, closure=depth, hardness=1.02 * greatest, **options)
+    assert not (below["state"] == 2).any()
+    above = fc.contact.press(ball, closure=depth, hardness=0.9 * greatest, **options)
+    yielded = np.argwhere((above["state"] == 2).values[0]) - n // 2
+    assert 0 < np.hypot(*yielded.T).max() < 12
+    soft = fc.contact.press(ball, closure=depth, hardness=0.002 * greatest, **options)
+    cut = np.pi * 2 * depth * radius  # where the flat cuts through the ball
+    assert float(soft["contact_area"][0]) == pytest.approx(cut, rel=0.02)
+    assert float(soft["normal_force"][0]) == pytest.approx(0.002 * greatest * cut, rel=0.02)
 
 
 def test_more_than_the_cap_can_carry_is_refused():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
-from fractalcontact.contact import _fast, _plane
+from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.contact import _descent, _fast, _plane
 from fractalcontact.contact._precondition import Preconditioner
 from fractalcontact.contact._problem import Body
 
@@ -154,11 +154,30 @@ def test_a_preconditioner_that_fails_is_done_without(monkeypatch, fault, boundar
 
 
 def test_a_tolerance_beyond_rounding_is_said_not_to_be_met():
-    with pytest.warns(ConvergenceWarning, match="rounding|stagnated"):
+    with pytest.warns(ConvergenceWarning, match="step 0: rounding"):
         found = press(rough(64), nominal_pressure=1e6, tolerance=1e-30)
     assert not bool(found["converged"][0])
-    assert str(found["stop_reason"].values[0]) in ("rounding", "stagnated")
+    assert stopped(found) == ["rounding"]
     assert float(found["residual"][0]) < 1e-11
+
+
+def stopped(found):
+    """Words for why the steps stopped, read as a user would."""
+    flags = dict(
+        zip(found["stop_reason"].flag_values, found["stop_reason"].flag_meanings.split(), strict=True)
+    )
+    return [flags[value] for value in found["stop_reason"].values]
+
+
+def test_a_step_that_runs_out_of_iterations_is_told_apart(monkeypatch):
+    monkeypatch.setattr(_descent, "GREATEST_ITERATIONS", 2)
+    with pytest.warns(ConvergenceWarning, match="step 1: iteration_limit"):
+        found = press(rough(64), nominal_pressure=[0.0, 1e6], tolerance=1e-10)
+    assert stopped(found) == ["converged", "iteration_limit"]
+    np.testing.assert_array_equal(found["converged"], [True, False])
+    assert found["stop_reason"].dtype == np.int8
+    assert float(found["residual"][1]) > 1e-10
+    np.testing.assert_allclose(found["pressure"][1].mean(), 1e6, rtol=1e-12)
 
 
 @pytest.mark.parametrize("heights", ["spike", "plateaus", "quantised", "noise", "step", "offset"])
@@ -194,8 +213,28 @@ def test_beyond_full_contact_the_body_is_linear():
 def test_a_periodic_face_cannot_be_closed_beyond_its_mean():
     surface = rough(32)
     depth = float(surface.max() - surface.mean())
-    with pytest.raises(InvalidInput, match="mean height"):
-        press(surface, closure=1.001 * depth)
-    nearly = press(surface, closure=0.97 * depth)
-    assert bool(nearly["converged"].all())
-    assert float(nearly["mean_gap"][0]) == pytest.approx(0.03 * depth, rel=1e-6)
+    keep = ("state", "pressure", "gap", "displacement")
+    with pytest.warns(ConvergenceWarning, match="step 1: beyond_full_contact"):
+        found = press(surface, closure=[0.97 * depth, 1.001 * depth, 0.97 * depth, 1e3 * depth], keep=keep)
+    assert stopped(found) == ["converged", "beyond_full_contact"] * 2
+    assert float(found["mean_gap"][0]) == pytest.approx(0.03 * depth, rel=1e-6)
+    np.testing.assert_array_equal(np.isnan(found["normal_force"]), [False, True, False, True])
+    np.testing.assert_allclose(found["closure"], np.array([0.97, 1.001, 0.97, 1e3]) * depth, rtol=1e-15)
+    for name in ("normal_force", "nominal_pressure", "elastic_energy", "pressure", "displacement"):
+        assert "mean plane" in found[name].attrs["reason"]
+        assert bool(found[name][1].isnull().all())
+    assert (found["state"][1] == 1).all()
+    assert (found["gap"][1] == 0).all()
+    assert float(found["contact_fraction"][1]) == 1.0
+    assert float(found["normal_force"][2]) == pytest.approx(float(found["normal_force"][0]), rel=1e-7)
+
+
+@pytest.mark.parametrize("share", [0.999, 0.999999, 1 - 1e-10])
+def test_a_periodic_face_nearly_closed_to_its_mean_is_in_full_contact(share):
+    surface = rough(32)
+    depth = float(surface.max() - surface.mean())
+    found = press(surface, closure=share * depth)
+    assert bool(found["converged"].all())
+    full = press(surface, nominal_pressure=1e10)
+    assert float(found["normal_force"][0]) < float(full["normal_force"][0])
+    assert float(found["contact_fraction"][0]) > 0.9
