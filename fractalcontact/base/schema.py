@@ -49,6 +49,10 @@ _STOP = {
     "flag_meanings": " ".join(STOP_REASONS),
 }
 
+_EVENT = {
+    "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
+    "flag_meanings": "continuation birth death merge split merge_and_split",
+}
 _NO_INTERVAL = {"comment": "NaN where no honest interval can be given"}
 _NO_CENTRE = {"comment": "NaN where an island winds around the whole period"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
@@ -214,6 +218,11 @@ QUANTITIES: dict[str, Quantity] = {
     "box_dimension": Quantity("1", "box dimension of the set"),
     "dust_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
     "dust_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
+    "box_local_slope": Quantity("1", "local box dimension, -d ln(box_measure)/d ln(box_size)"),
+    "minkowski_local_slope": Quantity("1", "local Minkowski dimension, 2 - d ln(area)/d ln(radius)"),
+    "correlation_local_slope": Quantity("1", "local correlation dimension, d ln(mean_mass)/d ln(box_size)"),
+    "minkowski_dust_dimension": Quantity("1", "Minkowski dimension of a random dust of equal coverage"),
+    "correlation_dust_dimension": Quantity("1", "correlation dimension of a random dust of equal coverage"),
     "dust_count": Quantity("1", "number of boxes that meet a random dust of equal coverage"),
     "differs_from_dust": Quantity("1", "the set differs from a random dust of equal coverage"),
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
@@ -291,11 +300,30 @@ QUANTITIES: dict[str, Quantity] = {
     "splits": Quantity("1", "islands of the step before that meet several"),
     "overlap": Quantity("1", "common over united area of successive sets"),
     "hausdorff_distance": Quantity("m", "Hausdorff distance between successive sets"),
+    "return_step": Quantity("1", "place on the path, on the way in the other direction, of the same load"),
+    "hysteresis": Quantity("1", "share of the united area that is in one alone of two sets at the same load"),
+    "coverage_change": Quantity("1", "coverage less that at the same load on the way before"),
+    "link": Quantity("1", "island and what became of it"),
+    "link_step": Quantity("1", "step that is compared with the one before"),
+    "link_shear": Quantity("m", "shear displacement at which the islands are seen"),
+    "link_direction": Quantity(None, "direction of sliding in which the islands are seen"),
+    "link_member": Quantity("1", "member of the ensemble in which the islands are seen"),
+    "island_before": Quantity("1", "number of the island before, 0 if there is none"),
+    "island_after": Quantity("1", "number of the island after, 0 if there is none"),
+    "common_cells": Quantity("1", "number of cells that both islands share"),
+    "event": Quantity("1", "what became of the island", _EVENT),
     # accuracy
     "error": Quantity("1", "true error"),
     "memory": Quantity("byte", "peak memory"),
     "first_run_time": Quantity("s", "run time of the first call, with compilation"),
     "knob": Quantity("1", "setting that trades error for time"),
+    "setting": Quantity("1", "number of the setting, in the order of growing cost"),
+    "contest": Quantity(None, "methods that are after the same truth"),
+    "knob_name": Quantity(None, "what the knob is"),
+    "error_meaning": Quantity(None, "what the error is"),
+    "truth": Quantity(None, "what the error is measured against"),
+    "on_frontier": Quantity("1", "no other method of the contest came as near in as little time"),
+    "share_on_frontier": Quantity("1", "share of the settings on the frontier; 0 is never worth choosing"),
     "family": Quantity(None, "family of surfaces"),
     "size": Quantity("1", "points along an edge"),
     "bias": Quantity("1", "mean error of the Hurst exponent"),

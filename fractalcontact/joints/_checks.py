@@ -9,7 +9,7 @@ import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.joints._directions import Direction
-from fractalcontact.joints._sliding import WHOLE, Block, heights_under
+from fractalcontact.joints._sliding import WHOLE, Block, heights_under, spline_error
 from fractalcontact.joints.crack import FILL, Crack
 
 if TYPE_CHECKING:
@@ -27,8 +27,12 @@ def check_crack(crack: Any, problems: Problems) -> None:
 
 
 def check_shear(shear: Any, crack: Any, directions: Sequence[Direction], problems: Problems) -> Array:
-    """Return the shears (m) as an array; they must keep the block on its face."""
+    """Return the shears (m) as an array; each comes once and keeps the block on its face."""
     shears = problems.numbers("shear", shear, at_least=0)
+    values, counts = np.unique(shears, return_counts=True)
+    if (counts > 1).any():
+        twice = ", ".join(f"{value:g} m" for value in values[counts > 1][:5])
+        problems.add("shear", "every shear once", f"{twice} several times")
     if not isinstance(crack, Crack) or problems.found:
         return shears
     longest = float(shears.max())
@@ -56,6 +60,26 @@ def missing(where: str, crack: Crack, direction: Direction, shear: float) -> Inv
             f"at a shear of {shear:g} m towards {direction.name}"
         ],
     )
+
+
+def resampling_errors(crack: Crack, shears: Array, directions: Sequence[Direction]) -> Array:
+    """Return the rms error (m) of the heights under the block, shape (direction, shear).
+
+    Zero for whole shifts, and along axes that wrap, where a shift is exact for what the grid resolves; else
+    that of the spline half way between two points.
+    """
+    layout, face = crack.layout, crack.faces()[0]
+    squares: dict[int, float] = {}
+    found = np.zeros((len(directions), shears.size))
+    for i, direction in enumerate(directions):
+        for j, shear in enumerate(shears):
+            for axis, cells in enumerate(layout.shift(float(shear), direction.unit)):
+                if cells == np.floor(cells) or layout.wraps[axis]:
+                    continue
+                if axis not in squares:
+                    squares[axis] = spline_error(face, axis) ** 2
+                found[i, j] += squares[axis]
+    return np.sqrt(found)
 
 
 def block_coords(crack: Crack, layout: Block) -> dict[str, xr.DataArray]:

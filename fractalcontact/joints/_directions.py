@@ -37,14 +37,23 @@ def one_direction(value: Any, problems: Problems, argument: str = "direction") -
 
 
 def several_directions(value: Any, problems: Problems, argument: str = "direction") -> tuple[Direction, ...]:
-    """Read one direction or a sequence of them, each kept once."""
-    alone = isinstance(value, str) or np.ndim(value) == 0
-    given = [value] if alone else list(value)
+    """Read one direction or a sequence of them, in which each comes once."""
+    given = [value] if is_one(value) else list(value)
     if not given:
         problems.add(argument, EXPECTED, "an empty sequence")
         return (_direction(0.0),)
-    found = (one_direction(item, problems, argument) for item in given)
-    return tuple({direction.name: direction for direction in found}.values())
+    before = len(problems.found)
+    found = tuple(one_direction(item, problems, argument) for item in given)
+    names = [direction.name for direction in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice and len(problems.found) == before:
+        problems.add(argument, "every direction once", f"{', '.join(twice)} several times")
+    return found
+
+
+def is_one(value: Any) -> bool:
+    """Say whether one direction is meant, and not a sequence of them."""
+    return isinstance(value, str) or np.ndim(value) == 0
 
 
 def _direction(azimuth: float) -> Direction:

@@ -178,6 +178,38 @@ def bandis_closure(
     return np.asarray(pressure * greatest_closure / (initial_stiffness * greatest_closure + pressure))
 
 
+def self_weight_strength(length: float | Array, *, unit_weight: float, friction_angle: float) -> Array:
+    """Return the shear strength of a joint under the weight of what stands on it, in Pa.
+
+    Similar structures of size L press on their joint with gamma L, so that tau = gamma L tan(phi) grows with
+    the size: friction stabilises large structures more than small ones.
+
+    Parameters
+    ----------
+    length : float or ndarray
+        Size L of the structure: the height of material over the joint, m.
+    unit_weight : float
+        Weight per volume gamma, N/m3; 24e3 for concrete.
+    friction_angle : float
+        Degree, 0 to 90.
+
+    Raises
+    ------
+    InvalidInput
+        A number is outside its bounds.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 1.
+    """
+    with Problems("fractalcontact.joints.self_weight_strength") as problems:
+        problems.numbers("length", np.ravel(length), above=0)
+        problems.number("unit_weight", unit_weight, above=0)
+        problems.number("friction_angle", friction_angle, at_least=0, below=90)
+    tangent = np.tan(np.radians(friction_angle))
+    return np.asarray(unit_weight * np.asarray(length, dtype=np.float64) * tangent)
+
+
 def size_effect(scale: float, *, contact_dimension: float, roughness_dimension: float = 2.0) -> SizeEffect:
     """Return the change of the strength of a joint when its size grows by a factor.
 

@@ -10,9 +10,16 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
-from fractalcontact.joints._checks import block_coords, check_crack, check_shear, missing
-from fractalcontact.joints._directions import Direction, one_direction
-from fractalcontact.joints._sliding import heights_under, is_whole
+from fractalcontact.joints._checks import (
+    block_coords,
+    check_crack,
+    check_shear,
+    direction_coords,
+    missing,
+    resampling_errors,
+)
+from fractalcontact.joints._directions import Direction, is_one, several_directions
+from fractalcontact.joints._sliding import heights_under
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +31,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def delta_surface(
-    crack: Crack, shear: float | Sequence[float] | Array, direction: str | float = "E"
+    crack: Crack,
+    shear: float | Sequence[float] | Array,
+    direction: str | float | Sequence[str | float] = "E",
 ) -> xr.DataArray:
     """Return the difference of the facing heights after the block has slid.
 
@@ -36,17 +45,18 @@ def delta_surface(
     ----------
     crack : Crack
     shear : float or sequence of float
-        Shear displacement v >= 0, m. Within 1e-6 of whole cells the shift is a copy, and exact. Else it is
-        band-limited where the face wraps, and a quintic spline on a free axis; the provenance then holds an
-        `interpolation_error` (m, the largest difference from a cubic spline), which is large where the
-        grid does not resolve the surface.
-    direction : str or float
+        Shear displacement v >= 0, m, each once. Within 1e-6 of whole cells the shift is a copy, and exact.
+        Else it is band-limited where the face wraps, and a quintic spline on a free axis.
+    direction : str, float, or a sequence of them
         E, NE, N, NW, W, SW, S, SE (E is +x, N is +y), or the azimuth in degrees from E, anticlockwise.
 
     Returns
     -------
-    DataArray `height`, shape (y, x), or (shear, y, x) for a sequence of shears
+    DataArray `height`, shape (y, x), after (direction,) and (shear,) where sequences are given
         Metres, on the grid of the block. An axis is periodic where the block is a whole period of its face.
+        The coordinate interpolation_error (m) is the rms error of the heights under the block: 0 for whole
+        shifts; else that of the spline half way between two points, measured on the face where every second
+        height is left out. NaN where the face has fewer than 40 points in a row.
 
     Raises
     ------
@@ -61,32 +71,23 @@ def delta_surface(
 
     with Problems(WHERE) as problems:
         check_crack(crack, problems)
-        towards = one_direction(direction, problems)
-        shears = check_shear(shear, crack, (towards,), problems)
-    planes, error = _planes(crack, shears, towards)
-    alone = np.ndim(shear) == 0
-    coords: dict[str, Any] = dict(block_coords(crack, crack.layout))
-    coords |= {"shear": shears[0] if alone else ("shear", shears)}
-    coords |= {"direction": towards.name, "azimuth": towards.azimuth}
-    dims = ("y", "x") if alone else ("shear", "y", "x")
-    result = xr.DataArray(planes[0] if alone else planes, dims=dims, coords=coords, name="height")
-    parameters = {"crack": crack.summary(), "shear": shears, "direction": towards.name}
-    facts: dict[str, Any] = {} if error is None else {"interpolation_error": error}
-    return stamp(label(result), WHERE, parameters, title="delta-surface of a sheared crack", **facts)
-
-
-def _planes(crack: Crack, shears: Array, towards: Direction) -> tuple[Array, float | None]:
-    """Return the delta-surfaces and, where a spline was needed, the largest difference from a cubic one."""
-    layout, (lower, upper) = crack.layout, crack.faces()
-    planes = np.empty((shears.size, *layout.cells))
-    error = None
-    for plane, shear in zip(planes, shears, strict=True):
-        plane[:] = delta_plane(crack, float(shear), towards, WHERE)
-        shift = layout.shift(float(shear), towards.unit)
-        if not is_whole(shift) and not all(layout.wraps):
-            cubic = heights_under(lower, layout, shift, degree=3) - upper
-            error = max(error or 0.0, float(np.abs(cubic - plane).max()))
-    return planes, error
+        towards = several_directions(direction, problems)
+        shears = check_shear(shear, crack, towards, problems)
+    planes = np.empty((len(towards), shears.size, *crack.layout.cells))
+    for several, one in zip(planes, towards, strict=True):
+        for plane, v in zip(several, shears, strict=True):
+            plane[:] = delta_plane(crack, float(v), one, WHERE)
+    coords: dict[str, Any] = {"shear": ("shear", shears), **block_coords(crack, crack.layout)}
+    coords |= direction_coords(towards)
+    coords["interpolation_error"] = ("direction", "shear"), resampling_errors(crack, shears, towards)
+    dims = ("direction", "shear", "y", "x")
+    result = xr.DataArray(planes, dims=dims, coords=coords, name="height")
+    if np.ndim(shear) == 0:
+        result = result.isel(shear=0)
+    if is_one(direction):
+        result = result.isel(direction=0)
+    parameters = {"crack": crack.summary(), "shear": shears, "direction": [one.name for one in towards]}
+    return stamp(label(result), WHERE, parameters, title="delta-surface of a sheared crack")
 
 
 def delta_plane(crack: Crack, shear: float, towards: Direction, where: str) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,11 @@ LOCKED = (
 
 
 def friction(
-    dilatancy: xr.Dataset, *, basic_friction_angle: float | None = None, smoothing: float | None = None
+    dilatancy: xr.Dataset,
+    *,
+    basic_friction_angle: float | None = None,
+    smoothing: float | None = None,
+    nominal_pressure: float | Sequence[float] | None = None,
 ) -> xr.Dataset:
     """Return friction angle and shear strength from the dilatancy.
 
@@ -44,15 +49,18 @@ def friction(
         ends of the path the window is cut. None: the slope through the two neighbours of each shear. The
         angle depends on this length, as the slope of any fractal curve does, so the length in use is kept
         in the result over `shear`: compare only angles of equal `smoothing`.
+    nominal_pressure : float or sequence of float, optional
+        Pressures sigma (Pa) for the strength of rigid faces; dilatancy under force carries its own.
 
     Returns
     -------
     Dataset
         dilatancy_angle, friction_angle (degree) over (direction, shear), and over step where forces were
-        given; then also shear_strength (Pa), NaN where the friction angle reaches 90 degrees and the faces
-        lock. It is negative where the block would slide down by itself. Over (direction[, step]):
-        peak_friction_angle, peak_shear (where it is met), peak_shear_strength. Also basic_friction_angle and,
-        over shear, smoothing.
+        given; with forces or pressures also shear_strength (Pa) over (direction, shear, step), NaN with the
+        `reason` where the friction angle reaches 90 degrees and the faces lock. It is negative where the
+        block would slide down by itself. Over (direction[, step]): peak_friction_angle and peak_shear (where
+        it is met); peak_shear_strength and peak_strength_shear, NaN where the faces lock somewhere. Also
+        basic_friction_angle and, over shear, smoothing.
 
     Raises
     ------
@@ -67,16 +75,9 @@ def friction(
     import xarray as xr
 
     with Problems(WHERE) as problems:
-        name, shears = _check_dilatancy(dilatancy, problems)
-        carried = None if problems.found else dilatancy.get("basic_friction_angle")
-        given = carried if basic_friction_angle is None else basic_friction_angle
-        basic = (
-            0.0
-            if problems.found
-            else problems.number("basic_friction_angle", _plain(given), at_least=0, below=90)
-        )
-        if smoothing is not None:
-            problems.number("smoothing", smoothing, above=0)
+        name, shears = check_dilatancy(dilatancy, problems)
+        basic = 0.0 if problems.found else basic_angle(dilatancy, basic_friction_angle, problems)
+        values = check_options(name, smoothing, nominal_pressure, problems)
     heights = dilatancy[name].transpose("shear", ...)
     curves = heights.values.reshape(shears.size, -1)
     slopes, lengths = (
@@ -88,35 +89,46 @@ def friction(
     angle = angle.transpose(*dilatancy[name].dims)
     total = angle + basic
     result = xr.Dataset({"dilatancy_angle": angle, "friction_angle": total})
-    _add_peaks(result, dilatancy if name == "dilatancy" else None)
+    pressure = dilatancy["nominal_pressure"] if name == "dilatancy" else None
+    if values is not None:
+        pressure = xr.DataArray(values, dims="step", coords={"step": np.arange(values.size)})
+        result = result.assign_coords(nominal_pressure=pressure)
+    _add_peaks(result, pressure)
     result["basic_friction_angle"], result["smoothing"] = basic, ("shear", lengths)
     parameters = {
         "dilatancy": dilatancy,
         "basic_friction_angle": basic_friction_angle,
         "smoothing": smoothing,
+        "nominal_pressure": nominal_pressure,
     }
     result = stamp(
         label(result), WHERE, parameters, title="friction of a joint", references=REFERENCES, slope_of=name
     )
-    if "shear_strength" in result:
-        result["shear_strength"].attrs["comment"] = LOCKED
+    for variable in ("shear_strength", "peak_shear_strength", "peak_strength_shear"):
+        if variable in result and bool(np.isnan(result[variable].values).any()):
+            result[variable].attrs["reason"] = LOCKED
     return result
 
 
-def _add_peaks(result: xr.Dataset, forced: xr.Dataset | None) -> None:
-    """Add the greatest angle along the shear, where it is met, and with forces the strengths."""
+def _add_peaks(result: xr.Dataset, pressure: xr.DataArray | None) -> None:
+    """Add the greatest angle along the shear and where it is met; with pressures the same of the strength."""
     total = result["friction_angle"]
     place = total.fillna(-np.inf).argmax("shear")
     result["peak_friction_angle"] = total.isel(shear=place).drop_vars("shear")
     result["peak_shear"] = result["shear"].isel(shear=place).drop_vars("shear")
-    if forced is None:
+    if pressure is None:
         return
     tangent = total.copy(data=np.tan(np.radians(total.where(total < 90.0).values)))
-    result["shear_strength"] = (tangent * forced["nominal_pressure"]).transpose(*total.dims)
-    result["peak_shear_strength"] = result["shear_strength"].isel(shear=place).drop_vars("shear")
+    strength = (tangent * pressure).transpose(*[dim for dim in total.dims if dim != "step"], "step")
+    peak = strength.max("shear", skipna=False)
+    place = strength.fillna(np.inf).argmax("shear")
+    result["shear_strength"], result["peak_shear_strength"] = strength, peak
+    where = result["shear"].isel(shear=place).drop_vars("shear")
+    result["peak_strength_shear"] = where.where(peak.notnull())
 
 
-def _check_dilatancy(dilatancy: Any, problems: Problems) -> tuple[str, np.ndarray]:
+def check_dilatancy(dilatancy: Any, problems: Problems) -> tuple[str, np.ndarray]:
+    """Return the name of the dilatancy to be used, that under force before the rigid one, and the shears."""
     import xarray as xr
 
     expected = "the Dataset of fractalcontact.joints.dilatancy"
@@ -135,6 +147,19 @@ def _check_dilatancy(dilatancy: Any, problems: Problems) -> tuple[str, np.ndarra
     return name, shears
 
 
-def _plain(value: Any) -> Any:
-    """Return the number inside a scalar DataArray."""
-    return value.item() if hasattr(value, "item") and getattr(value, "size", 0) == 1 else value
+def check_options(name: str, smoothing: Any, nominal_pressure: Any, problems: Problems) -> np.ndarray | None:
+    """Check the smoothing, and return the pressures that are given for rigid faces."""
+    if smoothing is not None:
+        problems.number("smoothing", smoothing, above=0)
+    if nominal_pressure is None:
+        return None
+    expected = "None where the dilatancy is that under forces"
+    problems.require(name != "dilatancy", "nominal_pressure", expected, nominal_pressure)
+    return problems.numbers("nominal_pressure", nominal_pressure, at_least=0)
+
+
+def basic_angle(dilatancy: xr.Dataset, given: Any, problems: Problems) -> float:
+    """Return the basic friction angle that is given, else the one that the dilatancy carries."""
+    value: Any = dilatancy.get("basic_friction_angle") if given is None else given
+    plain = value.item() if hasattr(value, "item") and getattr(value, "size", 0) == 1 else value
+    return problems.number("basic_friction_angle", plain, at_least=0, below=90)

@@ -182,7 +182,7 @@ def test_spline_shift_of_a_smooth_free_face(make_face, direction, shear):
     y, x = y[crack.layout.slices], x[crack.layout.slices]
     exact = surface(y + shear * np.sin(angle), x + shear * np.cos(angle)) - surface(y, x)
     np.testing.assert_allclose(delta, exact, atol=3e-6)
-    assert '"interpolation_error"' in delta.attrs["provenance"]
+    assert 0 < delta.interpolation_error < 1e-4
 
 
 def test_spline_error_falls_with_the_sixth_power(make_face):
@@ -284,3 +284,49 @@ def test_importing_the_room_loads_nothing_heavy():
         "assert not [name for name in heavy if name in sys.modules]\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+def test_stated_interpolation_error_is_that_of_a_finer_face(make_face, hurst):
+    # a face known at half the spacing tells what lies between the points of every second one
+    fine = fc.surfaces.fbm((300, 400), 0.5, hurst=hurst, rms_increment=1.0, rng=5).values
+    crack = fc.joints.Crack(make_face(fine[::2, ::2]), block=(100, 100), **MATERIAL)
+    delta = fc.joints.delta_surface(crack, [2.0, 2.5], ["E", "N"])
+    rows, columns = (slice(2 * s.start, 2 * s.stop, 2) for s in crack.layout.slices)
+    for direction, (dy, dx) in {"E": (0, 5), "N": (5, 0)}.items():
+        moved = fine[rows.start + dy : rows.stop + dy : 2, columns.start + dx : columns.stop + dx : 2]
+        one = delta.sel(direction=direction, shear=2.5)
+        missed = np.sqrt(np.mean((one.values - (moved - fine[rows, columns])) ** 2))
+        assert one.interpolation_error == pytest.approx(missed, rel=0.05)
+    assert (delta.interpolation_error.sel(shear=2.0) == 0).all()
+
+
+def test_stated_interpolation_error_is_not_below_that_of_a_smooth_face(make_face):
+    x = np.arange(200.0)
+    for points in (4, 8, 16):
+        face = make_face(np.cos(2 * np.pi * x / points + np.arange(5)[:, None]))
+        delta = fc.joints.delta_surface(fc.joints.Crack(face, block=(5, 100), **MATERIAL), 0.5)
+        x0 = x[50:150]
+        exact = np.cos(2 * np.pi * (x0 + 0.5) / points + np.arange(5)[:, None])
+        missed = np.sqrt(np.mean((delta.values - exact + face.values[:, 50:150]) ** 2))
+        assert missed <= delta.interpolation_error < 200 * missed
+
+
+def test_several_directions_are_a_dim_everywhere(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((24, 24), 6)), block=10, **MATERIAL)
+    several = fc.joints.delta_surface(crack, 2.0, ["E", 90, "SW"])
+    assert several.dims == ("direction", "y", "x")
+    assert list(several.direction.values) == ["E", "N", "SW"]
+    np.testing.assert_array_equal(several.sel(direction="N"), fc.joints.delta_surface(crack, 2.0, "N"))
+    several = fc.joints.delta_surface(crack, [0.0, 2.0], ["E"])
+    assert several.dims == ("direction", "shear", "y", "x")
+
+
+@pytest.mark.parametrize("function", ["delta_surface", "closure", "dilatancy", "decorrelation_length"])
+def test_what_comes_twice_is_named(make_face, rough, function):
+    crack = fc.joints.Crack(make_face(rough((24, 24), 6)), block=10, **MATERIAL)
+    options = {"normal_force": 1.0} if function == "closure" else {}
+    with pytest.raises(ValueError, match=r"shear: expected every shear once, got 2 m several times"):
+        getattr(fc.joints, function)(crack, shear=[0.0, 2.0, 3.0, 2.0], **options)
+    with pytest.raises(ValueError, match=r"direction: expected every direction once, got E several times"):
+        getattr(fc.joints, function)(crack, shear=[0.0, 2.0], direction=["E", "N", 360], **options)

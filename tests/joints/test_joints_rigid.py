@@ -180,7 +180,7 @@ def test_strength_needs_a_pressure_and_locks_at_ninety_degrees():
     np.testing.assert_allclose(result.shear_strength.isel(step=0), expected)
     assert np.isnan(result.shear_strength.isel(step=1)).all()
     np.testing.assert_allclose(result.friction_angle.isel(step=1), 35 + np.degrees(np.arctan(3.0)))
-    assert "locked" in result.shear_strength.attrs["comment"]
+    assert "locked" in result.shear_strength.attrs["reason"]
     assert result.peak_shear_strength.dims == ("direction", "step")
     assert result.shear_strength.attrs["units"] == "Pa"
 
