@@ -1,0 +1,533 @@
+"""The contact solver beside every rival that is installed, in one run.
+
+    python tests/contact/bench_solvers.py                       # a minute or two
+    python tests/contact/bench_solvers.py --sizes 256,512,1024,2048,4096 --seeds 1,2,3 --threads 1,2
+    python tests/contact/bench_solvers.py --only cold --boundaries free --sizes 512 --without tamaas
+
+Rivals are Tamaas, ContactMechanics (with its own solver and with NuMPI's) and ASPHER (preconditioned,
+and nested in two precisions); none is needed. Surfaces are periodic self-affine, H = .8, waves 4 to n/4, rms
+slope .1; pressures are .001, .01 and .03 of the modulus, or a path of 20 from .0005 to .05.
+
+Every solver is run down a ladder of its own tolerance, and what counts is the error that is computed here,
+from its pressure alone and in the same way for all:
+
+    complementarity = sum of p (g - min g) / (sum of p * standard deviation of the heights),
+
+g being the settlement of p less the heights. The time of a solver is that of the first tolerance whose error
+is at most `--target`, and along a path the greatest error counts. Then all solvers run in turn, `--repeats`
+times, and the ratio to this solver is formed within each turn. The clock covers the solve: for the rivals
+without their set-up (but ASPHER's nested mode sets up inside), for this solver all of `press`, labels too.
+
+Each number of threads is a process of its own, held to as many processors; memory is the peak of a process
+that does nothing else, less what it had before. Transforms are pairs on the finest grid, as far as a solver
+tells. Writes `solvers.csv` (every run), `solvers.png` and the table `solvers.txt` into `--out`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import multiprocessing
+import os
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+LOADS = (0.001, 0.01, 0.03)
+PATH = tuple(np.geomspace(0.0005, 0.05, 20).tolist())
+LADDER = tuple(3 * 10.0**-k if half else 10.0**-k for k in range(3, 10) for half in (False, True))
+OURS = "fractalcontact"
+# pressures and pairs of transforms (nan where the solver does not tell), step after step
+Answer = Iterator[tuple[np.ndarray, float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One surface on a unit square, to be pressed with modulus 1."""
+
+    n: int
+    boundary: str
+    start: str
+    loads: tuple[float, ...]
+    seed: int
+
+    @property
+    def heights(self) -> np.ndarray:
+        """Heights (n, n) of zero mean."""
+        rng = np.random.default_rng(self.seed)
+        k = np.hypot(np.fft.fftfreq(self.n, 1 / self.n)[:, None], np.arange(self.n // 2 + 1)[None, :])
+        band = (k >= 4) & (k <= self.n / 4)
+        modes = np.where(band, np.where(band, k, 1.0) ** -1.8, 0.0) * np.exp(2j * np.pi * rng.random(k.shape))
+        heights = np.fft.irfft2(modes, s=(self.n, self.n))
+        slope = 2j * np.pi * np.fft.rfft2(heights)
+        ky, kx = np.fft.fftfreq(self.n, 1 / self.n)[:, None], np.arange(self.n // 2 + 1)[None, :]
+        squares = [np.mean(np.fft.irfft2(slope * q, s=(self.n, self.n)) ** 2) for q in (kx, ky)]
+        return heights * (0.1 / np.sqrt(sum(squares)))
+
+
+def fractalcontact(case: Case, heights: np.ndarray) -> Callable[[float], Answer]:
+    """This solver: the whole call, labels and all."""
+    import fractalcontact as fc
+
+    surface = fc.surfaces.from_array(heights, 1 / case.n, periodic=case.boundary == "periodic")
+    influence = "spectral" if case.boundary == "periodic" else "square"
+
+    def solve(tolerance: float) -> Answer:
+        found = fc.contact.press(
+            surface,
+            contact_modulus=1.0,
+            nominal_pressure=case.loads,
+            influence=influence,
+            tolerance=tolerance,
+            keep=("pressure",),
+        )
+        yield from zip(found["pressure"].values, found["transforms"].values, strict=True)
+
+    return solve
+
+
+def aspher(mode: str, precision: str) -> Callable[[Case, np.ndarray], Callable[[float], Answer]]:
+    """ASPHER: nested, which sets up inside, or preconditioned, started from the step before along a path."""
+
+    def prepare(case: Case, heights: np.ndarray) -> Callable[[float], Answer]:
+        import aspher as peer
+
+        gap = np.ascontiguousarray(heights.max() - heights).ravel()
+        backend = "periodic" if case.boundary == "periodic" else "fft"
+        coarsest = case.n
+        while coarsest > 64 and coarsest % 2 == 0:
+            coarsest //= 2
+        common = {"domain_size": 1.0, "E_star": 1.0, "backend": backend}
+        solver = peer.ContactSolver(grid_size=case.n, **common) if mode == "precond" else None
+
+        def solve(tolerance: float) -> Answer:
+            before = None
+            for load in case.loads:
+                limits = {"tol": tolerance, "max_iter": 10000}
+                if solver is None:
+                    given = {"grid_size": case.n, "gap": gap, "p_nominal": load, "coarsest": coarsest}
+                    found = peer.solve_nested(**given, **common, **limits, precision=precision)
+                else:
+                    found = solver.solve(gap, load, **limits, precond="fourier-fft", p_init=before)
+                    before = np.array(found.pressure) if case.start == "path" else None
+                yield (
+                    np.array(found.pressure).reshape(heights.shape),
+                    found.matvec_count + found.precond_count,
+                )
+
+        return solve
+
+    return prepare
+
+
+def tamaas(case: Case, heights: np.ndarray) -> Callable[[float], Answer]:
+    """Tamaas: two pairs in an iteration; along a path it starts from the step before by itself."""
+    import tamaas as peer
+
+    peer.initialize(1)
+    peer.set_log_level(peer.LogLevel.error)
+
+    def solve(tolerance: float) -> Answer:
+        model = peer.Model(peer.model_type.basic_2d, [1.0, 1.0], list(heights.shape))
+        model.E, model.nu = 1.0, 0.0
+        solver = peer.PolonskyKeerRey(model, heights, tolerance)
+        if case.boundary == "free":  # after the elastic constants, which are read here
+            peer.ModelFactory.registerNonPeriodic(model, "free")
+            solver.setIntegralOperator("free")
+        solver.max_iter, solver.dump_freq = 20000, 10**9
+        for load in case.loads:
+            solver.solve(load)
+            yield np.array(model.traction), np.nan
+
+    return solve
+
+
+def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[float], Answer]]:
+    """ContactMechanics: Polonsky and Keer, or NuMPI's conjugate gradients without restart."""
+
+    def prepare(case: Case, heights: np.ndarray) -> Callable[[float], Answer]:
+        from ContactMechanics.FFTElasticHalfSpace import FreeFFTElasticHalfSpace, PeriodicFFTElasticHalfSpace
+        from ContactMechanics.Optimization.ConstrainedConjugateGradients import (
+            constrained_conjugate_gradients,
+        )
+        from NuMPI.Optimization import CCGWithoutRestart
+        from SurfaceTopography import Topography
+
+        periodic, shape = case.boundary == "periodic", heights.shape
+        half_space = (PeriodicFFTElasticHalfSpace if periodic else FreeFFTElasticHalfSpace)(
+            shape, 1.0, (1.0, 1.0)
+        )
+        topography = Topography(heights, (1.0, 1.0), periodic=periodic)
+        size, std = heights.size, float(heights.std())
+
+        def settle(force: np.ndarray) -> np.ndarray:
+            padded = np.zeros(half_space.nb_subdomain_grid_pts)
+            padded[: shape[0], : shape[1]] = -force.reshape(shape)
+            return half_space.evaluate_disp(padded)[: shape[0], : shape[1]]
+
+        def restarted(load: float, tolerance: float, before: np.ndarray | None) -> tuple[np.ndarray, float]:
+            start = {}
+            if before is not None:
+                padded = np.zeros(half_space.nb_subdomain_grid_pts)
+                padded[: shape[0], : shape[1]] = -before * (load / before.sum())
+                start["initial_forces"] = padded
+            found = constrained_conjugate_gradients(
+                half_space,
+                topography,
+                external_force=load,
+                maxiter=20000,
+                pentol=tolerance * std,
+                forcetol=tolerance * load / size,
+                thermotol=tolerance,
+                **start,
+            )
+            return np.array(found.jac).reshape(shape), float(found.nfev)
+
+        def kept(load: float, tolerance: float, before: np.ndarray | None) -> tuple[np.ndarray, float]:
+            start = np.full(size, load / size) if before is None else before.ravel() * (load / before.sum())
+            found = CCGWithoutRestart.constrained_conjugate_gradients(
+                lambda force: (0.0, (settle(force) - heights).ravel()),
+                lambda force: settle(force).ravel(),
+                x0=start,
+                mean_val=load / size,
+                gtol=tolerance * std,
+                maxiter=20000,
+            )
+            return np.array(found.x).reshape(shape), 2.0 * found.nit + 1
+
+        def solve(tolerance: float) -> Answer:
+            before = None
+            for load in case.loads:
+                force, pairs = (restarted if method == "pk" else kept)(load, tolerance, before)
+                before = force if case.start == "path" else None
+                yield force * size, pairs
+
+        return solve
+
+    return prepare
+
+
+SOLVERS: dict[str, tuple[str, Callable[[Case, np.ndarray], Callable[[float], Answer]]]] = {
+    OURS: ("fractalcontact", fractalcontact),
+    "aspher precond": ("aspher", aspher("precond", "double")),
+    "aspher nested": ("aspher", aspher("nested", "double")),
+    "aspher nested float": ("aspher", aspher("nested", "float_then_double")),
+    "tamaas": ("tamaas", tamaas),
+    "contactmechanics pk": ("ContactMechanics", contactmechanics("pk")),
+    "contactmechanics ccg": ("ContactMechanics", contactmechanics("ccg")),
+}
+
+
+class Judge:
+    """Complementarity of a pressure: one settlement in plain numpy, the same for all."""
+
+    def __init__(self, case: Case, heights: np.ndarray) -> None:
+        self.heights, self.std, n = heights, float(heights.std()), case.n
+        self.wide = n if case.boundary == "periodic" else 2 * n
+        if case.boundary == "periodic":
+            q = 2 * np.pi * np.hypot(np.fft.fftfreq(n, 1 / n)[:, None], np.arange(n // 2 + 1)[None, :])
+            self.symbol = np.divide(2.0, q, out=np.zeros_like(q), where=q > 0)
+        else:  # Love (1929)
+            at = np.fft.fftfreq(2 * n, 1 / (2 * n)) / n
+            edge = 0.5 / n
+
+            def corner(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+                return y * np.arcsinh(x / np.abs(y)) + x * np.arcsinh(y / np.abs(x))
+
+            y, x = at[:, None], at[None, :]
+            table = corner(y + edge, x + edge) + corner(y - edge, x - edge)
+            table -= corner(y + edge, x - edge) + corner(y - edge, x + edge)
+            self.symbol = np.fft.rfft2(table / np.pi)
+
+    def __call__(self, pressure: np.ndarray) -> float:
+        """Return the complementarity over the standard deviation of the heights."""
+        n, wide = self.heights.shape[0], (self.wide, self.wide)
+        gap = np.fft.irfft2(np.fft.rfft2(pressure, s=wide) * self.symbol, s=wide)[:n, :n] - self.heights
+        return float(np.sum(pressure * (gap - gap.min())) / (np.sum(pressure) * self.std))
+
+
+def timed(solve: Callable[[float], Answer], tolerance: float) -> tuple[float, list[np.ndarray], float]:
+    """Seconds, pressures, and pairs of transforms."""
+    begun = time.perf_counter()
+    answer = list(solve(tolerance))
+    seconds = time.perf_counter() - begun
+    return seconds, [pressure for pressure, _ in answer], float(sum(pairs for _, pairs in answer))
+
+
+def compare(case: Case, names: list[str], options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Run all solvers on one case: down the ladder, then in turn at the tolerance that meets the target."""
+    heights = case.heights
+    judge, rows = Judge(case, heights), []
+    solves = {name: SOLVERS[name][1](case, heights) for name in names}
+    met: dict[str, float] = {}
+    for name, solve in solves.items():
+        for tolerance in LADDER:
+            if case.start == "path" and tolerance > 3 * options.target:  # no curve, only the target
+                continue
+            seconds, pressures, pairs = timed(solve, tolerance)
+            error = max(judge(pressure) for pressure in pressures)
+            rows.append(row(case, name, options.threads, "ladder", tolerance, error, seconds, pairs))
+            if error <= options.target:
+                met.setdefault(name, tolerance)
+            if error <= options.target * options.beyond or seconds > options.patience:
+                break
+    for _ in range(options.repeats):
+        for name, tolerance in met.items():
+            seconds, pressures, pairs = timed(solves[name], tolerance)
+            error = max(judge(pressure) for pressure in pressures)
+            rows.append(row(case, name, options.threads, "turn", tolerance, error, seconds, pairs))
+    return rows
+
+
+def row(
+    case: Case, name: str, threads: int, kind: str, tolerance: float, error: float, *cost: float
+) -> dict[str, Any]:
+    """One run as a line of the table."""
+    facts = asdict(case) | {"loads": " ".join(f"{load:g}" for load in case.loads), "steps": len(case.loads)}
+    run = {"solver": name, "threads": threads, "kind": kind, "tolerance": tolerance, "error": error}
+    return facts | run | {"seconds": cost[0], "pairs": cost[1], "load_average": os.getloadavg()[0]}
+
+
+def worker(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dict[str, Any]]:
+    """Compare in a process of its own, with as many processors as threads."""
+    options, case, names = arguments
+    warm = Case(128, case.boundary, "cold", (0.01,), 0)
+    for name in names:  # compiled, and its libraries loaded
+        list(SOLVERS[name][1](warm, warm.heights)(1e-6))
+    return compare(case, names, options)
+
+
+def footprint(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dict[str, Any]]:
+    """Peak memory of one solve beyond what was there before, in arrays of n x n doubles."""
+    options, case, (name,) = arguments
+    warm = Case(128, case.boundary, "cold", (0.01,), 0)
+    list(SOLVERS[name][1](warm, warm.heights)(1e-6))
+    heights = case.heights.copy()
+    Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
+    before = status("VmRSS")
+    for _ in SOLVERS[name][1](case, heights)(1e-6):
+        pass
+    arrays = (max(status("VmHWM"), 0) - before) / heights.nbytes
+    return [row(case, name, options.threads, "memory", 1e-6, np.nan, np.nan, np.nan) | {"arrays": arrays}]
+
+
+def status(field: str) -> int:
+    """Memory of this process in bytes."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(field + ":"):
+            return int(line.split()[1]) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def apart(task: Callable[[Any], list[dict[str, Any]]], options: argparse.Namespace, *more: Any) -> Any:
+    """Run a task in a fresh process that has `options.threads` threads and processors."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "FRACTALCONTACT_THREADS"):
+        os.environ[name] = str(options.threads)
+    every = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(every)[-options.threads :])
+    try:
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            return pool.map(task, [(options, *more)])[0]
+    finally:
+        os.sched_setaffinity(0, every)
+
+
+def cases(options: argparse.Namespace) -> Iterator[Case]:
+    """Every case asked for."""
+    for n in options.sizes:
+        for boundary in options.boundaries:
+            for seed in options.seeds:
+                if "cold" in options.only:
+                    yield from (Case(n, boundary, "cold", (load,), seed) for load in options.loads)
+                if "path" in options.only and n <= options.path_up_to:
+                    yield Case(n, boundary, "path", PATH, seed)
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Medians over turns and seeds, and the ratios to this solver within each turn."""
+    lines = [
+        f"{'threads n boundary start load':36} {'solver':22} {'seconds':>9} {'pairs a step':>12} "
+        f"{'error':>8} {'ours/theirs':>11} {'arrays':>6}"
+    ]
+    groups: dict[tuple[Any, ...], dict[str, list[dict[str, Any]]]] = {}
+    for one in rows:
+        load = one["loads"] if one["start"] == "cold" else "path"
+        key = (one["threads"], one["n"], one["boundary"], one["start"], load)
+        if one["kind"] == "turn":
+            groups.setdefault(key, {}).setdefault(one["solver"], []).append(one)
+    memory = {
+        (one["n"], one["boundary"], one["solver"]): one["arrays"] for one in rows if one["kind"] == "memory"
+    }
+    for key, solvers in groups.items():
+        for name, runs in solvers.items():
+            ratios = [
+                ours["seconds"] / theirs["seconds"]
+                for ours, theirs in zip(solvers.get(OURS, []), runs, strict=False)
+                if ours["seed"] == theirs["seed"]
+            ]
+            middle = {
+                item: statistics.median(run[item] for run in runs) for item in ("seconds", "pairs", "error")
+            }
+            held, ratio = memory.get((key[1], key[2], name), np.nan), statistics.median(ratios or [np.nan])
+            lines.append(
+                f"{' '.join(map(str, key)):36} {name:22} {middle['seconds']:9.3f} "
+                f"{middle['pairs'] / runs[0]['steps']:12.1f} {middle['error']:8.1e} "
+                f"{ratio:11.3f} {held:6.1f}"
+            )
+    return "\n".join([*lines, *totals(groups), *growth(rows)])
+
+
+def totals(groups: dict[tuple[Any, ...], dict[str, list[dict[str, Any]]]]) -> Iterator[str]:
+    """Total over the loads of a cold case, against the fastest of each package."""
+    sums: dict[tuple[Any, ...], dict[str, dict[str, float]]] = {}
+    for (threads, n, boundary, start, load), solvers in groups.items():
+        if start == "cold":
+            for name, runs in solvers.items():
+                middle = statistics.median(run["seconds"] for run in runs)
+                sums.setdefault((threads, n, boundary), {}).setdefault(name, {})[load] = middle
+    for key, solvers in sums.items():
+        ours = solvers.get(OURS, {})
+        for package in ("aspher", "tamaas", "contactmechanics"):
+            whole = {
+                k: v for k, v in solvers.items() if k.startswith(package) and ours and v.keys() == ours.keys()
+            }
+            if whole:
+                best = min(whole, key=lambda name: sum(whole[name].values()))
+                ratio = sum(ours.values()) / sum(whole[best].values())
+                yield f"threads {key[0]} n {key[1]} {key[2]}: all loads, ours / {best} = {ratio:.3f}"
+
+
+def growth(rows: list[dict[str, Any]]) -> Iterator[str]:
+    """Exponent with which the pairs of transforms grow with n, least squares over the sizes."""
+    for name in dict.fromkeys(one["solver"] for one in rows):
+        for boundary in ("periodic", "free"):
+            runs = [
+                (one["n"], one["pairs"], one["loads"])
+                for one in rows
+                if (one["kind"], one["start"], one["solver"], one["boundary"])
+                == ("turn", "cold", name, boundary)
+            ]
+            if len({n for n, _, _ in runs}) > 1 and all(np.isfinite(pairs) for _, pairs, _ in runs):
+                for load in dict.fromkeys(load for _, _, load in runs):
+                    n, pairs = zip(*((n, pairs) for n, pairs, at in runs if at == load), strict=True)
+                    power = np.polyfit(np.log(n), np.log(pairs), 1)[0]
+                    yield f"{name} {boundary} {load}: pairs grow as n^{power:.2f} from {min(n)} to {max(n)}"
+
+
+def draw(rows: list[dict[str, Any]], target: float, path: Path) -> None:
+    """Time against true error on the largest common grid, time and pairs against n."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    threads = min(one["threads"] for one in rows)
+    kept = [one for one in rows if one["threads"] == threads and one["kind"] != "memory"]
+    subjects = list(dict.fromkeys((one["boundary"], one["start"]) for one in kept))
+    figure, axes = plt.subplots(len(subjects), 3, figsize=(15, 4.2 * len(subjects)), squeeze=False)
+    for line, (boundary, start) in zip(axes, subjects, strict=True):
+        here = [one for one in kept if (one["boundary"], one["start"]) == (boundary, start)]
+        loads = sorted({one["loads"] for one in here}, key=lambda text: float(text.split()[0]))
+        load = loads[len(loads) // 2]
+        here = [one for one in here if one["loads"] == load]
+        n = max(one["n"] for one in here)
+        for colour, name in enumerate(SOLVERS):
+            runs = [one for one in here if one["solver"] == name]
+            look = {"color": f"C{colour}", "label": name, "marker": "o", "ms": 4, "lw": 1 + (name == OURS)}
+            curve = sorted(
+                (one["tolerance"], one["error"], one["seconds"])
+                for one in runs
+                if one["n"] == n and one["kind"] == "ladder" and one["seed"] == min(o["seed"] for o in runs)
+            )
+            if curve:
+                line[0].loglog([e for _, e, _ in curve], [s for _, _, s in curve], **look)
+            for place, item in ((line[1], "seconds"), (line[2], "pairs")):
+                turns = [one for one in runs if one["kind"] == "turn" and np.isfinite(one[item])]
+                sizes = sorted({one["n"] for one in turns})
+                middle = [
+                    statistics.median(t[item] / t["steps"] for t in turns if t["n"] == m) for m in sizes
+                ]
+                if sizes:
+                    place.loglog(sizes, middle, **look)
+        line[0].axvline(target, color="0.7", lw=1)
+        line[0].invert_xaxis()
+        told = f"{boundary}, {start}" + (f", p = {load} E*" if start == "cold" else ", 20 steps")
+        line[0].set(xlabel="complementarity / std of heights", ylabel="seconds", title=f"{told}, n = {n}")
+        line[1].set(xlabel="n", ylabel="seconds a step", title=f"to {target:g}")
+        line[2].set(xlabel="n", ylabel="pairs of transforms a step", title=f"to {target:g}")
+        for place in line[1:]:
+            place.set_xticks(sizes := sorted({one["n"] for one in here}), [str(m) for m in sizes])
+            place.minorticks_off()
+    figure.suptitle(f"{threads} thread{'s' if threads > 1 else ''}")
+    figure.tight_layout(rect=(0, 0.3 / figure.get_figheight(), 1, 1))
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="lower center", ncols=len(SOLVERS), fontsize=8)
+    figure.savefig(path, dpi=110)
+
+
+def write(rows: list[dict[str, Any]], path: Path) -> None:
+    """Write every run as a line of a CSV file."""
+    with path.open("w", newline="") as file:
+        names = list(dict.fromkeys(name for one in rows for name in one))
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def parsed(arguments: list[str] | None) -> argparse.Namespace:
+    """Read the command line."""
+    numbers = {"type": lambda text: tuple(int(one) for one in text.split(","))}
+    words = {"type": lambda text: tuple(text.split(","))}
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--sizes", default=(256, 512), **numbers)
+    parser.add_argument("--seeds", default=(1,), **numbers)
+    parser.add_argument("--threads", default=(1,), **numbers)
+    parser.add_argument("--loads", default=LOADS, type=lambda text: tuple(float(p) for p in text.split(",")))
+    parser.add_argument("--boundaries", default=("periodic", "free"), **words)
+    parser.add_argument("--only", default=("cold", "path", "memory"), **words, help="of cold, path, memory")
+    parser.add_argument("--without", default=(), **words, help="solvers left out, by the start of their name")
+    parser.add_argument("--path-up-to", type=int, default=512, help="largest n for paths")
+    parser.add_argument("--target", type=float, default=1e-6, help="complementarity to reach")
+    parser.add_argument("--beyond", type=float, default=0.1, help="share of the target where a ladder ends")
+    parser.add_argument("--patience", type=float, default=60.0, help="seconds after which a ladder ends")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--out", type=Path, default=Path("bench-solvers"))
+    return parser.parse_args(arguments)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Compare, print the table, write the files."""
+    options = parsed(arguments)
+    names = [name for name, (module, _) in SOLVERS.items() if find_spec(module)]
+    names = [name for name in names if not any(name.startswith(word) for word in options.without if word)]
+    rows: list[dict[str, Any]] = []
+    for threads in options.threads:
+        alone = argparse.Namespace(**(vars(options) | {"threads": threads}))
+        for case in cases(options):
+            rows += apart(worker, alone, case, names)
+            told = f"{case.boundary} {case.start} {case.loads[0]:g} .. {case.loads[-1]:g}, seed {case.seed}"
+            print(f"done: {threads} threads, n {case.n} {told}", file=sys.stderr, flush=True)
+    if "memory" in options.only:
+        alone = argparse.Namespace(**(vars(options) | {"threads": min(options.threads)}))
+        for n in options.sizes:
+            for boundary in options.boundaries:
+                case = Case(n, boundary, "cold", (0.01,), options.seeds[0])
+                for name in names:
+                    rows += apart(footprint, alone, case, [name])
+    options.out.mkdir(parents=True, exist_ok=True)
+    write(rows, options.out / "solvers.csv")
+    draw(rows, options.target, options.out / "solvers.png")
+    text = table(rows)
+    (options.out / "solvers.txt").write_text(text + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
