@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.spectra import half_weights, radial_wavenumber
+from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_POINTS, _IMAGES, _STEP = 128, 5, 1e-4
+_POINTS, _STEP = 128, 1e-4
 
 
 def fractional_brownian(hurst: float, n: int) -> float:
@@ -48,14 +48,4 @@ def band_limited(shape: tuple[int, int], low: float, high: float) -> float:
 def _aliased(hurst: float) -> Array:
     """Return the spectral density of the sampled surface on a quarter of its wavevectors."""
     w = (np.arange(_POINTS) + 0.5) / _POINTS * np.pi
-    images = 2.0 * np.pi * np.arange(-_IMAGES, _IMAGES + 1)
-    squares = (w[:, None] + images) ** 2
-    total = np.zeros((_POINTS, _POINTS))
-    for one in squares.T:
-        for other in squares.T:
-            total += (one[:, None] + other) ** (-1.0 - hurst)
-    # the images outside that square, as an integral
-    edge = (2 * _IMAGES + 1) * np.pi
-    angle = (np.arange(1000) + 0.5) / 1000 * np.pi / 4
-    outside = 2.0 * np.pi * np.mean((edge / np.cos(angle)) ** (-2.0 * hurst)) / (2.0 * hurst)
-    return np.asarray(total + outside / (2.0 * np.pi) ** 2)
+    return aliased_power_law((w[:, None], w), hurst)

@@ -209,6 +209,7 @@ QUANTITIES: dict[str, Quantity] = {
     "transmissivity": Quantity("m3", "transmissivity: hydraulic aperture cubed over 12"),
     "percolates": Quantity("1", "an open path crosses the joint along the axis"),
     "open_fraction": Quantity("1", "open over nominal area"),
+    "overlap_fraction": Quantity("1", "area where the faces overlap over nominal area"),
     "flow_conductance": Quantity("m3 Pa-1 s-1", "flow per width and pressure gradient"),
     # domains
     "box_size": Quantity("1", "edge of the box in cells"),

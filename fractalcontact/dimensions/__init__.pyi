@@ -7,10 +7,12 @@ from .curves import spectrum as spectrum
 from .curves import variogram as variogram
 from .estimating import estimate as estimate
 from .estimating import methods as methods
+from .orienting import directions as directions
 
 __all__ = [
     "covering",
     "cube_counts",
+    "directions",
     "estimate",
     "madogram",
     "methods",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +92,11 @@ class Face:
         return tuple(step / self.grid.spacing[-1] for step in self.grid.spacing)
 
     @property
+    def plane_steps(self) -> tuple[float, float]:
+        """(dy/dx, 1)."""
+        return self.spacing[0] / self.spacing[1], 1.0
+
+    @property
     def complete(self) -> bool:
         """No height is missing."""
         return bool(np.isfinite(self.raw.min()))
@@ -167,6 +172,22 @@ def read_faces(
     outer = [dim for dim in surface.dims if dim not in core]
     places = np.ndindex(*(surface.sizes[dim] for dim in outer))
     return [Face(surface.isel(dict(zip(outer, place, strict=True))), grid) for place in places]
+
+
+def read_scales(problems: Problems, scales: Any, faces: Sequence[Face]) -> tuple[float, float] | None:
+    """Check a window of lengths (low, high) in m, which must meet the lengths that the faces have."""
+    if scales is None:
+        return None
+    values = problems.numbers("scales", scales, above=0)
+    if values.size != 2 or not values[0] < values[-1]:
+        problems.add("scales", "two ascending lengths in metres, (low, high)", scales)
+        return None
+    if faces:
+        least, most = min(faces[0].grid.spacing), max(faces[0].grid.extent)
+        inside = values[0] < most and values[1] > least
+        expected = f"a window that meets the lengths of the face, {least:g} m to {most:g} m"
+        problems.require(inside, "scales", expected, scales)
+    return float(values[0]), float(values[1])
 
 
 def _check_heights(heights: Array, grid: Grid, problems: Problems, gaps: bool) -> None:

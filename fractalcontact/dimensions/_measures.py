@@ -39,7 +39,7 @@ def spectrum(face: Face, window: str, tile: int | None = None) -> Curve:
     powers: Array = np.zeros(1)
     number = 0
     for part in _tiles(face, tile):
-        heights = _without_trend(part, plane=not all(wraps))
+        heights = without_trend(part, plane=not all(wraps))
         power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
         powers = powers + power
         number += 1
@@ -68,7 +68,7 @@ def _tiles(face: Face, tile: int | None) -> Iterator[Array]:
             yield strip[:, i : i + tile]
 
 
-def _without_trend(heights: Array, *, plane: bool) -> Array:
+def without_trend(heights: Array, *, plane: bool) -> Array:
     """Return complete heights without their mean, or without the plane of least squares."""
     heights = heights - heights.mean()
     if not plane:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,13 +39,18 @@ def stack(
     for name, attribute in {**values, **counts}.items():
         stacked = np.stack([getattr(curve, attribute) for curve in curves])
         data[name] = ((*outer, dim), stacked.reshape(*sizes, -1))
-    coords: dict[Any, Any] = {
-        name: c.variable for name, c in surface.coords.items() if set(c.dims) <= set(outer)
-    }
-    coords = {name: c for name, c in coords.items() if name in schema.QUANTITIES}
     if np.isfinite(curves[0].factor):
         data["vertical_scale"] = (outer, np.reshape([curve.factor for curve in curves], sizes))
-    return xr.Dataset(data, coords={**coords, dim: curves[0].scale})
+    return xr.Dataset(data, coords={**outer_coords(surface, outer), dim: curves[0].scale})
+
+
+def outer_coords(surface: xr.DataArray, outer: Sequence[Hashable]) -> dict[Any, Any]:
+    """Return the coordinates along the leading dims whose names the house knows."""
+    return {
+        name: c.variable
+        for name, c in surface.coords.items()
+        if name in schema.QUANTITIES and set(c.dims) <= set(outer)
+    }
 
 
 def finish(

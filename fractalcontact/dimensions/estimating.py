@@ -13,7 +13,8 @@ import numpy as np
 from fractalcontact.base import schema
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
-from fractalcontact.dimensions._faces import Face, read_faces
+from fractalcontact.dimensions._faces import Face, read_faces, read_scales
+from fractalcontact.dimensions._tables import outer_coords
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +104,6 @@ def estimate(
         )
         problems.require(bool(names or problems.found), "methods", "at least one name", methods)
         real = [DEFAULT if name == "default" else name for name in names]
-        window = _scales(problems, scales)
         problems.require(isinstance(noise, (bool, np.bool_)), "noise", "True or False", noise)
         faces = read_faces(
             surface,
@@ -111,6 +111,7 @@ def estimate(
             smallest=max((METHODS[name].smallest for name in real), default=4),
             gaps=all(METHODS[name].gaps for name in real),
         )
+        window = read_scales(problems, scales, faces)
         _enough_points(problems, faces)
     found, times = _run(faces, [METHODS[name].estimate for name in real], window, bool(noise))
     result = _dataset(surface, faces, names, found, times)
@@ -135,16 +136,6 @@ def methods() -> dict[str, str]:
     from fractalcontact.dimensions._methods import METHODS
 
     return {name: method.line for name, method in METHODS.items()}
-
-
-def _scales(problems: Problems, scales: Any) -> tuple[float, float] | None:
-    if scales is None:
-        return None
-    values = problems.numbers("scales", scales, above=0)
-    if values.size != 2 or not values[0] < values[-1]:
-        problems.add("scales", "two ascending lengths in metres, (low, high)", scales)
-        return None
-    return float(values[0]), float(values[1])
 
 
 def _enough_points(problems: Problems, faces: Sequence[Face]) -> None:
@@ -198,12 +189,7 @@ def _dataset(
     data["fractal_dimension"] = dims, 1.0 + faces[0].axes - hurst
     data["topothesy"] = stacked([[one.topothesy(spacing) for one in line] for line in found])
     data["run_time"] = stacked(times)
-    coords: dict[Any, Any] = {
-        name: c.variable
-        for name, c in surface.coords.items()
-        if name in schema.QUANTITIES and set(c.dims) <= set(outer)
-    }
-    coords |= {"method": np.array(names, dtype=str), "increment_lag": spacing}
+    coords = outer_coords(surface, outer) | {"method": np.array(names, dtype=str), "increment_lag": spacing}
     first = ["hurst", "fractal_dimension"]
     return xr.Dataset(
         {name: data[name] for name in [*first, *(k for k in data if k not in first)]}, coords=coords

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base import threads
 
 VARIABLES = {
@@ -213,7 +214,9 @@ def test_scales_limit_the_fit(rough):
     free = estimate(rough, ["likelihood"])
     assert float(found.standard_error[0]) > 1.5 * float(free.standard_error[0])
     assert float(found.ci_low[0]) < 0.7 < float(found.ci_high[0])
-    empty = estimate(rough, NAMES, scales=(1.0, 2.0))
+    with pytest.raises(InvalidInput, match="scales: expected a window that meets the lengths of the face"):
+        estimate(rough, NAMES, scales=(1.0, 2.0))
+    empty = estimate(rough, NAMES, scales=(1.05e-4, 1.3e-4))
     assert np.isnan(empty.hurst).all()
     assert set(json.loads(empty.hurst.attrs["note"])) == set(NAMES)
 

@@ -1,0 +1,301 @@
+"""Second differences along many directions of a free face: exponent, level, and tests of isotropy.
+
+For fractional Brownian heights the mean square second difference at the lag vector h is proportional to
+(h' M h)^H, M being the identity for an isotropic surface and a symmetric matrix of determinant one for a
+stretched one. The covariance of these means follows from the spectral density as sampled, aliases included.
+What is left of their logarithms after a smooth curve over the length is set against harmonics of the
+direction, in level and in slope: none may be there if the surface is isotropic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.spectra import aliased_power_law
+from fractalcontact.dimensions import _lags
+from fractalcontact.dimensions._estimates import NORMAL
+from fractalcontact.dimensions._faces import Face
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+FROM_ROUND = 2.447746830680816  # root of 95 % of chi square with two degrees of freedom
+MULTIPLES = (1, 2, 4)
+DIRECTIONS = 8
+LEAST_LAGS = 13  # a curve of three numbers, eight harmonics, and two to spare
+_REACH = 8  # components of a direction that was asked for
+_NEAR = 2.5  # degrees within which the shorter of two lattice directions is better
+_LOWEST, _HIGHEST = 0.02, 0.98  # exponents whose covariances are taken
+_ROUNDS, _STEEPEST = 12, 6.0  # of the fit of a stretch; its largest logarithm
+_OPEN = 50.0  # logarithm of a stretch beyond which nothing is known
+_GRID = 64
+
+
+@dataclass(frozen=True)
+class Ray:
+    """A direction of the lattice: steps in y (not negative) and x without common divisor."""
+
+    dy: int
+    dx: int
+    azimuth: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Means:
+    """Mean square second differences at lag vectors, and how many there were.
+
+    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x.
+    """
+
+    vectors: Array
+    means: Array
+    counts: Array
+    steps: tuple[float, float]
+
+    @classmethod
+    def of(cls, face: Face, rays: Sequence[Ray], scales: tuple[float, float] | None) -> tuple[Means, Array]:
+        """Measure the lags of some directions; return them with the place of the direction of each.
+
+        Lags are 1, 2 and 4 times the step of the lattice, or of the least multiple of it inside `scales` (m).
+        """
+        low, high = (0.0, np.inf) if scales is None else scales
+        found, owners = [], []
+        for place, ray in enumerate(rays):
+            step = ray.length * face.spacing[1]
+            least = max(1, int(np.ceil(low / step * (1 - 1e-9))))
+            for multiple in MULTIPLES:
+                lag = least * multiple
+                if lag * step <= high * (1 + 1e-9):
+                    found.append((lag * ray.dy, lag * ray.dx))
+                    owners.append(place)
+        vectors = np.array(found, dtype=np.int64).reshape(-1, 2)
+        inside = (2 * np.abs(vectors) < np.array(face.shape)).all(axis=1)
+        vectors, owner = vectors[inside], np.array(owners, dtype=np.int64)[inside]
+        slabs = iter([(np.ascontiguousarray(face.heights), face.shape[0])])
+        means, counts = _lags.direct(slabs, (0, face.shape[1]), vectors, _lags.SECOND)
+        kept = counts > 0
+        return cls(vectors[kept], means[kept], counts[kept], face.plane_steps), owner[kept]
+
+    def part(self, kept: Array) -> Means:
+        """Keep some of the lag vectors."""
+        return Means(self.vectors[kept], self.means[kept], self.counts[kept], self.steps)
+
+    @property
+    def places(self) -> Array:
+        """Lag vectors in spacings of x, shape (k, 2)."""
+        return np.asarray(self.vectors * np.array(self.steps))
+
+
+@dataclass(frozen=True)
+class Isotropy:
+    """What tells a face from an isotropic one.
+
+    Attributes
+    ----------
+    p_value : float
+        Of an isotropic surface showing as much of a difference between directions.
+    stretch, low, high : float
+        How many times as long correlations are along `azimuth` (degree) as across it, with its 95 % interval.
+    stretched_p_value : float
+        Of a stretched surface showing as much that no stretch explains.
+    hurst : float
+        One exponent for all directions, of the stretched surface.
+    form : ndarray, shape (2, 2)
+        The matrix M of that surface, y first.
+    """
+
+    p_value: float
+    stretch: float
+    low: float
+    high: float
+    azimuth: float
+    stretched_p_value: float
+    hurst: float
+    form: Array
+
+    @classmethod
+    def of(
+        cls, p_value: float, stretched: float, hurst: float, parts: tuple[float, float], errors: Array
+    ) -> Isotropy:
+        """Turn the two parts of the logarithm of a stretch, with their covariance, into size and azimuth."""
+        size = float(np.hypot(*parts))
+        toward = np.array(parts) / size if size > 0 else np.array([1.0, 0.0])
+        error = float(np.sqrt(toward @ errors @ toward))
+        return cls(
+            p_value,
+            stretch=float(np.exp(size)),
+            low=float(np.exp(max(size - FROM_ROUND * error, 0.0))),
+            high=float(np.exp(min(size + NORMAL * error, _OPEN))),
+            azimuth=float(np.degrees(0.5 * np.arctan2(parts[1], parts[0])) % 180.0),
+            stretched_p_value=stretched,
+            hurst=hurst,
+            form=matrix(*parts),
+        )
+
+
+def rays(azimuths: Array | None, steps: tuple[float, float]) -> list[Ray]:
+    """Return the directions of the lattice nearest to those asked for, or eight over the half-circle."""
+    targets = np.arange(DIRECTIONS) * 180.0 / DIRECTIONS if azimuths is None else np.mod(azimuths, 180.0)
+    near = 90.0 / DIRECTIONS if azimuths is None else _NEAR
+    ratio = max(steps) / min(steps)
+    limits = [int(np.ceil(_REACH * min(max(steps) / step, ratio))) for step in steps]
+    y, x = np.meshgrid(np.arange(limits[0] + 1), np.arange(-limits[1], limits[1] + 1), indexing="ij")
+    kept = (np.gcd(y, x) == 1) & ((y > 0) | (x > 0))
+    y, x = y[kept], x[kept]
+    length = np.hypot(y * steps[0], x * steps[1])
+    azimuth = np.degrees(np.arctan2(y * steps[0], x * steps[1]))
+    found = []
+    for target in targets:
+        away = np.abs((azimuth - target + 90.0) % 180.0 - 90.0)
+        close = away <= max(near, away.min()) * (1 + 1e-9)
+        best = np.flatnonzero(close)[np.lexsort((np.round(away[close], 6), np.round(length[close], 6)))[0]]
+        found.append(Ray(int(y[best]), int(x[best]), float(azimuth[best]), float(length[best])))
+    return found
+
+
+def covariance(vectors: Array, counts: Array, hurst: float, form: Array) -> Array:
+    """Return the covariance of the logarithms of mean square second differences: shape (k, k).
+
+    Parameters
+    ----------
+    vectors : ndarray of int, shape (k, 2)
+    counts : ndarray, shape (k,)
+        How many differences each mean is over.
+    hurst : float
+    form : ndarray, shape (2, 2)
+        Matrix by which wavevectors in rad per cell are measured, y first.
+    """
+    points = max(_GRID, 4 * int(np.abs(vectors).max()))
+    wy = (np.arange(points) + 0.5) / points * 2.0 * np.pi - np.pi
+    wx = (np.arange(points // 2) + 0.5) / (points // 2) * np.pi
+    density = aliased_power_law((wy[:, None], wx), hurst, form, images=3)
+    # |1 - exp(i w h)|^4 is the response of a second difference
+    powers = np.stack([(2.0 - 2.0 * np.cos(wy[:, None] * dy + wx * dx)) ** 2 * density for dy, dx in vectors])
+    powers = powers.reshape(len(vectors), -1)
+    powers /= powers.mean(axis=1)[:, None]
+    return np.asarray(2.0 * (powers @ powers.T) / powers.shape[1] / np.sqrt(np.outer(counts, counts)))
+
+
+def slope(means: Means, hurst: float, form: Array) -> tuple[float, float, float]:
+    """Return exponent, standard error and the mean square second difference over one x spacing.
+
+    The lag vectors lie along one direction.
+    """
+    lengths = np.hypot(*means.places.T)
+    spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+    design = np.stack([np.ones(lengths.size), 2.0 * np.log(lengths)], axis=1)
+    (level, exponent), errors = _least_squares(design, np.log(means.means), spread)
+    return float(exponent), float(np.sqrt(errors[1, 1])), float(np.exp(level))
+
+
+def isotropy(means: Means) -> Isotropy:
+    """Fit a stretched fractional Brownian surface, and test it and the isotropic one."""
+    values = np.log(means.means)
+    round_form = np.eye(2)
+    hurst = 0.5
+    for _ in range(3):
+        spread = covariance(means.vectors, means.counts, hurst, _waves(round_form, means.steps))
+        design, _ = _columns(means.places, round_form)
+        hurst = _inside(_least_squares(design[:, :2], values, spread)[0][1])
+    p_value = _wald(means, values, round_form, spread, freely=True)
+    u = v = 0.0
+    for _ in range(_ROUNDS):
+        form = matrix(u, v)
+        spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+        slopes = log_square_slopes(means.places, u, v)
+        design = np.stack(
+            [np.ones(values.size), log_squares(means.places, form), hurst * slopes[0], hurst * slopes[1]],
+            axis=1,
+        )
+        coefficients, errors = _least_squares(design, values, spread)
+        hurst = _inside(coefficients[1])
+        u, v = u + coefficients[2], v + coefficients[3]
+        size = float(np.hypot(u, v))
+        if size > _STEEPEST:
+            u, v = u * _STEEPEST / size, v * _STEEPEST / size
+        if np.hypot(*coefficients[2:]) < 1e-4 or size > _STEEPEST:
+            break
+    form = matrix(u, v)
+    spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+    stretched = _wald(means, values, form, spread, freely=False)
+    return Isotropy.of(p_value, stretched, hurst, (u, v), errors[2:, 2:])
+
+
+def _wald(means: Means, values: Array, form: Array, spread: Array, *, freely: bool) -> float:
+    """Return how likely harmonics as large are by chance; the level of the second is free in a stretch."""
+    from scipy.stats import chi2
+
+    smooth, waves = _columns(means.places, form)
+    if not freely:
+        smooth, waves = np.concatenate([smooth, waves[:, :2]], axis=1), waves[:, 2:]
+    root = np.linalg.cholesky(spread)
+    smooth, waves, values = (np.linalg.solve(root, part) for part in (smooth, waves, values[:, None]))
+    basis = np.linalg.qr(smooth)[0]
+    waves, values = (part - basis @ (basis.T @ part) for part in (waves, values))
+    left, singular, _ = np.linalg.svd(waves, full_matrices=False)
+    kept = singular > 1e-6 * singular.max(initial=0.0)
+    if not kept.any():
+        return float("nan")
+    return float(chi2.sf(np.sum((left[:, kept].T @ values) ** 2), np.count_nonzero(kept)))
+
+
+def _columns(places: Array, form: Array) -> tuple[Array, Array]:
+    """Return the columns of a smooth curve over the length, and those of the harmonics of the direction."""
+    y, x = (places @ np.linalg.cholesky(form)).T
+    logs, angle = np.log(np.hypot(y, x)), np.arctan2(y, x)
+    smooth = np.stack([np.ones(logs.size), 2.0 * logs, (logs - logs.mean()) ** 2], axis=1)
+    return smooth, harmonics(logs, angle)
+
+
+def harmonics(logs: Array, angle: Array) -> Array:
+    """Return the second and fourth harmonics of an angle, and the same times a centred logarithm: (k, 8)."""
+    waves = [trig(order * angle) for order in (2, 4) for trig in (np.cos, np.sin)]
+    centred = logs - logs.mean()
+    return np.stack([*waves, *(centred * wave for wave in waves)], axis=1)
+
+
+def matrix(u: float, v: float) -> Array:
+    """Return the exponential of -[[-u, v], [v, u]]: lengths along half the angle of (u, v) shrink."""
+    size = float(np.hypot(u, v))
+    sine = np.sinh(size) / size if size > 0 else 1.0
+    return np.asarray(np.cosh(size) * np.eye(2) + sine * np.array([[u, -v], [-v, -u]]))
+
+
+def log_squares(places: Array, form: Array) -> Array:
+    """Return the logarithm of h' M h."""
+    return np.asarray(np.log(quadratic(places, form)))
+
+
+def log_square_slopes(places: Array, u: float, v: float, step: float = 1e-4) -> list[Array]:
+    """Return the change of `log_squares` with u and with v."""
+    square = quadratic(places, matrix(u, v))
+    return [
+        quadratic(places, (matrix(u + a, v + b) - matrix(u - a, v - b)) / (2 * step)) / square
+        for a, b in ((step, 0.0), (0.0, step))
+    ]
+
+
+def quadratic(places: Array, form: Array) -> Array:
+    """Return h' M h for vectors h on the last axis."""
+    y, x = places[..., 0], places[..., 1]
+    return np.asarray(form[0, 0] * y * y + 2.0 * form[0, 1] * y * x + form[1, 1] * x * x)
+
+
+def _waves(form: Array, steps: tuple[float, float]) -> Array:
+    """Return the matrix that measures wavevectors in rad per cell."""
+    return np.asarray(np.linalg.inv(form) / np.outer(steps, steps))
+
+
+def _least_squares(design: Array, values: Array, spread: Array) -> tuple[Array, Array]:
+    """Return generalised least squares and its covariance."""
+    weighted = np.linalg.solve(spread, design)
+    errors = np.linalg.inv(design.T @ weighted)
+    return errors @ (weighted.T @ values), errors
+
+
+def _inside(hurst: float) -> float:
+    return float(np.clip(hurst, _LOWEST, _HIGHEST))

@@ -1,0 +1,281 @@
+"""How rough a face is in each direction, and whether the directions differ by more than chance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base import schema
+from fractalcontact.base.checks import Problems
+from fractalcontact.base.provenance import stamp
+from fractalcontact.dimensions import _periodic, _rays, _sectors
+from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
+from fractalcontact.dimensions._faces import Face, read_faces, read_scales
+from fractalcontact.dimensions._fitting import LEAST_MODES, PeriodicModes, fitted
+from fractalcontact.dimensions._tables import outer_coords
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SMALLEST = 16
+_WHITE = 0.05  # exponent below which heights have no length of correlation that could be stretched
+_STRANGE = 1e-3  # chance below which no stretch explains the face
+_UNVARIED = 1e-22  # of the largest mean square: the heights do not vary along that direction
+_SMOOTH = "the heights do not vary along this direction"
+_BEYOND = "the face is no stretched fractional Brownian one, and no model tells how the estimates scatter"
+_FEW = "fewer than two lags of this direction fit into the face, or into the scales asked for"
+_ALONG = {
+    "hurst": "hurst",
+    "fitted_hurst": "fitted",
+    "standard_error": "standard_error",
+    "ci_low": "low",
+    "ci_high": "high",
+    "rms_increment": "increment",
+}
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """The estimates of one face by direction, and what tells it from an isotropic one."""
+
+    estimates: list[Estimate]
+    isotropy: _rays.Isotropy | None
+    note: str = ""
+
+
+def directions(
+    surface: xr.DataArray,
+    azimuth: float | Sequence[float] | None = None,
+    *,
+    scales: tuple[float, float] | None = None,
+) -> xr.Dataset:
+    """Estimate exponent, increment and topothesy along each direction, and test isotropy.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x), at least 16 points along each axis. NaN marks missing points,
+        which are left out.
+    azimuth : float or sequence of float, optional
+        Directions in degrees, E = 0, anticlockwise; a direction and its opposite are the same. Default: eight
+        over the half-circle.
+    scales : (low, high), optional
+        Lengths in metres: lags of a face with free edges, wavelengths of a periodic one and of the tests.
+        Default: the shortest lags, or the band of the spectrum.
+
+    Returns
+    -------
+    Dataset over the leading dims and `azimuth` (degree, ascending, 0 ... 180)
+        hurst, standard_error, ci_low, ci_high, fitted_hurst : as of `estimate`, along each direction.
+        rms_increment, topothesy : height increment over `increment_lag`, one x spacing, along the direction,
+        and the lag at which it equals the lag (m).
+        isotropy_p_value : how likely an isotropic surface shows as much of a difference between directions.
+        Below .05 the face is told from an isotropic one, at that risk of an error.
+        stretch, stretch_low, stretch_high, stretch_azimuth : correlations are `stretch` times as long along
+        `stretch_azimuth` as across it (`fractalcontact.surfaces.spectral` names them so); the azimuth means
+        nothing where the interval begins at 1.
+        stretch_p_value : how likely a stretch of an isotropic surface shows as much of a difference beyond
+        the stretch. A small one tells two exponents, ridges, or a sum f(x) + g(y).
+        The attribute `reason` of hurst and the attribute `not_given` of ci_low and ci_high say why a number
+        is missing.
+
+    Raises
+    ------
+    InvalidInput
+        A profile, wrong axes or scales, a face too small or of nothing but NaN.
+
+    Notes
+    -----
+    Tests: the modes over the mean of their ring of wavevectors are held against the second and fourth
+    harmonics of the direction, in level and in slope (chi square with 8 degrees of freedom, 6 beyond a
+    stretch). The spectrum may have any form. A face with free edges is tapered, and tested by its waves from
+    6 spacings to a third of the extent. Where heights are missing, or fewer than about 90 points stand along
+    an edge, its second differences are tested in the same way, for fractional Brownian heights.
+
+    Exponents: a face with free edges is measured by second differences over 1, 2 and 4 steps of the lattice
+    along each direction; `azimuth` is that of the nearest direction of the lattice, and the interval is that
+    of a stretched fractional Brownian surface. A periodic face is measured by the waves of its band that run
+    within 11 degrees of the direction: where two exponents H_x and H_y were built in, with the harmonic
+    mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
+
+    References
+    ----------
+    Davies and Hall (1999), Journal of the Royal Statistical Society B 61; Chan and Wood (2000), Annals of
+    Statistics 28; for stretched surfaces: Richard (2018), Journal of Mathematical Imaging and Vision 60.
+    """
+    import xarray as xr
+
+    with Problems("fractalcontact.dimensions.directions") as problems:
+        asked = None if azimuth is None else np.unique(np.mod(problems.numbers("azimuth", azimuth), 180.0))
+        faces = read_faces(surface, problems, smallest=SMALLEST)
+        window = read_scales(problems, scales, faces)
+        problems.require("y" in getattr(surface, "dims", ("y",)), "surface", "dims (..., y, x)", surface)
+    started = time.perf_counter()
+    periodic = all(faces[0].grid.periodic) and all(face.complete for face in faces)
+    rays = [] if periodic else _unique(_rays.rays(asked, faces[0].plane_steps))
+    at = (
+        (np.arange(_rays.DIRECTIONS) * 180.0 / _rays.DIRECTIONS if asked is None else asked)
+        if periodic
+        else np.array([ray.azimuth for ray in rays])
+    )
+    found = [_sectored(face, at, window) if periodic else _turned(face, rays, window) for face in faces]
+    outer = surface.dims[: surface.ndim - 2]
+    shape = [surface.sizes[dim] for dim in outer]
+    dims = (*outer, "azimuth")
+    data: dict[str, Any] = {
+        name: (dims, np.reshape([[getattr(e, key) for e in one.estimates] for one in found], (*shape, -1)))
+        for name, key in _ALONG.items()
+    }
+    spacing = faces[0].spacing[1]
+    data["topothesy"] = (
+        dims,
+        np.reshape([[e.topothesy(spacing) for e in one.estimates] for one in found], (*shape, -1)),
+    )
+    for name, key in _OVERALL.items():
+        values = [np.nan if one.isotropy is None else getattr(one.isotropy, key) for one in found]
+        data[name] = (outer, np.reshape(values, shape))
+    coords = outer_coords(surface, outer) | {"azimuth": at, "increment_lag": spacing}
+    result = schema.label(xr.Dataset({**data, "run_time": time.perf_counter() - started}, coords=coords))
+    _explain(result, found)
+    return stamp(
+        result,
+        "fractalcontact.dimensions.directions",
+        {"surface": surface, "azimuth": azimuth, "scales": window},
+        title="Roughness by direction",
+        references="Davies and Hall, Fractal analysis of surface roughness by using spatial data, Journal "
+        "of the Royal Statistical Society B 61 (1999) 3-37",
+    )
+
+
+_OVERALL = {
+    "isotropy_p_value": "p_value",
+    "stretch": "stretch",
+    "stretch_low": "low",
+    "stretch_high": "high",
+    "stretch_azimuth": "azimuth",
+    "stretch_p_value": "stretched_p_value",
+}
+
+
+def _unique(rays: Sequence[_rays.Ray]) -> list[_rays.Ray]:
+    return sorted(set(rays), key=lambda ray: ray.azimuth)
+
+
+def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] | None) -> _Turned:
+    """Measure a face with free edges."""
+    if face.is_constant or face.is_plane:
+        one = undefined(CONSTANT) if face.is_constant else plane()
+        return _Turned([one.limited() if np.isfinite(one.hurst) else one] * len(rays), None, one.note)
+    means, owner = _rays.Means.of(face, rays, scales)
+    around, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales)
+    level = _UNVARIED * max(means.means.max(initial=0.0), around.means.max(initial=0.0))
+    varied, smooth = around.part(around.means > level), bool((around.means <= level).any())
+    enough = np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > _rays.LEAST_LAGS
+    isotropy = _rays.isotropy(varied) if enough else None
+    strange = isotropy is not None and isotropy.stretched_p_value < _STRANGE
+    if isotropy is not None and face.complete:
+        isotropy = _by_waves(face, isotropy, scales)
+    if smooth and isotropy is not None:
+        isotropy = replace(isotropy, p_value=0.0, stretched_p_value=0.0)
+    beyond = strange or (isotropy is not None and isotropy.stretched_p_value < _STRANGE)
+    hurst, form = (isotropy.hurst, isotropy.form) if isotropy is not None else (0.5, np.eye(2))
+    estimates = []
+    for place in range(len(rays)):
+        own = means.part(owner == place)
+        if (own.means <= level).any():
+            estimates.append(undefined(_SMOOTH))
+        elif len(own.means) < 2:
+            estimates.append(undefined(_FEW))
+        else:
+            estimates.append(_along(own, hurst, form, face.unit, _BEYOND if beyond else ""))
+    note = "" if isotropy is not None else "too few lags fit into the face to compare directions"
+    return _Turned(estimates, *_known(isotropy, note))
+
+
+def _known(isotropy: _rays.Isotropy | None, note: str) -> tuple[_rays.Isotropy | None, str]:
+    """Leave out the stretch of heights that are next to uncorrelated."""
+    if isotropy is None or isotropy.hurst >= _WHITE:
+        return isotropy, note
+    blank = replace(
+        isotropy, stretch=np.nan, low=np.nan, high=np.nan, azimuth=np.nan, stretched_p_value=np.nan
+    )
+    return blank, "heights without correlation have no stretch"
+
+
+def _by_waves(face: Face, found: _rays.Isotropy, scales: tuple[float, float] | None) -> _rays.Isotropy:
+    """Take the chances from the waves of a complete face, if it is large enough: they know no family."""
+    low, high = (0.0, np.inf) if scales is None else scales
+    window = low / face.spacing[1], high / face.spacing[1]
+
+    def chance(form: Array, free: int, otherwise: float) -> float:
+        value = _sectors.tapered_test(
+            face.heights, face.plane_steps, form, found.hurst, free=free, scales=window
+        )
+        return value if np.isfinite(value) else otherwise
+
+    return replace(
+        found,
+        p_value=chance(np.eye(2), 0, found.p_value),
+        stretched_p_value=chance(np.linalg.inv(found.form), 2, found.stretched_p_value),
+    )
+
+
+def _along(own: _rays.Means, hurst: float, form: Array, unit: float, reason: str) -> Estimate:
+    """Return the estimate of one direction."""
+    exponent, error, second = _rays.slope(own, hurst, form)
+    low, high = normal_interval(exponent, error)
+    # a second difference over one lag has 4 - 4^H times the mean square of a first one
+    first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan
+    if reason:
+        error = low = high = np.nan
+    estimate = Estimate(exponent, error, low, high, increment=float(np.sqrt(first)) * unit, not_given=reason)
+    return estimate.limited()
+
+
+def _sectored(face: Face, azimuths: Array, scales: tuple[float, float] | None) -> _Turned:
+    """Measure a periodic face."""
+    if face.is_constant:
+        return _Turned([undefined(CONSTANT)] * azimuths.size, None, CONSTANT)
+    whole = _sectors.Plane.of(face.heights, face.plane_steps)
+    extent = max(face.grid.extent)
+    low, high = _periodic.band(whole.modes) if scales is None else (extent / scales[1], extent / scales[0])
+    modes = whole.inside(low * (1 - 1e-9), high * (1 + 1e-9))
+    gaps = np.diff(azimuths, append=azimuths[:1] + 180.0)
+    half = min(_sectors.WIDEST, 0.5 * float(gaps.min())) if azimuths.size > 1 else _sectors.WIDEST
+    increments = _sectors.increments(face.heights, face.plane_steps, azimuths) * face.unit
+    estimates = []
+    for azimuth, increment in zip(azimuths, increments, strict=True):
+        sector = modes.sector(float(azimuth), half)
+        if np.sum(sector.modes.weights) < 2 * LEAST_MODES or not _spread(sector):
+            estimates.append(undefined("too few waves of the band run along this direction"))
+            continue
+        _, estimate = fitted(sector, 0.5, noise=False)
+        estimates.append(replace(estimate, increment=float(increment)).limited())
+    if modes.weights.sum() < _sectors.LEAST or not _spread(PeriodicModes(modes.modes)):
+        return _Turned(estimates, None, "too few waves in the band to compare directions")
+    start = PeriodicModes(modes.modes).fit(0.5, noise=False).hurst
+    return _Turned(estimates, *_known(_sectors.isotropy(modes, start), ""))
+
+
+def _spread(modes: PeriodicModes) -> bool:
+    """Tell whether the waves differ in length."""
+    waves = modes.modes.wavenumber
+    return bool(waves.max() > 1.2 * waves.min())
+
+
+def _explain(result: xr.Dataset, found: Sequence[_Turned]) -> None:
+    """Write down why numbers are missing."""
+    reasons = list(dict.fromkeys(e.not_given for one in found for e in one.estimates if e.not_given))
+    for name in ("standard_error", "ci_low", "ci_high"):
+        result[name].attrs["not_given"] = "; ".join(reasons)
+    notes = list(dict.fromkeys(e.note for one in found for e in one.estimates if e.note))
+    result["hurst"].attrs["reason"] = "; ".join(notes)
+    overall = "; ".join(dict.fromkeys(one.note for one in found if one.note))
+    for name in _OVERALL:
+        result[name].attrs["reason"] = overall

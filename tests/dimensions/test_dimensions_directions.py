@@ -1,0 +1,233 @@
+"""Roughness by direction: against surfaces whose directions are known, and the size of the test."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.spectra import aliased_power_law
+from fractalcontact.dimensions import _rays
+
+SPACING = 1e-4
+
+
+def brownian(n, hurst, seed, spacing=SPACING, **more):
+    return fc.surfaces.fbm((n, n), spacing, hurst=hurst, rms_increment=1e-6, rng=seed, **more)
+
+
+def stretched(n, seed, stretch=2.0, rotation=30.0, hurst=0.6, thin=4, **more):
+    """A stretched fractal with free edges: every fourth point out of the middle of a wider band."""
+    whole = fc.surfaces.spectral(
+        (2 * thin * n, 2 * thin * n), SPACING / thin, hurst=hurst, rms_height=1e-6, stretch=stretch,
+        rotation=rotation, rng=seed, **more,
+    )  # fmt: skip
+    return fc.surfaces.from_array(whole.values[: thin * n : thin, : thin * n : thin], SPACING)
+
+
+def profile(n, seed, hurst=0.7):
+    return fc.surfaces.fbm(n, SPACING, hurst=hurst, rms_increment=1e-6, rng=seed).values
+
+
+def turned(azimuth, other):
+    """Angle between two directions without sense, degrees."""
+    return abs((azimuth - other + 90.0) % 180.0 - 90.0)
+
+
+def test_isotropic_surface_has_one_exponent_and_one_increment():
+    found = fc.dimensions.directions(brownian(256, 0.7, 1))
+    assert found["hurst"].dims == ("azimuth",)
+    assert found["azimuth"].values[[0, 2, 4, 6]] == pytest.approx([0, 45, 90, 135])
+    assert ((found["ci_low"] < 0.7) & (found["ci_high"] > 0.7)).all()
+    assert found["rms_increment"].values == pytest.approx(1e-6, rel=0.03)
+    topothesy = SPACING * (1e-6 / SPACING) ** (1 / 0.3)
+    assert np.log(found["topothesy"].values) == pytest.approx(np.log(topothesy), rel=0.05)
+    assert float(found["isotropy_p_value"]) > 0.01
+    assert float(found["stretch_low"]) == 1.0
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_stretch_and_its_azimuth_are_found(free):
+    if free:
+        face = stretched(192, 3)
+    else:
+        face = fc.surfaces.spectral(
+            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, stretch=2.0, rotation=30.0, rng=3
+        )
+    found = fc.dimensions.directions(face)
+    assert float(found["isotropy_p_value"]) < 1e-6
+    assert float(found["stretch_low"]) < 2.0 < float(found["stretch_high"]) + 0.1
+    assert turned(float(found["stretch_azimuth"]), 30.0) < 2.0
+    assert float(found["stretch_p_value"]) > 1e-3
+    # the exponent is the same all round; heights change least along the stretch
+    assert ((found["ci_low"] < 0.65) & (found["ci_high"] > 0.55)).all()
+    least = float(found["azimuth"][int(np.argmin(found["rms_increment"].values))])
+    assert turned(least, 30.0) < 23.0
+
+
+def test_turning_the_face_turns_the_answer():
+    face = stretched(128, 4, stretch=1.6, rotation=20.0)
+    other = fc.surfaces.from_array(np.ascontiguousarray(face.values.T), SPACING)
+    one, two = (fc.dimensions.directions(each) for each in (face, other))
+    assert turned(float(two["stretch_azimuth"]), 90.0 - float(one["stretch_azimuth"])) < 1e-6
+    assert float(two["stretch"]) == pytest.approx(float(one["stretch"]), rel=1e-9)
+    assert float(two["isotropy_p_value"]) == pytest.approx(float(one["isotropy_p_value"]), rel=1e-6)
+    for azimuth in (0.0, 45.0, 90.0):
+        pair = [
+            one["hurst"].sel(azimuth=azimuth, method="nearest"),
+            two["hurst"].sel(azimuth=(90.0 - azimuth) % 180.0, method="nearest"),
+        ]
+        assert float(pair[0]) == pytest.approx(float(pair[1]), rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [48, 160])
+def test_striated_faces_are_told_from_isotropic_ones(size):
+    x, y = profile(size, 5), profile(size, 6)
+    noise = 1e-7 * np.random.default_rng(7).standard_normal((size, size))
+    for heights in (x + noise, x + y[:, None] + noise, x + y[:, None]):
+        found = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+        assert float(found["isotropy_p_value"]) < 1e-3
+        if size > 100:
+            assert "no model" in found["ci_low"].attrs["not_given"]
+            assert np.isnan(found["ci_low"]).all()
+
+
+def test_ground_face_has_no_exponent_along_its_ridges():
+    heights = np.broadcast_to(profile(96, 8), (96, 96))
+    found = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+    assert np.flatnonzero(np.isnan(found["hurst"].values)).tolist() == [4]
+    assert float(found["hurst"][0]) == pytest.approx(0.7, abs=0.15)
+    assert "do not vary" in found["hurst"].attrs["reason"]
+    assert float(found["isotropy_p_value"]) == 0.0
+
+
+def test_two_exponents_are_more_than_a_stretch():
+    face = fc.surfaces.spectral((192, 192), SPACING, hurst=(0.4, 0.8), rms_height=1e-6, rng=9)
+    found = fc.dimensions.directions(face)
+    assert float(found["isotropy_p_value"]) < 1e-6
+    assert float(found["stretch_p_value"]) < 1e-6
+    assert float(found["hurst"].sel(azimuth=0)) - float(found["hurst"].sel(azimuth=90)) > 0.3
+
+
+def test_isotropic_spectrum_of_any_form_is_isotropic():
+    """A plateau, a cut-off that no fractional Brownian face has, and the same face cut free."""
+    face = fc.surfaces.spectral(
+        (256, 256), SPACING, hurst=0.8, rms_height=1e-6, rolloff=4e-3, short_cutoff=6e-4, rng=10
+    )
+    for part in (face, face[:200, :180]):
+        found = fc.dimensions.directions(part)
+        assert float(found["isotropy_p_value"]) > 0.01
+        assert float(found["stretch_p_value"]) > 0.01
+
+
+def test_gaps_and_unequal_spacings():
+    face = brownian(160, 0.4, 11, (2e-4, 1e-4))
+    heights = face.values.copy()
+    heights[np.random.default_rng(12).random(heights.shape) < 0.05] = np.nan
+    heights[20:50, 60:100] = np.nan
+    found = fc.dimensions.directions(face.copy(data=heights))
+    assert ((found["ci_low"] - 0.02 < 0.4) & (found["ci_high"] + 0.02 > 0.4)).all()
+    assert float(found["isotropy_p_value"]) > 0.01
+    assert float(found["stretch_low"]) == 1.0
+
+
+def test_asked_directions_are_those_of_the_lattice_nearest_to_them():
+    face = brownian(64, 0.5, 13)
+    found = fc.dimensions.directions(face, [210.0, 0.0, 90.0])
+    assert found["azimuth"].values == pytest.approx([0.0, np.degrees(np.arctan2(3, 5)), 90.0])
+    whole = fc.dimensions.directions(face)
+    assert float(found["isotropy_p_value"]) == float(whole["isotropy_p_value"])
+    assert float(found["hurst"].sel(azimuth=90)) == float(whole["hurst"].sel(azimuth=90))
+    periodic = fc.surfaces.spectral((64, 64), SPACING, hurst=0.5, rms_height=1e-6, rng=14)
+    assert fc.dimensions.directions(periodic, 33.0)["azimuth"].values.tolist() == [33.0]
+
+
+def test_members_keep_their_dimension():
+    faces = brownian(48, 0.5, 15, members=3)
+    found = fc.dimensions.directions(faces)
+    assert found["hurst"].dims == ("member", "azimuth")
+    assert found["isotropy_p_value"].dims == ("member",)
+    alone = fc.dimensions.directions(faces[1])
+    assert np.array_equal(found["hurst"][1], alone["hurst"])
+
+
+def test_units_change_nothing():
+    face = brownian(64, 0.6, 16)
+    one = fc.dimensions.directions(face)
+    for factor in (2.0**40, 2.0**-40):
+        other = fc.dimensions.directions(face.copy(data=face.values * factor))
+        assert np.array_equal(one["hurst"], other["hurst"])
+        assert float(one["isotropy_p_value"]) == float(other["isotropy_p_value"])
+        assert np.array_equal(one["rms_increment"] * factor, other["rms_increment"])
+
+
+def test_limits_and_refusals():
+    flat = fc.dimensions.directions(fc.surfaces.from_array(np.full((20, 20), 3.0), SPACING))
+    assert np.isnan(flat["hurst"]).all()
+    assert "constant" in flat["hurst"].attrs["reason"]
+    plane = fc.surfaces.from_array(np.broadcast_to(np.arange(20) * 1e-6, (20, 20)), SPACING)
+    assert (fc.dimensions.directions(plane)["hurst"] == 1).all()
+    white = fc.surfaces.from_array(np.random.default_rng(17).standard_normal((128, 128)), SPACING)
+    found = fc.dimensions.directions(white)
+    assert (found["hurst"] < 0.03).all()
+    assert float(found["isotropy_p_value"]) > 0.001
+    assert np.isnan(found["stretch"])
+    with pytest.raises(InvalidInput, match="16"):
+        fc.dimensions.directions(brownian(12, 0.5, 1))
+    with pytest.raises(InvalidInput, match="dims"):
+        fc.dimensions.directions(fc.surfaces.fbm(100, SPACING, hurst=0.5, rms_increment=1e-6, rng=1))
+    with pytest.raises(InvalidInput, match="scales"):
+        fc.dimensions.directions(brownian(32, 0.5, 1), scales=(1.0, 2.0))
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.8])
+def test_scatter_of_second_differences_is_the_one_expected(hurst):
+    """Over a thousand small faces, against the covariance from the spectral density."""
+    n = 40
+    rays = _rays.rays(None, (1.0, 1.0))
+    vectors = np.array([(m * ray.dy, m * ray.dx) for ray in rays[:4] for m in (1, 2)])
+    logs = []
+    for heights in brownian(n, hurst, 18, members=1000).values:
+        means = []
+        for dy, dx in vectors:
+            middle, far = heights[dy : n - dy, dx : n - dx], heights[2 * dy :, 2 * dx :]
+            means.append(np.mean((heights[: n - 2 * dy, : n - 2 * dx] - 2 * middle + far) ** 2))
+        logs.append(np.log(means))
+    counts = np.array([(n - 2 * dy) * (n - 2 * dx) for dy, dx in vectors])
+    expected = _rays.covariance(vectors, counts, hurst, np.eye(2))
+    assert np.cov(np.transpose(logs)) == pytest.approx(expected, rel=0.3, abs=0.15 * expected.max())
+
+
+def test_aliased_density_of_a_stretched_lattice():
+    """The images of a stretched form, summed over many more of them."""
+    form = np.array([[2.0, 0.5], [0.5, 1.0]])
+    offsets = 2 * np.pi * np.arange(-300, 301)
+    y, x = 1.0 + offsets[:, None], -2.0 + offsets
+    square = form[0, 0] * y * y + 2 * form[0, 1] * y * x + form[1, 1] * x * x
+    near = np.sum(square ** (-1 - 0.6))
+    assert aliased_power_law((1.0, -2.0), 0.6, form) == pytest.approx(near, rel=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("kind", ["free", "small", "gaps", "periodic"])
+def test_size_of_the_test_and_coverage(kind, hurst):
+    n, members = (48 if kind == "small" else 112), 400
+    if kind == "periodic":
+        faces = fc.surfaces.spectral(
+            (n, n), SPACING, hurst=hurst, rms_height=1e-6, short_cutoff=4e-4, members=members, rng=20
+        )
+    else:
+        faces = brownian(n, hurst, 20, members=members)
+        if kind == "gaps":
+            heights = faces.values.copy()
+            heights[np.random.default_rng(21).random(heights.shape) < 0.1] = np.nan
+            faces = faces.copy(data=heights)
+    found = fc.dimensions.directions(faces)
+    for name in ("isotropy_p_value", "stretch_p_value"):
+        share = float((found[name] < 0.05).mean())
+        assert 0.01 < share < 0.05 + 3.2 * np.sqrt(0.05 * 0.95 / members)
+    assert float((found["stretch_low"] == 1.0).mean()) > 0.92
+    given = np.isfinite(found["ci_low"])
+    assert float(given.mean()) > 0.98
+    covered = ((found["ci_low"] <= hurst) & (hurst <= found["ci_high"])).where(given).mean("member")
+    assert (abs(covered - 0.95) < 0.035).all()
