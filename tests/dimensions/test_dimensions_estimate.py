@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base import threads
+from fractalcontact.base.errors import InvalidInput
 
 VARIABLES = {
     "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",
