@@ -26,7 +26,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 S = TypeVar("S")
 R = TypeVar("R")
 
-TAKEN = ("axis", "box_size", "island", "moment_order")  # dims that results add
+TAKEN = ("axis", "box_size", "island", "link", "moment_order", "radius")  # dims that results add
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
 
 
@@ -188,18 +188,43 @@ def assemble(
     *,
     on_plane: bool = False,
     notes: dict[str, dict[str, str]] | None = None,
+    rows: tuple[str, Array] | None = None,
 ) -> xr.Dataset:
     """Build a labelled Dataset from variables (dims, values) on the dims of the mask.
 
-    `notes` gives further attributes by name, or other units and meanings than those of the schema.
+    `notes` gives further attributes by name, or other units and meanings than those of the schema. `rows` is
+    the dim of a table and the plane that each of its rows is about.
     """
     import xarray as xr
 
-    there = {**planes.coords, **(planes.plane_coords if on_plane else {}), **(coords or {})}
+    known, unknown = _row_coords(planes, *rows) if rows else ({}, {})
+    there = {**planes.coords, **(planes.plane_coords if on_plane else {}), **known, **(coords or {})}
     dataset = label(xr.Dataset(variables, coords=there))
+    for name, values in unknown.items():
+        dataset.coords[name] = values
+        dataset.coords[name].encoding["_FillValue"] = None
     for name, attributes in (notes or {}).items():
         dataset[name].attrs.update(attributes)
     return dataset
+
+
+def _row_coords(planes: Planes, row: str, plane: Array) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return where along every leading dim the plane of each row of a table lies.
+
+    The coordinates are called after the row and the dim, as in `island_step`. Dims that the schema does not
+    know come second, with the index.
+    """
+    known: dict[str, Any] = {}
+    unknown: dict[str, Any] = {}
+    places = np.unravel_index(plane, planes.shape) if planes.dims else ()
+    for dim, length, index in zip(planes.dims, planes.shape, places, strict=True):
+        if f"{row}_{dim}" in QUANTITIES:
+            values = planes.coords[dim].values if dim in planes.coords else np.arange(length)
+            known[f"{row}_{dim}"] = (row, values[index])
+        else:
+            attributes = {"units": "1", "long_name": f"index of the {row} along {dim}"}
+            unknown[f"{row}_{dim}"] = (row, index, attributes)
+    return known, unknown
 
 
 def together(function: Callable[[S], R], items: Iterable[S]) -> list[R]:

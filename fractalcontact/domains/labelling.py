@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.provenance import stamp
-from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.domains import _labels
 from fractalcontact.domains._masks import Array, Planes, assemble, read_mask, together
 
@@ -81,10 +80,10 @@ def islands(
         **{name: ("island", values) for name, values in columns.items()},
         "run_time": ((), time.perf_counter() - begin),
     }
-    dataset = assemble(
-        planes, variables, _island_coords(planes, tables), on_plane="label" in maps, notes=_notes(planes)
-    )
-    _place_unknown(dataset, planes, tables)
+    counts = [one["cells"].size for one in tables]
+    coords = {"island_label": ("island", np.concatenate([np.arange(1, count + 1) for count in counts]))}
+    rows = ("island", np.repeat(np.arange(planes.count), counts))
+    dataset = assemble(planes, variables, coords, on_plane="label" in maps, notes=_notes(planes), rows=rows)
     parameters = {
         "mask": mask,
         "connectivity": connectivity,
@@ -128,34 +127,6 @@ def measure(labels: _labels.Labels, planes: Planes) -> dict[str, Array]:
     return {
         name: np.full(values.shape, np.nan) if name in METRIC else values for name, values in measured.items()
     }
-
-
-def _places(planes: Planes, tables: list[dict[str, Array]]) -> dict[str, Array]:
-    """Return the index along every leading dim, for all islands."""
-    counts = [one["cells"].size for one in tables]
-    plane = np.repeat(np.arange(planes.count), counts)
-    return dict(zip(planes.dims, np.unravel_index(plane, planes.shape), strict=True)) if planes.dims else {}
-
-
-def _island_coords(planes: Planes, tables: list[dict[str, Array]]) -> dict[str, Any]:
-    numbers = [np.arange(1, one["cells"].size + 1) for one in tables]
-    coords: dict[str, Any] = {"island_label": ("island", np.concatenate(numbers))}
-    for dim, index in _places(planes, tables).items():
-        if f"island_{dim}" in QUANTITIES:
-            values = (
-                planes.coords[dim].values if dim in planes.coords else np.arange(index.max(initial=0) + 1)
-            )
-            coords[f"island_{dim}"] = ("island", values[index])
-    return coords
-
-
-def _place_unknown(dataset: xr.Dataset, planes: Planes, tables: list[dict[str, Array]]) -> None:
-    """Put the index along leading dims that the schema does not know beside the islands."""
-    for dim, index in _places(planes, tables).items():
-        if f"island_{dim}" not in QUANTITIES:
-            attributes = {"units": "1", "long_name": f"index of the island along {dim}"}
-            dataset.coords[f"island_{dim}"] = ("island", index, attributes)
-            dataset.coords[f"island_{dim}"].encoding["_FillValue"] = None
 
 
 def _notes(planes: Planes) -> dict[str, dict[str, str]]:

@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.provenance import stamp
-from fractalcontact.domains import crossing, labelling
+from fractalcontact.domains import gathering, labelling
 from fractalcontact.domains._masks import assemble, read_mask
-from fractalcontact.domains.counting import box_dimension
-from fractalcontact.domains.edges import boundary_dimension
 from fractalcontact.domains.gliding import lacunarity
 
 if TYPE_CHECKING:
@@ -50,9 +47,11 @@ def describe(
         the extent; `n_islands`, `largest_cells`, `largest_island`, `mean_island_area` (m2), `largest_share`,
         `euler_number` (see `islands`); `percolates` over `axis` (see `percolation`); `box_dimension` with
         `box_dimension_low` and `box_dimension_high`, `dust_dimension`, `dust_spread`, `differs_from_dust`
-        (see `box_dimension`); `boundary_dimension` with its interval (see `boundary_dimension`);
-        `lacunarity` and `dust_lacunarity` at the `box_size` of 8 cells, or of the shorter side if that is
-        less (see `lacunarity`).
+        (see `box_dimension`); `minkowski_dimension`, `correlation_dimension` and `boundary_dimension`, each
+        with its interval (`_low`, `_high`), the first two with that of a dust (`minkowski_dust_dimension`,
+        `correlation_dust_dimension`); `boundary_sides`; `lacunarity` and `dust_lacunarity` at the `box_size`
+        of 8 cells, or of the shorter side if that is less, and the whole curve as one number,
+        `lacunarity_slope` and `lacunarity_area`, with those of a dust (see `lacunarity`).
 
     Raises
     ------
@@ -65,38 +64,18 @@ def describe(
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
     told: dict[str, Any] = {"periodic": periodic, "valid": valid}
-    boxes = box_dimension(mask, **told)
-    edge = boundary_dimension(mask, **told)
-    gaps = lacunarity(mask, [min(BOX, *planes.grid.shape)], **told).isel(box_size=0)
     found = labelling.find(planes, connectivity, keep=False)
-    crossed = crossing.across(found, planes)
-    dy, dx = planes.grid.spacing if planes.grid.known else (np.nan, np.nan)
-    sides = contact_edges(planes.cells, planes.grid.periodic) @ np.array([dx, dy])
-    scalars = {
-        "coverage": planes.coverage,
-        "total_perimeter": sides,
-        **labelling.summary(found, planes, connectivity),
-        "largest_share": crossed["largest_share"],
-        **{
-            name: boxes[name]
-            for name in ("box_dimension", "dust_dimension", "dust_spread", "differs_from_dust")
-        },
-        "box_dimension_low": boxes["ci_low"],
-        "box_dimension_high": boxes["ci_high"],
-        "boundary_dimension": edge["boundary_dimension"],
-        "boundary_dimension_low": edge["ci_low"],
-        "boundary_dimension_high": edge["ci_high"],
-        "lacunarity": gaps["lacunarity"],
-        "dust_lacunarity": gaps["dust_lacunarity"],
+    gathered = gathering.measure(mask, planes, gathering.PARTS, found, connectivity, told)
+    size = min(BOX, *planes.grid.shape)
+    gaps = lacunarity(mask, [size], **told).isel(box_size=0)
+    variables: dict[str, Any] = {
+        **gathered.scalars(),
+        "percolates": gathered.variables["percolates"],
+        **{name: (planes.dims, gaps[name].values) for name in ("lacunarity", "dust_lacunarity")},
+        "run_time": ((), time.perf_counter() - begin),
     }
-    variables = {name: planes.variable(np.asarray(values).ravel()) for name, values in scalars.items()}
-    variables["percolates"] = planes.variable(crossed["percolates"], "axis")
-    variables["run_time"] = ((), np.asarray(time.perf_counter() - begin))
-    coords = {"axis": ("axis", np.array(crossing.AXES)), "box_size": ((), gaps["box_size"].values)}
-    notes = {"percolates": {"long_name": crossing.meaning(connectivity)}}
-    for name, source in (("box_dimension", boxes), ("boundary_dimension", edge), ("lacunarity", gaps)):
-        if "comment" in source[name].attrs:
-            notes[name] = {"comment": source[name].attrs["comment"]}
+    coords = {"axis": gathered.coords["axis"], "box_size": ((), np.int64(size))}
+    notes = {name: note for name, note in gathered.notes.items() if name in variables}
     dataset = assemble(planes, variables, coords, notes=notes)
     parameters = {"mask": mask, "connectivity": connectivity, "periodic": periodic, "valid": valid}
     return stamp(dataset, "fractalcontact.domains.describe", parameters, title="Description of a set")

@@ -42,6 +42,7 @@ DOMAIN_STAGES: Mapping[str, str] = {
         "percolation",
         "describe",
         "evolution",
+        "lineage",
     )
 }
 # arguments that the scene gives in another way: faces and maps, what to keep, the material, the bars

@@ -138,3 +138,130 @@ def test_description_may_call_a_periodic_plane_free():
     for name in one.data_vars:
         if name != "run_time":
             assert np.array_equal(one[name], other[name], equal_nan=True), name
+
+
+def test_evolution_gives_every_scalar_and_curve_of_the_room():
+    rng = np.random.default_rng(7)
+    planes = np.array(
+        [[np.zeros((40, 40)), *(level_set(40, 0.7, c, rng) for c in (0.05, 0.3))] for _ in range(2)]
+    )
+    mask = as_mask(planes, periodic=(True, True), dims=("shear", "step", "y", "x"))
+    mask = mask.assign_coords(shear=[0.0, 1e-3], normal_force=(("shear", "step"), [[0, 1.0, 2], [0, 1, 3]]))
+    result = fc.domains.evolution(mask)
+    boxes, gaps = fc.domains.box_dimension(mask), fc.domains.lacunarity(mask)
+    grown, pairs = fc.domains.minkowski_dimension(mask), fc.domains.correlation_dimension(mask)
+    for name, want in {
+        "box_dimension": boxes.box_dimension,
+        "box_dimension_low": boxes.ci_low,
+        "dust_dimension": boxes.dust_dimension,
+        "minkowski_dimension": grown.minkowski_dimension,
+        "minkowski_dust_dimension": grown.dust_dimension,
+        "grown_fraction": grown.grown_fraction,
+        "correlation_dimension_high": pairs.ci_high,
+        "lacunarity_area": gaps.lacunarity_area,
+        "boundary_dimension": fc.domains.boundary_dimension(mask).boundary_dimension,
+        "n_islands": fc.domains.islands(mask).n_islands,
+        "percolates": fc.domains.percolation(mask).percolates,
+    }.items():
+        assert result[name].dims[:2] == ("shear", "step")
+        assert np.array_equal(result[name], want, equal_nan=True), name
+    for name, own in (("box_local_slope", boxes), ("lacunarity", gaps), ("correlation_local_slope", pairs)):
+        source = own["lacunarity" if name == "lacunarity" else "local_slope"]
+        chosen = result[name].sel(box_size=own.box_size.values)
+        assert np.array_equal(chosen, source, equal_nan=True), name
+    assert np.isnan(result.box_count.sel(box_size=16)).all()  # beyond the window of the dimension
+    assert "fitted over 1 to 9 cells" in result.box_dimension.attrs["comment"]
+    assert "empty (2 planes)" in result.box_dimension.attrs["comment"]
+    assert np.isnan(result.box_dimension.values[:, 0]).all()
+    assert np.isfinite(result.box_dimension.values[:, 1:]).all()
+
+
+def test_only_what_is_wanted_is_measured():
+    planes = np.array([level_set(24, 0.7, c, np.random.default_rng(8)) for c in (0.1, 0.3)])
+    result = fc.domains.evolution(as_mask(planes), want=["lacunarity"])
+    assert "box_count" not in result
+    assert "births" not in result
+    assert set(result.dims) == {"step", "box_size"}
+    with pytest.raises(ValueError, match="want: expected words out of"):
+        fc.domains.evolution(as_mask(planes), want=["gaps"])
+
+
+def test_lineage_of_a_path_by_hand():
+    cells = path(
+        ".#...#..#.",
+        ".#..##.##.",
+        ".######.#.",
+        ".##..#....",
+    )
+    result = fc.domains.lineage(as_mask(cells))
+    names = result.event.attrs["flag_meanings"].split()
+    rows = [
+        (int(step), int(before), int(after), int(common), names[event])
+        for step, before, after, common, event in zip(
+            result.link_step,
+            result.island_before,
+            result.island_after,
+            result.common_cells,
+            result.event.values,
+            strict=True,
+        )
+    ]
+    assert rows == [
+        (1, 1, 1, 2, "continuation"),
+        (1, 2, 2, 2, "continuation"),
+        (1, 3, 3, 2, "continuation"),
+        (2, 1, 1, 2, "merge"),
+        (2, 2, 1, 4, "merge"),
+        (2, 3, 2, 2, "continuation"),
+        (3, 1, 1, 4, "split"),
+        (3, 1, 2, 2, "split"),
+        (3, 2, 0, 0, "death"),
+    ]
+    births = fc.domains.lineage(as_mask(np.concatenate([0 * cells[:1], cells[:1]])))
+    assert births.event.values.tolist() == [1, 1, 1]
+    assert births.island_before.values.tolist() == [0, 0, 0]
+    assert fc.domains.lineage(as_mask(cells[:1])).sizes["link"] == 0
+
+
+def test_lineage_and_evolution_count_the_same_events():
+    rng = np.random.default_rng(9)
+    planes = np.array([[level_set(48, 0.4, c, rng) for c in (0.2, 0.25, 0.2)] for _ in range(2)])
+    mask = as_mask(planes, periodic=(True, True), dims=("shear", "step", "y", "x"))
+    mask = mask.assign_coords(shear=[1e-3, 2e-3])
+    counts = fc.domains.evolution(mask, want=["changes", "islands"])
+    table = fc.domains.lineage(mask)
+    for i, shear in enumerate(mask.shear.values):
+        for step in (1, 2):
+            rows = table.isel(link=np.flatnonzero((table.link_shear == shear) & (table.link_step == step)))
+            assert (rows.event == 1).sum() == counts.births[i, step]
+            assert (rows.event == 2).sum() == counts.deaths[i, step]
+            merged = rows.island_after.values[np.isin(rows.event, (3, 5))]
+            parted = rows.island_before.values[np.isin(rows.event, (4, 5))]
+            assert np.unique(merged).size == counts.merges[i, step]
+            assert np.unique(parted).size == counts.splits[i, step]
+            after = rows.island_after.values
+            assert np.unique(after[after > 0]).size == counts.n_islands[i, step]
+
+
+def test_hysteresis_of_a_cycle():
+    cells = path("#.........", "##........", "####......", "###.......", "#.........", "###.......")
+    force = [1.0, 2.0, 3.0, 2.0, 1.0, 2.0]
+    mask = as_mask(cells).assign_coords(normal_force=("step", force))
+    result = fc.domains.evolution(mask, want=["changes"])
+    nan = np.nan
+    assert np.array_equal(result.return_step, [nan, nan, nan, 1, 0, 3], equal_nan=True)
+    assert result.hysteresis.values[3:] == pytest.approx([1 / 3, 0, 0])
+    assert result.coverage_change.values[3:] == pytest.approx([0.1, 0, 0])
+    assert "come back to the same normal_force" in result.hysteresis.attrs["comment"]
+    up = fc.domains.evolution(mask.isel(step=slice(3)), want=["changes"])
+    assert np.isnan(up.hysteresis).all()
+    assert "hysteresis" not in fc.domains.evolution(as_mask(cells), want=["changes"])
+
+
+def test_elastic_contact_forgets_its_path():
+    face = fc.surfaces.spectral((32, 32), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
+    pressure = 1e10 * np.array([0.001, 0.004, 0.01, 0.004, 0.001])
+    pressed = fc.contact.press(face, contact_modulus=1e10, nominal_pressure=pressure)
+    result = fc.domains.evolution(pressed["state"], want=["changes"])
+    assert result.return_step.values[3:].tolist() == [1, 0]
+    assert result.hysteresis.values[3:].tolist() == [0, 0]

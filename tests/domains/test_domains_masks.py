@@ -22,6 +22,7 @@ FUNCTIONS = {
     "generalised_dimensions": fc.domains.generalised_dimensions,
     "islands": fc.domains.islands,
     "lacunarity": fc.domains.lacunarity,
+    "lineage": fc.domains.lineage,
     "minkowski_dimension": fc.domains.minkowski_dimension,
     "percolation": fc.domains.percolation,
 }
@@ -59,7 +60,7 @@ def test_results_keep_the_leading_dims_and_known_coordinates(name, mask):
     assert float(result.shear) == 1e-3
     assert "temperature" not in result.coords
     for variable in result.data_vars.values():
-        assert variable.ndim == 0 or variable.dims[0] in ("step", "island")
+        assert variable.ndim == 0 or variable.dims[0] in ("step", "island", "link")
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

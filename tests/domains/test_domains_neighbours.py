@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from domains.sets import DIMENSION, as_mask, koch_raster, lattice_set, placed, random_dust
 
 import fractalcontact as fc
@@ -180,7 +181,9 @@ def test_wrong_calls_list_everything():
 
 
 def test_one_scale_gives_no_slope():
-    result, dimension = measured("correlation_dimension", as_mask(np.ones((1, 9))))
+    result, dimension = measured(
+        "correlation_dimension", xr.DataArray(np.ones((1, 9), bool), dims=("y", "x"))
+    )
     assert np.isnan(dimension)
     assert "no slope" in dimension.attrs["comment"]
     assert result.mean_mass.sizes["box_size"] == 1
