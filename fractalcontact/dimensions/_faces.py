@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[Any]]
 ROUNDING = 1e-12  # of the range of heights
+LEAST, MOST = 2.0**-450, 2.0**450  # m: ranges of heights whose squares and fourth powers are numbers
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
 
 
@@ -60,6 +61,15 @@ class Face:
     def raw(self) -> Array:
         """Heights in m, shape (ny, nx)."""
         return np.asarray(self.source.values, dtype=np.float64).reshape(self.shape)
+
+    @property
+    def is_extreme(self) -> bool:
+        """Squares of the heights in m would overflow or vanish."""
+        return not self.is_lazy and not LEAST <= self.unit <= MOST and not self.is_constant
+
+    def unitless(self) -> Face:
+        """Return the same face with its scaled heights taken for metres."""
+        return Face(self.source, self.grid, 1.0, self.heights, self._flat)
 
     @property
     def is_lazy(self) -> bool:
@@ -133,10 +143,14 @@ class Face:
         """Number of observed heights."""
         return self.raw.size if self.complete else int(np.count_nonzero(np.isfinite(self.raw)))
 
-    def slabs(self, reach: int) -> Iterator[tuple[Array, int]]:
-        """Yield heights in m with up to `reach` rows beyond a slab's own, and the number of its own."""
+    def slabs(self, reach: int, unit: float = 1.0) -> Iterator[tuple[Array, int]]:
+        """Yield heights with up to `reach` rows beyond a slab's own, and the number of its own.
+
+        They are in m, those in memory over a power of two if one is given.
+        """
         if not self.is_lazy or self.axes == 1:
-            yield np.ascontiguousarray(self.raw), self.shape[0]
+            raw = self.raw if unit == 1.0 else self.raw / unit
+            yield np.ascontiguousarray(raw), self.shape[0]
             return
         ny, nx = self.shape
         rows = max(SLAB // nx, 4 * reach, 1)
@@ -151,9 +165,15 @@ def is_lazy(array: xr.DataArray) -> bool:
 
 
 def read_faces(
-    surface: Any, problems: Problems, *, smallest: int = 3, gaps: bool = True, leading: bool = True
+    surface: Any,
+    problems: Problems,
+    *,
+    smallest: int = 3,
+    gaps: bool = True,
+    leading: bool = True,
+    squares: bool = False,
 ) -> list[Face]:
-    """Check a surface and split it along its leading dims.
+    """Check a surface and split it along its leading dims; `squares` of its heights in m must be numbers.
 
     Returns
     -------
@@ -171,7 +191,11 @@ def read_faces(
     core = surface.dims[surface.ndim - len(grid.shape) :]
     outer = [dim for dim in surface.dims if dim not in core]
     places = np.ndindex(*(surface.sizes[dim] for dim in outer))
-    return [Face(surface.isel(dict(zip(outer, place, strict=True))), grid) for place in places]
+    faces = [Face(surface.isel(dict(zip(outer, place, strict=True))), grid) for place in places]
+    if squares and any(face.is_extreme for face in faces):
+        expected = f"heights over a range of {LEAST:.0e} m to {MOST:.0e} m, whose squares are numbers"
+        problems.add("surface", expected, f"a range of about {max(face.unit for face in faces):.0e} m")
+    return faces
 
 
 def read_scales(problems: Problems, scales: Any, faces: Sequence[Face]) -> tuple[float, float] | None:

@@ -48,7 +48,8 @@ def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
     centred = heights - np.nanmean(heights)
     if float(modes.power.sum()) <= _ROUNDING * float(np.nansum(centred * centred)):
         return undefined(
-            "the heights vary along one axis only, or are a sum f(x) + g(y): estimate a profile instead"
+            "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
+            "exponent is: estimate profiles, or see `directions`"
         )
     fit, estimate = fitted(modes, pilot, noise)
     as_free = "a periodic face with gaps is taken as free" if all(face.grid.periodic) else ""

@@ -14,6 +14,7 @@ from fractalcontact.dimensions._faces import Face
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+_STEEP = 2.0**300
 SMALLEST = {"roughness_length": 5, "cube_counts": 3, "covering": 3}
 
 
@@ -203,7 +204,9 @@ def covering(face: Face, vertical_scale: float = 1.0) -> Curve:
     longest = max(face.spacing)
     # slopes are what counts, and they are formed in scaled lengths
     steps = (face.spacing[0] / longest, face.spacing[1] / longest)
-    ratios = _covers.area_ratios(face.heights * (face.unit / longest * vertical_scale), edges, steps)
+    factor = face.unit / longest * vertical_scale
+    shown = min(factor, _STEEP)  # beyond it an area is proportional to the heights
+    ratios = _covers.area_ratios(face.heights * shown, edges, steps) * (factor / shown)
     areas = ratios * face.grid.nominal_area
     return Curve(_edge_lengths(face, edges), areas, np.ones(len(edges), dtype=np.int64), vertical_scale)
 

@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.scaling import fit_line
 from fractalcontact.dimensions import _increments, _measures
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
-from fractalcontact.dimensions._faces import Face
+from fractalcontact.dimensions._faces import LEAST, MOST, Face
 from fractalcontact.dimensions._likelihood import Scales, likelihood
 from fractalcontact.dimensions._pairs import LAGS
 
@@ -44,7 +44,7 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
             return undefined(
                 f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
             )
-    moments = _increments.moments(face.slabs(_increments.REACH * step), face.grid.shape, step)
+    moments, unit = _moments(face, step)
     firsts, seconds = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(firsts) > 0:
         return undefined(CONSTANT)
@@ -70,13 +70,23 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
         error,
         low,
         high,
-        increment=found.increment,
+        increment=found.increment * unit,
         not_given=reason,
         note="the lags disagree on the exponent, and the interval is widened by it"
         if found.strain > 1.0
         else "",
         **window,  # type: ignore[arg-type]
     )
+
+
+def _moments(face: Face, step: int) -> tuple[_increments.Moments, float]:
+    """Return mean squares of increments and the unit of height they are in: 1 m unless they overflow."""
+    reach = _increments.REACH * step
+    moments = _increments.moments(face.slabs(reach), face.grid.shape, step)
+    largest = float(np.nanmax(moments.means, initial=0.0))
+    if face.is_lazy or LEAST**2 < largest < MOST**2:
+        return moments, 1.0
+    return _increments.moments(face.slabs(reach, face.unit), face.grid.shape, step), face.unit
 
 
 def _not_fractional(face: Face, noise: bool) -> str:
@@ -112,7 +122,8 @@ class CurveMethod:
             return undefined(CONSTANT) if face.is_constant else plane()
         if face.is_constant and not self.also:
             return undefined(CONSTANT)
-        curve = self.measure(face)
+        # slopes know no unit, but for those methods that have a natural scale
+        curve = self.measure(face.unitless() if face.is_extreme and not self.also else face)
         lengths = 2.0 * np.pi / curve.scale if self.as_wavelength else curve.scale
         low, high, rule = self.window(face) if scales is None else (*scales, _ASKED)
         inside = (lengths >= low * (1 - 1e-9)) & (lengths <= high * (1 + 1e-9)) & (curve.value > 0)

@@ -58,7 +58,7 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
     """
     with Problems("fractalcontact.dimensions.spectrum") as problems:
-        faces = read_faces(surface, problems, smallest=4, gaps=False)
+        faces = read_faces(surface, problems, smallest=4, gaps=False, squares=True)
         given = problems.choice("window", "none" if window is None else window, ("auto", "hann", "none"))
         edge = None if tile is None else problems.integer("tile", tile, at_least=8)
         if faces and edge is not None:
@@ -260,7 +260,7 @@ def _lag_curve(
     name: str, surface: Any, max_lag: float | None, measure: Callable[..., Any], value: dict[str, str]
 ) -> xr.Dataset:
     with Problems(f"fractalcontact.dimensions.{name}") as problems:
-        faces = read_faces(surface, problems)
+        faces = read_faces(surface, problems, squares=True)
         longest = None if max_lag is None else problems.number("max_lag", max_lag, above=0)
         if faces and longest is not None:
             least = min(faces[0].grid.spacing)
@@ -292,7 +292,7 @@ def _window_curve(
     name: str, surface: Any, dim: str, value: dict[str, str], options: dict[str, Any], title: str
 ) -> xr.Dataset:
     with Problems(f"fractalcontact.dimensions.{name}") as problems:
-        faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name])
+        faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name], squares=True)
         scale = options.get("vertical_scale")
         if scale is not None and not (name == "cube_counts" and scale == "range"):
             problems.number("vertical_scale", scale, above=0)

@@ -336,3 +336,17 @@ def test_the_room_loads_nothing_heavy():
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("factor", [2.0**530, 2.0**-530])
+def test_heights_whose_squares_are_no_numbers(rough, factor):
+    """Exponents know no unit; the curves, which are in m2 and m4, refuse."""
+    far = rough.copy(data=rough.values * factor)
+    unitless = [name for name in NAMES if name != "covering"]
+    here, there = estimate(rough, unitless), estimate(far, unitless)
+    np.testing.assert_array_equal(here.hurst, there.hurst)
+    np.testing.assert_array_equal(here.rms_increment * factor, there.rms_increment)
+    assert np.isfinite(estimate(far, "covering").hurst).all()
+    for curve in ("spectrum", "variogram", "second_variogram", "cube_counts", "roughness_length"):
+        with pytest.raises(InvalidInput, match="whose squares are numbers"):
+            getattr(fc.dimensions, curve)(far)
