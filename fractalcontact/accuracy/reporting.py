@@ -16,30 +16,69 @@ if TYPE_CHECKING:
 
 
 def curves_table(measured: xr.DataTree) -> str:
-    """Return error and seconds of every method at every setting, part by part.
+    """Return error, seconds and memory of every method at every setting, contest by contest.
 
-    A star marks the frontier: no other method of the part reached as small an error in as short a time.
+    A star marks the frontier: no other method of the contest came as near in as little time.
     """
     parts = []
     for name, node in measured.children.items():
         data = node.to_dataset()
-        notes = data["error"].attrs
-        rows: list[tuple[str, ...]] = [
-            ("method", notes["knob"], "error", "seconds", "first call", "frontier")
-        ]
-        errors, seconds = data["error"].values, data["run_time"].values
-        for row, method in enumerate(data["method"].values):
-            for column, knob in enumerate(data["knob"].values):
-                error, time = errors[row, column], seconds[row, column]
-                if np.isfinite(error):
-                    beaten = ((errors < error) & (seconds <= time)).any()
-                    first = float(data["first_run_time"][row, column])
-                    mark = "" if beaten else "*"
-                    rows.append(
-                        (str(method), f"{knob:g}", f"{error:.3g}", f"{time:.2e}", f"{first:.2e}", mark)
+        contests = data["contest"].values
+        for contest in dict.fromkeys(contests.tolist()):
+            one = data.isel(method=contests == contest)
+            rows: list[tuple[str, ...]] = [
+                (
+                    "method",
+                    str(one["knob_name"].values[0]),
+                    "error",
+                    "seconds",
+                    "first call",
+                    "memory",
+                    "frontier",
+                )
+            ]
+            for method in one["method"].values:
+                row = one.sel({"method": method})
+                rows += [
+                    (
+                        str(method),
+                        f"{float(row['knob'][k]):g}",
+                        f"{float(row['error'][k]):.3g}",
+                        f"{float(row['run_time'][k]):.2e}",
+                        f"{float(row['first_run_time'][k]):.2e}",
+                        f"{float(row['memory'][k]) / 1e6:.3g} MB",
+                        "*" if bool(row["on_frontier"][k]) else "",
                     )
-        parts.append(f"{name}: {notes['error']}\nagainst {notes['truth']}\n{table(rows)}")
-    return "\n\n".join(parts)
+                    for k in range(row.sizes["setting"])
+                    if np.isfinite(row["error"][k])
+                ]
+            head = f"{name}, {contest}: {one['error_meaning'].values[0]}\nagainst {one['truth'].values[0]}"
+            parts.append(f"{head}\n{table(rows)}")
+    return "\n\n".join([*parts, choice_table(measured)])
+
+
+def choice_table(measured: xr.DataTree) -> str:
+    """Return which methods are worth choosing: on the frontier of their contest at which settings."""
+    rows: list[tuple[str, ...]] = [("room", "contest", "method", "on the frontier", "least error", "in")]
+    for name, node in measured.children.items():
+        data = node.to_dataset()
+        for method in data["method"].values:
+            one = data.sel({"method": method})
+            alone = int((data["contest"] == one["contest"]).sum()) == 1
+            count = int(np.isfinite(one["error"]).sum())
+            held = int(one["on_frontier"].sum())
+            best = int(np.nanargmin(one["error"].values))
+            rows.append(
+                (
+                    name,
+                    str(one["contest"].values),
+                    str(method),
+                    "alone" if alone else f"{held} of {count}" if held else "never worth choosing",
+                    f"{float(one['error'][best]):.2g}",
+                    f"{float(one['run_time'][best]):.2g} s",
+                )
+            )
+    return table(rows)
 
 
 def estimators_table(bench: xr.Dataset) -> str:

@@ -17,21 +17,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-COLUMNS = 2
 MARKERS = "osD^vP*"
+MEGABYTE = 1e6
 
 
 @_style.styled
 def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
-    """Draw true error against run time, a panel for each part and a curve for each method.
+    """Draw true error against run time and against memory: a row for each contest, a curve for each method.
 
-    Further down is more accurate, further to the left is faster; each point is one setting of the method.
+    Further down is nearer to the truth, further to the left is cheaper; each point is one setting of the
+    method. A filled one is on the frontier: no other method of the contest came as near in as little time.
 
     Parameters
     ----------
     measured : DataTree or Dataset
-        From `fractalcontact.accuracy.measure`, or one of its groups: error and run_time (s) over
-        (method, knob). What the error means is read from the attributes of `error`.
+        From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
+        on_frontier over (method, setting), contest and error_meaning over method.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -44,53 +45,65 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
     InvalidInput
         There is nothing that was measured.
     """
-    parts = _parts(measured)
-    columns = min(len(parts), COLUMNS)
-    rows = -(-len(parts) // columns)
-    sheet = _style.sheet(figure, (4.9 * columns, 3.2 * rows))
-    axes = sheet.subplots(rows, columns, squeeze=False).ravel()
-    for ax in axes[len(parts) :]:
-        ax.set_axis_off()
-    for ax, (name, data) in zip(axes, parts.items(), strict=False):
-        _style.dress(ax)
-        _curves(ax, data)
-        meaning = textwrap.fill(str(data["error"].attrs.get("error", "")), 62)
-        ax.set_title("\n".join(line for line in (name, meaning) if line), fontsize=8)
+    contests = _contests(measured)
+    sheet = _style.sheet(figure, (8.6, 2.7 * len(contests)))
+    axes = sheet.subplots(len(contests), 2, squeeze=False, sharey="row")
+    for (left, right), (name, data) in zip(axes, contests.items(), strict=True):
+        seconds = scale_for("s", table(data, "run_time", PLANE))
+        _curves(left, data, seconds(table(data, "run_time", PLANE)))
+        left.set_xlabel(axis_label(data["run_time"], seconds))
+        left.set_ylabel("true error")
+        entries = _curves(right, data, table(data, "memory", PLANE) / MEGABYTE)
+        right.set_xlabel("peak memory (MB)")
+        right.tick_params(labelleft=False)
+        _style.beside(right, entries)
+        meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
+        left.set_title(f"{name}\n{meaning}", fontsize=8)
     return _style.root(sheet)
 
 
-def _parts(measured: Any) -> dict[str, xr.Dataset]:
+PLANE = ("method", "setting")
+
+
+def _contests(measured: Any) -> dict[str, xr.Dataset]:
+    """Return what was measured, contest by contest."""
     import xarray as xr
 
     if isinstance(measured, xr.DataTree) and measured.children:
-        found = {name: node.to_dataset() for name, node in measured.children.items()}
+        found = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
         found = {"": as_dataset(measured, "error_against_time")}
     with Problems("fc.plotting.error_against_time") as problems:
         for data in found.values():
-            for name in ("error", "run_time"):
-                problems.require(name in data, "measured", f"the variable {name!r}", list(data.variables))
-    return found
+            for name in ("error", "run_time", "memory", "on_frontier", "contest", "error_meaning"):
+                problems.require(
+                    name in data.variables, "measured", f"the variable {name!r}", list(data.variables)
+                )
+    contests = {}
+    for part, data in found.items():
+        names = np.asarray(words(data["contest"]))
+        for name in dict.fromkeys(names.tolist()):
+            contests[f"{part}{name}"] = data.isel(method=np.flatnonzero(names == name))
+    return contests
 
 
-def _curves(ax: Axes, data: xr.Dataset) -> None:
-    dims = ("method", "knob")
-    errors, seconds = table(data, "error", dims), table(data, "run_time", dims)
-    scale = scale_for("s", seconds)
+def _curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
+    """Draw error against a cost, a curve for each method; return the entries of the legend."""
+    _style.dress(ax)
+    errors, best = table(data, "error", PLANE), table(data, "on_frontier", PLANE).astype(bool)
     entries = []
     for row, name in enumerate(words(data["method"])):
-        known = np.isfinite(errors[row]) & np.isfinite(seconds[row])
+        known = np.isfinite(errors[row]) & np.isfinite(cost[row])
         look: dict[str, Any] = {
             "color": _style.CYCLE[row % len(_style.CYCLE)],
             "marker": MARKERS[row % len(MARKERS)],
         }
-        ax.plot(scale(seconds[row][known]), errors[row][known], **look)
+        ax.plot(cost[row][known], errors[row][known], **look, markerfacecolor="white")
+        ax.plot(cost[row][known & best[row]], errors[row][known & best[row]], **look, ls="")
         entries.append(_style.line_entry(name.replace("_", " "), **look))
-    _style.log_scale(ax, x=seconds, y=errors)
+    _style.log_scale(ax, x=cost, y=errors)
     _style.plain_ticks(ax)
-    ax.set_xlabel(axis_label(data["run_time"], scale))
-    ax.set_ylabel("true error")
-    _style.beside(ax, entries)
+    return entries
 
 
 @_style.styled

@@ -6,35 +6,100 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.accuracy.experiments import PARTS
-from fractalcontact.accuracy.reporting import curves_table
+from fractalcontact.accuracy import measuring
+from fractalcontact.accuracy.reporting import choice_table, curves_table
+from fractalcontact.accuracy.trials.trial import Contest, Experiment
 from fractalcontact.base.errors import InvalidInput
 
 
-@pytest.mark.parametrize("part", list(PARTS))
+@pytest.mark.parametrize("part", list(measuring.PARTS))
 def test_each_part_is_measured_within_its_budget(part):
     start = time.perf_counter()
-    tree = fc.accuracy.measure(part, budget=4)
+    tree = fc.accuracy.measure(part, budget=2)
     assert time.perf_counter() - start < 60
     data = tree[part].to_dataset()
-    assert data["error"].dims == ("method", "knob")
+    assert data["error"].dims == ("method", "setting")
     measured = np.isfinite(data["error"].values)
     assert measured.any(axis=1).all()
     assert (data["run_time"].values[measured] > 0).all()
+    assert (data["memory"].values[measured] > 0).all()
     assert (data["first_run_time"].values[measured] >= data["run_time"].values[measured]).all()
-    assert data["error"].attrs["truth"]
+    assert all(data[name].values.all() for name in ("truth", "error_meaning", "knob_name", "contest"))
     assert part in curves_table(tree)
 
 
+def test_every_public_method_is_measured():
+    names = {
+        part: [one.method for c in measuring.contests(part) for one in c.experiments]
+        for part in measuring.PARTS
+    }
+    for generator in ("fbm", "spectral", "midpoint", "weierstrass"):
+        assert generator in names["surfaces"]
+    assert set(fc.dimensions.methods()) <= set(names["dimensions"])
+    assert all(len(set(found)) == len(found) for found in names.values())
+
+
+def stub(method, seconds, errors):
+    """An experiment whose run times and errors are known."""
+    return Experiment(
+        method,
+        range(len(errors)),
+        int,
+        lambda knob: time.sleep(seconds[knob]) or np.ones(1000 * (knob + 1)).sum(),
+        lambda _, knob: errors[int(knob)],
+    )
+
+
+def test_frontier_memory_and_choice_of_known_methods(monkeypatch):
+    quick = stub("quick", [0.01, 0.04], [0.1, 0.02])
+    slow = stub("slow", [0.03, 0.08], [0.2, 0.05])
+    fine = stub("fine", [0.06], [0.001])
+    alone = stub("other", [0.01], [0.5])
+    part = (Contest("one", "of it", "known", (quick, slow, fine)), Contest("two", "of it", "known", (alone,)))
+    monkeypatch.setattr(measuring, "contests", lambda name: part)
+    tree = fc.accuracy.measure("contact", budget=20)
+    data = tree["contact"].to_dataset()
+    for method, expected in {"quick": [1, 1], "slow": [0, 0], "fine": [1], "other": [1]}.items():
+        row = data.sel({"method": method})
+        assert row["on_frontier"].values[: len(expected)].tolist() == expected, method
+    assert data["share_on_frontier"].values.tolist() == [1.0, 0.0, 1.0, 1.0]
+    np.testing.assert_allclose(data["memory"].sel({"method": "quick"}), [8000, 16000], rtol=0.2)
+    np.testing.assert_allclose(data["run_time"].sel({"method": "slow"}), [0.03, 0.08], rtol=0.3)
+    lines = [line for line in choice_table(tree).splitlines() if "never worth choosing" in line]
+    assert len(lines) == 1
+    assert "slow" in lines[0]
+
+
+def test_what_is_given_is_compared_at_the_same_size_only():
+    error = np.array([[0.4, 0.2, 0.1], [0.5, 0.3, np.nan]])
+    seconds = np.array([[1.0, 2.0, 3.0], [2.5, 9.0, np.nan]])
+    sizes = np.array([[8.0, 16.0, 32.0]] * 2)
+    free = measuring.on_frontier(error, seconds, ["a", "a"], 0 * sizes)
+    assert free.tolist() == [[True, True, True], [False, False, False]]
+    seconds[1, 0] = 0.5
+    given = measuring.on_frontier(error, seconds, ["a", "a"], sizes)
+    assert given.tolist() == [[True, True, True], [True, False, False]]
+
+
 def test_the_error_of_the_solver_falls_with_the_spacing():
-    data = fc.accuracy.measure("contact", budget=20)["contact"].to_dataset()
-    square = data["error"].sel({"method": "fast, square"}).dropna("knob")
-    assert square.values[-1] < 0.1 * square.values[0]
+    data = fc.accuracy.measure("contact", budget=12)["contact"].to_dataset()
+    square = data["error"].sel({"method": "fast, square"}).dropna("setting")
+    assert square.values[-1] < 0.5 * square.values[0]
     paper, fast = (
-        data["error"].sel({"method": name}).dropna("knob") for name in ("elimination, disc", "fast, disc")
+        data.sel({"method": name}).dropna("setting") for name in ("elimination, disc", "fast, disc")
     )
     common = np.intersect1d(paper["knob"], fast["knob"])
-    np.testing.assert_allclose(paper.sel(knob=common), fast.sel(knob=common), atol=1e-6)
+    assert common.size
+    both = [one["error"].values[np.isin(one["knob"], common)] for one in (paper, fast)]
+    np.testing.assert_allclose(*both, atol=1e-6)
+
+
+def test_a_file_of_all_is_clean(tmp_path, compliance):
+    tree = fc.accuracy.measure("joints", budget=1)
+    tree["joints"].to_dataset().to_netcdf(tmp_path / "joints.nc")
+    assert compliance(tmp_path / "joints.nc") == []
+    fc.save(tree, tmp_path / "accuracy.nc")
+    assert fc.open(tmp_path / "accuracy.nc")["joints"].to_dataset().identical(tree["joints"].to_dataset())
 
 
 def test_unknown_parts_and_budgets_are_refused():

@@ -210,12 +210,15 @@ def accuracy():
 
     knob = np.array([8.0, 16.0, 32.0, 64.0])
     error = np.array([1 / knob, 4 / knob**2])
-    error[0, 3] = np.nan
-    dims = ("method", "knob")
-    data = {"error": (dims, error), "run_time": (dims, 1e-6 * knob**2 * np.array([[1.0], [3.0]]))}
-    part = label(xr.Dataset(data, coords={"method": ["plain", "fast, disc"], "knob": knob}))
-    part["error"].attrs["error"] = "relative error of the force"
-    return xr.DataTree.from_dict({"/contact": part, "/joints": part * 1})
+    error[1, -1] = np.nan
+    dims = ("method", "setting")
+    seconds = 1e-6 * knob**2 * np.array([[1.0], [3.0]])
+    data = {"error": (dims, error), "run_time": (dims, seconds), "memory": (dims, 1e8 * seconds)}
+    data["on_frontier"] = (dims, np.array([[True, True, False, False], [False, True, True, False]]))
+    coords = {"method": ["plain", "fast, disc"], "setting": np.arange(4)}
+    coords |= {"contest": ("method", ["sphere", "sphere"]), "error_meaning": ("method", ["of the force"] * 2)}
+    part = label(xr.Dataset(data, coords=coords))
+    return xr.DataTree.from_dict({"/contact": part, "/joints": part.copy()})
 
 
 def study():

@@ -154,13 +154,17 @@ def test_box_dimension_with_a_wide_interval_or_none_is_an_open_point(made, close
 def test_error_against_time_shows_what_was_measured(made):
     measured = made.accuracy()
     axes = plotting.error_against_time(measured).axes
-    for ax, (name, part) in zip(axes, measured.children.items(), strict=True):
-        assert ax.get_title(loc="left").startswith(name)
-        seconds = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", ax.get_xlabel()).group(1)]
-        for line, method in zip(ax.lines, part.method.values, strict=True):
-            one = part.to_dataset().sel({"method": method}).dropna("knob")
-            assert np.asarray(line.get_xdata()) * seconds == pytest.approx(one.run_time.values)
-            assert np.array_equal(line.get_ydata(), one.error.values)
+    for left, right, (name, part) in zip(axes[::2], axes[1::2], measured.children.items(), strict=True):
+        assert left.get_title(loc="left").startswith(f"{name}: sphere")
+        unit = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", left.get_xlabel()).group(1)]
+        for row, method in enumerate(part.method.values):
+            one = part.to_dataset().sel({"method": method}).dropna("setting")
+            best = one.isel(setting=one.on_frontier.values)
+            for ax, cost, scale in ((left, "run_time", unit), (right, "memory", 1e6)):
+                line, filled = ax.lines[2 * row : 2 * row + 2]
+                assert np.asarray(line.get_xdata()) * scale == pytest.approx(one[cost].values)
+                assert np.array_equal(line.get_ydata(), one.error.values)
+                assert np.array_equal(filled.get_ydata(), best.error.values)
 
 
 def test_lacunarity_shows_every_step_and_its_dust(made, closed):
