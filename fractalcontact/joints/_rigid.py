@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.polynomial import slopes
 from fractalcontact.joints._sliding import Block, Pair, heights_under
-from fractalcontact.surfaces._polynomial import slopes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

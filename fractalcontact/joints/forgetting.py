@@ -133,7 +133,7 @@ def _without_rounding(residual: Array, heights: Array) -> Array:
 
 
 def _sums(crack: Crack, shears: Array, towards: Direction) -> Any:
-    from fractalcontact.surfaces._polynomial import detrended
+    from fractalcontact.base.polynomial import detrended
 
     layout = crack.layout
     order = 0 if any(layout.wraps) else 1

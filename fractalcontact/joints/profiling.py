@@ -68,7 +68,7 @@ def roughness_coefficient(
     """
     import xarray as xr
 
-    from fractalcontact.surfaces._polynomial import detrended
+    from fractalcontact.base.polynomial import detrended
 
     with Problems(WHERE) as problems:
         grid = check_surface(face, problems, "face", finite=False)

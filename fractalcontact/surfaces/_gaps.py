@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.surfaces._polynomial import shifted
+from fractalcontact.base.polynomial import shifted
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import spectra
-from fractalcontact.surfaces._polynomial import shifted, slopes
+from fractalcontact.base.polynomial import shifted, slopes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

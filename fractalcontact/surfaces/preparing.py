@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base import provenance, schema
+from fractalcontact.base import polynomial, provenance, schema
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface
-from fractalcontact.surfaces import _gaps, _polynomial
+from fractalcontact.surfaces import _gaps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +51,7 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
         if not problems.found:
             planes = _planes(problems, surface, len(grid.shape))
             parts = [
-                _polynomial.detrended(plane, degree) if _any(plane) else (plane, False) for plane in planes
+                polynomial.detrended(plane, degree) if _any(plane) else (plane, False) for plane in planes
             ]
             lost = sum(not fixed for _, fixed in parts)
             where = "" if len(parts) == 1 else f" ({lost} of {len(parts)} planes)"
