@@ -8,6 +8,7 @@ from .domain_maps import islands as islands
 from .drawing import draw as draw
 from .lacunar import box_dimension as box_dimension
 from .lacunar import lacunarity as lacunarity
+from .lacunar import local_slopes as local_slopes
 from .leakage import hydraulic_aperture as hydraulic_aperture
 from .paper import paper_figure as paper_figure
 from .relief import face as face
@@ -37,6 +38,7 @@ __all__ = [
     "island_map",
     "islands",
     "lacunarity",
+    "local_slopes",
     "paper_figure",
     "rigid_dilatancy",
     "sliding_scheme",

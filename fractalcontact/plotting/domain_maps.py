@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 COLUMNS = 3
+CURVES = 8  # of the distributions of many masks
 PALETTE = 12  # colours of neighbouring islands
 
 
@@ -117,7 +118,7 @@ def islands(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.islands`: label (y, x), and area (m2) over `island`. Of several masks
-        the last one with an island is mapped, and each gets a curve.
+        the last one with an island is mapped, and each gets a curve; of more than eight some do.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -207,6 +208,7 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
         _style.say(ax, "no island")
         return
     title, groups = _island_groups(data, areas)
+    groups = [groups[place] for place in _style.chosen(len(groups), CURVES)]
     colours = _style.family(len(groups))
     for (_, group), colour in zip(groups, colours, strict=True):
         ordered = np.sort(group[np.isfinite(group)])[::-1]
@@ -230,7 +232,7 @@ def _island_groups(data: xr.Dataset, areas: Any) -> tuple[str, list[tuple[str, A
     _, group = np.unique(np.stack([inverse for _, inverse in columns], -1), axis=0, return_inverse=True)
     parts = [areas[group.ravel() == number] for number in range(group.max() + 1)]
     title, texts = "", [str(number) for number in range(len(parts))]
-    if len(names) == 1 and names[0] in ("shear", "step") and names[0] in data.coords:
+    if len(names) == 1 and names[0] in ("shear", "step") and names[0] in data.dims:
         title, every = (shear_words if names[0] == "shear" else load_words)(data)
         places = [nearest(data[names[0]], value) for value in columns[0][0]]
         texts = [every[place] for place in places] if every else texts

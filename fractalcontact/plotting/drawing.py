@@ -61,6 +61,8 @@ def drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
     for path, name, drawing in (
         ("joints/friction", "friction", _friction),
         ("domains/box_dimension", "box_dimension", lacunar.box_dimension),
+        ("domains/minkowski_dimension", "minkowski_dimension", lacunar.box_dimension),
+        ("domains/correlation_dimension", "correlation_dimension", lacunar.box_dimension),
         ("domains/lacunarity", "lacunarity", _lacunarity),
         ("domains/islands", "islands", domain_maps.islands),
         ("joints/transmissivity", "hydraulic_aperture", leakage.hydraulic_aperture),
@@ -69,6 +71,9 @@ def drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
         data = group(tree, path)
         if data is not None:
             yield name, _later(drawing, data)
+    counted = group(tree, "domains/box_dimension")
+    if counted is not None and "local_slope" in counted:
+        yield "local_slopes", _later(_local_slopes, counted)
     pressed = group(tree, "contact")
     if pressed is not None and "state" in pressed:
         yield "contact_domains", _later(domain_maps.contact_domains, pressed)
@@ -94,6 +99,10 @@ def _friction(data: xr.Dataset) -> Figure:
 
 def _lacunarity(data: xr.Dataset) -> Figure:
     return lacunar.lacunarity(data, shear=shown_shear(data))
+
+
+def _local_slopes(data: xr.Dataset) -> Figure:
+    return lacunar.local_slopes(data, shear=shown_shear(data))
 
 
 def _write(figure: Figure, target: Path) -> Path:

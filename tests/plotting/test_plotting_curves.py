@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
@@ -271,3 +272,41 @@ def test_the_callers_settings_are_left_alone(closed):
     before = dict(matplotlib.rcParams)
     plotting.closure_laws(closed)
     assert dict(matplotlib.rcParams) == before
+
+
+def test_local_slopes_show_the_level_parts_and_those_of_the_dust():
+    sizes = np.array([1, 2, 4, 8])
+    count = 64.0 * sizes[None, :] ** -np.array([[1.2], [1.5]])
+    dust = 64.0 * sizes[None, :] ** -np.array([[0.5], [1.0]])
+    result = xr.Dataset(
+        {
+            "local_slope": (("step", "box_size"), np.array([[1.2] * 4, [1.5] * 4])),
+            "box_count": (("step", "box_size"), count),
+            "dust_count": (("step", "box_size"), dust),
+        },
+        coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
+    )
+    (ax,) = plotting.local_slopes(result).axes
+    lines = [line.get_ydata() for line in ax.lines]
+    for line, want in zip(lines, (1.2, 0.5, 1.5, 1.0), strict=True):
+        assert line == pytest.approx(np.full(4, want))
+    low, high = ax.get_ylim()
+    assert low < 0
+    assert high > 2
+    steep = result.assign(local_slope=result["local_slope"] + 2.0)
+    assert plotting.local_slopes(steep).axes[0].get_ylim()[1] > 3.5
+
+
+def test_other_dimensions_of_a_domain_are_drawn_alike():
+    result = xr.Dataset(
+        {
+            "minkowski_dimension": ("step", np.array([0.5, 1.5])),
+            "dust_dimension": ("step", np.array([0.2, 1.0])),
+        },
+        coords={"normal_force": ("step", np.array([1.0, 2.0]), {"units": "N"})},
+    )
+    (ax,) = plotting.box_dimension(result).axes
+    assert ax.lines[0].get_ydata() == pytest.approx([0.5, 1.5])
+    assert "inkowski" in ax.get_ylabel()
+    empty = result.assign(minkowski_dimension=result["minkowski_dimension"] * np.nan)
+    assert plotting.box_dimension(empty).axes[0].texts[0].get_text() == "no contact"
