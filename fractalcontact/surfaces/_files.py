@@ -37,33 +37,61 @@ def opened(path: Path) -> IO[bytes]:
         raise UnreadableFile("fractalcontact.surfaces.read", [message]) from error
 
 
-class NoNumbers(ValueError):
+class NoTable(ValueError):
+    """A text is no table of numbers; the message names the line and the column."""
+
+
+class NoNumbers(NoTable):
     """A text file is empty."""
 
 
 def read_table(path: Path) -> Array:
-    """Return the numbers of a text file, one row to a line; raise ValueError where it is not such a table.
+    """Return the numbers of a text file, one row to a line; raise NoTable where it is not such a table.
 
-    Values stand between blanks, tabs, commas or semicolons; empty cells and words like "nan" are missing; `#`
-    starts a comment.
+    Values stand between semicolons, tabs, commas or blanks, with or without quotes; `#` starts a comment; a
+    mark at the end of every line stands for nothing. Cells that are empty or one of `MISSING` are NaN.
     """
     with opened(path) as file:
-        text = file.read().decode("utf-8-sig")
-    first = next((line for line in text.splitlines() if line.split("#")[0].strip()), "")
-    delimiter = next((mark for mark in ",;\t" if mark in first), None)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # an empty file
-        table = np.loadtxt(
-            io.StringIO(text), delimiter=delimiter, converters=_number, ndmin=2, encoding="utf-8"
-        )
-    if table.size == 0:
+        try:
+            text = file.read().decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise NoTable(f"it is no text: byte {error.start} is not UTF-8") from error
+    lines = [
+        (number, content)
+        for number, line in enumerate(text.splitlines(), 1)
+        if (content := line.partition("#")[0].strip(" \r\n"))
+    ]
+    if not lines:
         raise NoNumbers("no numbers in it")
-    return np.asarray(table)
+    delimiter = next((mark for mark in ";\t," if mark in lines[0][1]), None)
+    try:
+        # the fast way, for a table in which nothing is missing
+        return np.loadtxt([content for _, content in lines], delimiter=delimiter, ndmin=2, comments=None)
+    except ValueError:
+        return _parsed([(number, content.split(delimiter)) for number, content in lines], delimiter)
 
 
-def _number(cell: str) -> float:
-    word = cell.strip()
-    return math.nan if word.lower() in MISSING else float(word)
+def _parsed(rows: list[tuple[int, list[str]]], delimiter: str | None) -> Array:
+    """Turn the cells of each line into numbers, one after the other."""
+    if delimiter and all(len(cells) > 1 and not cells[-1].strip() for _, cells in rows):
+        rows = [(number, cells[:-1]) for number, cells in rows]
+    (first, head), found = rows[0], []
+    for number, cells in rows:
+        if len(cells) != len(head):
+            raise NoTable(f"line {number} has {len(cells)} values, line {first} has {len(head)}")
+        found.append([_number(cell, number, column) for column, cell in enumerate(cells, 1)])
+    return np.array(found)
+
+
+def _number(cell: str, line: int, column: int) -> float:
+    word = cell.strip().strip("\"'").strip()
+    if word.lower() in MISSING:
+        return math.nan
+    try:
+        return float(word.replace("_", "?"))
+    except ValueError:
+        hint = ", a decimal comma" if "," in word else ""
+        raise NoTable(f"line {line}, column {column}: expected a number, got {word[:40]!r}{hint}") from None
 
 
 def read_npy(path: Path) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import warnings
 from collections.abc import Sequence
@@ -138,9 +139,11 @@ def read(
     ----------
     path : path-like
         NetCDF (`.nc`): the variable `height`. numpy (`.npy`) or a table of numbers in text (`.csv`, `.txt`
-        ..., between commas, semicolons, tabs or blanks): rows are y, and `spacing` must be given. Anything
-        else, and text without `spacing`: an instrument's file, read by SurfaceTopography (extra `io`).
-        Files packed with gzip (`.gz`) are unpacked on the fly.
+        ..., between semicolons, tabs, commas or blanks): rows are y, and `spacing` must be given. Cells that
+        are empty, or one of nan, na, n/a, null, none, --, are missing; any other that is no number is an
+        error, which names its line and column; a line of names is not skipped. Anything else, and text
+        without `spacing`: an instrument's file, read by SurfaceTopography (extra `io`). Files packed with
+        gzip (`.gz`) are unpacked on the fly.
     channel : str or int, optional
         Channel of an instrument's file, or variable of a NetCDF file. Default: the first height channel.
     units : str, optional
@@ -188,8 +191,11 @@ def read(
     if suffix in NETCDF:
         surface, facts, microscope = _netcdf(source, channel, units, steps)
     else:
-        found = _table(source, suffix, units, steps, first_row) if table else None
-        surface, facts, microscope = found or _instrument(source, channel, units, steps)
+        surface, facts, microscope = (
+            _table(source, suffix, channel, units, steps, first_row)
+            if table
+            else _instrument(source, channel, units, steps)
+        )
     stated = facts["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
@@ -215,21 +221,39 @@ Read = tuple["xr.DataArray", dict[str, Any], bool]
 
 
 def _table(
-    path: Path, suffix: str, units: str | None, spacing: tuple[float, ...] | None, first_row: str
-) -> Read | None:
-    """Read an array of numbers; None where a text is not a table."""
+    path: Path,
+    suffix: str,
+    channel: str | int | None,
+    units: str | None,
+    spacing: tuple[float, ...] | None,
+    first_row: str,
+) -> Read:
+    """Read an array of numbers; a text that is none may be the file of an instrument that states its size."""
     try:
         values = _files.read_npy(path) if suffix == ".npy" else _files.read_table(path)
     except ValueError as error:
-        if suffix in TABLES and not isinstance(error, _files.NoNumbers):
-            return None
+        if isinstance(error, _files.NoTable) and not isinstance(error, _files.NoNumbers):
+            with contextlib.suppress(UnreadableFile, MissingExtra):
+                found = _instrument(path, channel, units, spacing)
+                # lists of points have a size too, whatever the lines are
+                if found[1]["stated_size"] is not None and found[1]["format"] != "xyz":
+                    return found
+        kind = "is corrupt" if suffix == ".npy" else "is no table of numbers"
         raise UnreadableFile(
-            "fractalcontact.surfaces.read", [f"path: {path.name!r} is corrupt ({error})"]
+            "fractalcontact.surfaces.read", [f"path: {path.name!r} {kind} ({error})"]
         ) from error
     with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
         problems.require(
             spacing is not None, "spacing", f"the spacing in metres, which {path.name!r} has not", None
         )
+        infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
+        problems.require(
+            infinite == 0, "path", "finite heights, or NaN where missing", f"{infinite} infinite"
+        )
+        if suffix != ".npy":
+            problems.require(
+                min(values.shape) > 1, "path", "a grid of heights, one row to a line", f"shape {values.shape}"
+            )
         if suffix != ".npy" and values.shape[1] == 3 and values.shape[0] > 9:
             problems.add(
                 "path",

@@ -127,6 +127,37 @@ def test_empty_cells_are_missing(tmp_path):
     np.testing.assert_array_equal(surface.values, [[1, np.nan, 3], [4, 5, np.nan]])
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("1,2,3\n4,abc,6\n7,8,9\n", "line 2, column 2: expected a number, got 'abc'"),
+        ("left,right\n1,2\n3,4\n", "line 1, column 1: expected a number, got 'left'"),
+        ("# made by hand\n1 2 3\n4 5\n6 7 8\n", "line 3 has 2 values, line 2 has 3"),
+        ("1;2,5;3\n4;5;6\n", "line 1, column 2: .* a decimal comma"),
+        ("1,2\n3,4 um\n", "line 2, column 2: expected a number, got '4 um'"),
+        ("1,2\n3,1_0\n", "line 2, column 2"),
+        ("1,2\n3,-\n", "line 2, column 2"),
+        ("1,2\n3,inf\n", "1 infinite"),
+        ("1,2,3\n", "a grid of heights"),
+        ("1\n2\n3\n", "a grid of heights"),
+        ("", "no numbers in it"),
+        ("# nothing\n", "no numbers in it"),
+    ],
+)
+@pytest.mark.parametrize("units", [None, "um"])
+def test_what_is_no_table_is_refused_at_its_cell(tmp_path, text, told, units):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(UnreadableFile, match=told) as caught:
+        fc.surfaces.read(tmp_path / "a.csv", spacing=1.0, units=units)
+    assert "reader" not in str(caught.value)
+
+
+def test_missing_marks_quotes_and_marks_at_the_end_of_lines(tmp_path):
+    (tmp_path / "a.csv").write_text('"1", NA ,null,\n--,"nan",6,\n')
+    surface = fc.surfaces.read(tmp_path / "a.csv", spacing=1.0)
+    np.testing.assert_array_equal(surface.values, [[1, np.nan, np.nan], [np.nan, np.nan, 6]])
+
+
 def test_a_list_of_points_is_not_taken_for_a_grid(tmp_path):
     np.savetxt(tmp_path / "points.csv", np.random.default_rng(0).random((50, 3)), delimiter=",")
     with pytest.raises(UnreadableFile, match="x, y, z"):
