@@ -56,8 +56,9 @@ def box_dimension(
     -------
     Dataset
         Over the leading dims of the mask: `box_dimension`; `ci_low` and `ci_high`, two standard deviations
-        of the local slopes to either side (a statement about how well a power law holds over the window,
-        NaN where fewer than two slopes speak); `scale_min`, `scale_max` (cells); `coverage`;
+        of the local slopes to either side and, in the default call, a part of what the fewest boxes and
+        their mean differ by (NaN where fewer than two slopes speak); `scale_min`, `scale_max` (cells);
+        `coverage`;
         `dust_dimension`, the same fit to the expected counts of as many cells thrown at random, with the
         standard deviation `dust_spread` from dust to dust; `differs_from_dust`, whether the mean counts at
         sizes 2 to 4 are out of reach for a dust. Over `box_size` (cells) too, with `box_length` (m, the
@@ -77,6 +78,11 @@ def box_dimension(
     An empty plane gives NaN, with the reason in the attributes. A dimension needs a stated window of scales:
     over the full range, the counts of any set measure little but its coverage, which is why the dust's
     value stands beside it. A single island of a few cells is a point at scales above its size.
+
+    The default interval holds the dimension of 98 % of sets in 250 x 250 to 1024 x 1024 cells (96 % with the
+    cover "mean"): self-similar sets of ratio 2 to 5, fixed and drawn anew at every level, placed and turned
+    at random, fractal percolation, spanning clusters of site percolation, lines, circles and von Koch
+    curves. It does not where the sampling ends before the cell does, as for too short a Levy flight.
     """
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.box_dimension") as problems:
@@ -101,7 +107,8 @@ def box_dimension(
         "dust_count": planes.variable(null["dust_count"], "box_size"),
         "run_time": ((), time.perf_counter() - begin),
     }
-    dataset = assemble(planes, variables, _size_coords(sizes, planes), notes=_notes(known, sizes))
+    notes = _notes(known, sizes, chosen=scales is not None or cover == "aligned")
+    dataset = assemble(planes, variables, _size_coords(sizes, planes), notes=notes)
     parameters = {"mask": mask, "scales": scales, "cover": cover, "periodic": periodic, "valid": valid}
     return stamp(
         dataset, "fractalcontact.domains.box_dimension", parameters, title="Box dimension", references=SOURCE
@@ -236,8 +243,9 @@ def _region(planes: Planes, sizes: Array) -> Array:
     return np.where(seen > 0, everything.occupied[:, None] / np.where(seen > 0, seen, 1.0), 0.0)
 
 
-def _notes(known: Array, sizes: Array) -> dict[str, dict[str, str]]:
+def _notes(known: Array, sizes: Array, *, chosen: bool) -> dict[str, dict[str, str]]:
     interval = "two standard deviations of the local slopes"
+    interval += "" if chosen else ", and what two covers differ by"
     notes = {
         "ci_low": {"long_name": f"lower end of the interval of the box dimension ({interval})"},
         "ci_high": {"long_name": f"upper end of the interval of the box dimension ({interval})"},

@@ -2,6 +2,7 @@
 
 import numpy as np
 import xarray as xr
+from scipy import ndimage
 
 from fractalcontact.base.grid import plane_coords
 
@@ -43,6 +44,26 @@ def random_lattice_set(keep, base, level, rng):
         parts = (rank < keep).reshape(n, n, base, base) & cells[:, :, None, None]
         cells = parts.transpose(0, 2, 1, 3).reshape(n * base, n * base)
     return cells
+
+
+def percolating_cluster(n, rng):
+    """Return a cluster of site percolation at the threshold that spans most of the plane (D = 91/48)."""
+    while True:
+        labels, _ = ndimage.label(rng.random((n, n)) < 0.592746)
+        cluster = labels == np.bincount(labels.ravel())[1:].argmax() + 1
+        if min(np.ptp(places) for places in np.nonzero(cluster)) > 0.9 * n:
+            return cluster
+
+
+def thinned(keep, ratio, levels, rng):
+    """Return fractal percolation, D = 2 + ln(keep)/ln(ratio): every part of every part stays with `keep`."""
+    while True:
+        cells = np.ones((1, 1), bool)
+        for _ in range(levels):
+            cells = np.kron(cells, np.ones((ratio, ratio), bool))
+            cells &= rng.random(cells.shape) < keep
+        if cells.sum() > 30:
+            return cells
 
 
 def placed(cells, n, rng):

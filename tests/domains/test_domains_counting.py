@@ -11,9 +11,11 @@ from domains.sets import (
     koch_raster,
     lattice_set,
     level_set,
+    percolating_cluster,
     placed,
     random_dust,
     random_lattice_set,
+    thinned,
 )
 
 import fractalcontact as fc
@@ -161,6 +163,32 @@ def test_interval_holds_the_dimension_of_fractals_placed_anywhere(n, cover):
             result = fc.domains.box_dimension(as_mask(plane), cover=cover)
             inside.append(float(result.ci_low) <= dimension <= float(result.ci_high))
     assert np.mean(inside) >= 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cover", ["minimum", "mean"])
+def test_interval_holds_the_dimension_of_sets_of_every_kind(cover):
+    rng = np.random.default_rng(77)
+    inside = []
+    for n in (250, 512):
+        sets = [(91 / 48, percolating_cluster(n, rng)) for _ in range(3)]
+        for ratio, keeps in ((2, (2, 3)), (3, (2, 4, 6, 7)), (4, (5, 8, 11)), (5, (8, 13, 18))):
+            level = int(np.log(n) / np.log(ratio) + 1e-9)
+            for keep in keeps:
+                pattern = (rng.permutation(ratio**2) < keep).reshape(ratio, ratio)
+                fixed = np.ones((1, 1), bool)
+                for _ in range(level):
+                    fixed = np.kron(pattern, fixed)
+                drawn = random_lattice_set(keep, ratio, level, rng)
+                turned = (np.rot90(cells, rng.integers(4)) for cells in (fixed, drawn))
+                sets += [(np.log(keep) / np.log(ratio), placed(cells, n, rng)) for cells in turned]
+        for ratio, keep in ((2, 0.7), (2, 0.85), (3, 0.6)):
+            cells = thinned(keep, ratio, int(np.log(n) / np.log(ratio) + 1e-9), rng)
+            sets.append((2 + np.log(keep) / np.log(ratio), placed(cells, n, rng)))
+        for dimension, cells in sets:
+            result = fc.domains.box_dimension(as_mask(cells), cover=cover)
+            inside.append(float(result.ci_low) <= dimension <= float(result.ci_high))
+    assert np.mean(inside) >= (0.95 if cover == "minimum" else 0.9)
 
 
 @pytest.mark.parametrize(

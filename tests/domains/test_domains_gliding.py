@@ -198,3 +198,74 @@ def test_numbers_of_the_whole_curve():
     full = fc.domains.lacunarity(as_mask(np.ones((16, 16))))
     assert (float(full.lacunarity_slope), float(full.lacunarity_area)) == (0.0, 0.0)
     assert np.isnan(full.normalised_lacunarity).all()
+
+
+def box_variance(covariance, r):
+    """Sum a covariance over all pairs of cells of a box of r cells."""
+    u = np.arange(-r + 1, r)
+    weight = np.outer(r - np.abs(u), r - np.abs(u))
+    return (weight * covariance(u[:, None], u[None, :])).sum() / r**4
+
+
+def test_level_sets_of_a_gaussian_surface_at_the_median():
+    rng = np.random.default_rng(21)
+    n, cut = 256, 24
+    modes = np.hypot(np.fft.fftfreq(n)[:, None] * n, np.fft.fftfreq(n)[None, :] * n)
+    power = np.exp(-((modes / cut) ** 2))
+    rho = np.fft.ifft2(power).real
+    rho = np.clip(rho / rho[0, 0], -1, 1)
+    planes = []
+    for _ in range(24):
+        noise = np.fft.fft2(rng.standard_normal((n, n)))
+        planes.append(np.fft.ifft2(noise * np.sqrt(power)).real > 0)
+    values = fc.domains.lacunarity(as_mask(np.array(planes), periodic=ROUND), [2, 5, 12]).lacunarity.values
+    for place, r in enumerate((2, 5, 12)):
+        # the bivariate normal orthant gives the second moment of the set
+        want = box_variance(lambda v, u: 0.25 + np.arcsin(rho[v % n, u % n]) / (2 * np.pi), r) / 0.25
+        error = values[:, place].std() / np.sqrt(24)
+        assert values[:, place].mean() == pytest.approx(want, abs=4 * error)
+        assert error < 0.02 * (want - 1)
+
+
+def test_discs_thrown_at_random():
+    rng = np.random.default_rng(22)
+    n, radius, number = 256, 6.0, 250
+    planes = []
+    for _ in range(24):
+        cells = np.zeros((n, n), bool)
+        for cy, cx in rng.uniform(0, n, (rng.poisson(number), 2)):
+            rows = np.arange(int(cy) - 8, int(cy) + 9)
+            columns = np.arange(int(cx) - 8, int(cx) + 9)
+            inside = np.hypot((rows - cy)[:, None], columns - cx) <= radius
+            cells[np.ix_(rows % n, columns % n)] |= inside
+        planes.append(cells)
+
+    def common(v, u):
+        """Area that two discs share."""
+        half = np.minimum(np.hypot(v, u) / (2 * radius), 1.0)
+        return 2 * radius**2 * (np.arccos(half) - half * np.sqrt(1 - half**2))
+
+    density = number / n**2
+    covered = 1 - np.exp(-density * np.pi * radius**2)
+    result = fc.domains.lacunarity(as_mask(np.array(planes), periodic=ROUND), [2, 5, 12])
+    assert float(result.coverage.mean()) == pytest.approx(covered, rel=0.02)
+    for place, r in enumerate((2, 5, 12)):
+        second = box_variance(
+            lambda v, u: 2 * covered - 1 + (1 - covered) ** 2 * np.exp(density * common(v, u)), r
+        )
+        values = result.lacunarity.values[:, place]
+        assert values.mean() == pytest.approx(second / covered**2, abs=4 * values.std() / np.sqrt(24))
+
+
+@pytest.mark.parametrize(("width", "period"), [(1, 4), (3, 8), (5, 12)])
+def test_stripes(width, period):
+    cells = np.zeros((period * 3, 24), bool)
+    for k in range(3):
+        cells[k * period : k * period + width] = True
+    sizes = np.arange(1, 2 * period + 1)
+    found = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), sizes[sizes <= 24]).lacunarity.values
+    for r, value in zip(sizes, found, strict=False):
+        # rows of the stripe seen by a window of r rows that starts anywhere in a period
+        rows = [sum((start + k) % period < width for k in range(r)) for start in range(period)]
+        want = period * sum(row**2 for row in rows) / sum(rows) ** 2
+        assert value == pytest.approx(want, rel=1e-13)
