@@ -22,6 +22,7 @@ UNLABELLED = {
     "contact.effective_modulus",
     "contact.flat_stiffness",
     "dimensions.methods",
+    "surfaces.SelfAffine",
 }
 
 

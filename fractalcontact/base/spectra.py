@@ -306,11 +306,97 @@ class SelfAffine:
         return float(self.plateau * (flat + tail) / (2.0 * np.pi))
 
     def moments(self) -> Moments:
-        """Return the mean squares of height, gradient and Laplacian."""
+        """Return the mean squares of height, gradient and Laplacian.
+
+        Their attributes are rms_height (m), rms_slope, rms_curvature (m-1) and nayak.
+        """
         return Moments(self.moment(0), self.moment(2), self.moment(4))
+
+    def autocorrelation(self, lag: Array | float) -> Array:
+        """Return the mean product of heights about their mean (m2) at distances `lag` (m), any shape.
+
+        The integral of C(q) J0(q lag) q dq / (2 pi), in closed form: Bessel functions over the plateau, and
+        the integral of x^(-1 - 2 hurst) J0(x) over the power law.
+        """
+        from scipy.special import j1
+
+        lag = np.abs(np.asarray(lag, dtype=np.float64))
+        low, corner, high = self._wavenumbers()
+        # shorter lags than this change the result by less than its rounding
+        apart = lag > 1e-9 / high
+        r = np.where(apart, lag, 1.0 / high)
+        flat = (corner * j1(corner * r) - low * j1(low * r)) / r
+        power = -1.0 - 2.0 * self.hurst
+        tail = _bessel_integral(power, corner * r) - _bessel_integral(power, high * r)
+        sums = flat + tail * r ** (2.0 * self.hurst) * corner ** (2.0 + 2.0 * self.hurst)
+        return np.where(apart, self.plateau * sums / (2.0 * np.pi), self.moment(0))
+
+    def profile_psd(self, q: Array | float) -> Array:
+        """Return the spectrum of the profiles (m3) at wavenumbers `q` along them (rad m-1), any shape.
+
+        The integral of C over the wavenumber across, over 2 pi; it falls as q^(-1 - 2 hurst). Its integral
+        dq / (2 pi) over both signs is the mean square height.
+        """
+        from scipy.special import beta, betainc
+
+        low, corner, high = self._wavenumbers()
+        q = np.abs(np.asarray(q, dtype=np.float64))
+        inside = np.minimum(q, high)
+        flat = np.sqrt(np.maximum(corner**2 - inside**2, 0.0)) - np.sqrt(np.maximum(low**2 - inside**2, 0.0))
+        rise = 2.0 + 2.0 * self.hurst
+        # with t = (q / q')^2 the power law is an incomplete beta function
+        along = np.maximum(inside, 1e-6 * low)
+        ends = [np.minimum((along / edge) ** 2, 1.0) for edge in (corner, high)]
+        parts = [betainc(self.hurst + 0.5, 0.5, end) for end in ends]
+        tail = 0.5 * beta(self.hurst + 0.5, 0.5) * (parts[0] - parts[1]) * along * (corner / along) ** rise
+        return np.asarray(self.plateau / np.pi * (flat + tail) * (q < high))
 
     def _wavenumbers(self) -> tuple[float, float, float]:
         return tuple(2.0 * np.pi / length for length in (self.long_cutoff, self.rolloff, self.short_cutoff))  # type: ignore[return-value]
+
+
+def _bessel_integral(power: float, start: Array) -> Array:
+    """Return the integral of x^power J0(x) from `start` (above 0) to infinity, power < 1/2."""
+    near, far = _SERIES, _ASYMPTOTIC
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+
+    def between(first: Array) -> Array:
+        """Up to `far`, by quadrature: three waves at most."""
+        from scipy.special import j0
+
+        half = 0.5 * (far - first)
+        x = first[..., None] + half[..., None] * (nodes + 1.0)
+        return np.asarray(half * np.sum(weights * x**power * j0(x), axis=-1))
+
+    beyond = _bessel_tail(power, np.maximum(start, far))
+    middle = between(np.clip(start, near, far))
+    total = beyond + middle
+    first = np.minimum(start, near)
+    factor = 1.0
+    for k in range(_TERMS):  # the power series of J0, term by term
+        exponent = power + 2 * k + 1.0
+        if abs(exponent) < 1e-12:
+            term = np.log(near / first)
+        else:
+            term = (near**exponent - first**exponent) / exponent
+        total = total + factor * term
+        factor *= -0.25 / (k + 1) ** 2
+    return np.asarray(total)
+
+
+_SERIES, _ASYMPTOTIC, _TERMS = 6.0, 40.0, 40
+
+
+def _bessel_tail(power: float, start: Array) -> Array:
+    """Integrate by parts again and again: an asymptotic series, good to rounding from 40 on."""
+    from scipy.special import j0, j1
+
+    total, factor = np.zeros_like(start), 1.0
+    for k in range(12):
+        s = 2 * k - power
+        total += factor * ((s + 1.0) * start ** (-s - 1.0) * j0(start) - start**-s * j1(start))
+        factor *= -((s + 1.0) ** 2)
+    return total
 
 
 def _power_integral(power: float, low: float, high: float) -> float:

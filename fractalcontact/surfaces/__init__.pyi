@@ -6,10 +6,12 @@ from .preparing import fill as fill
 from .preparing import level as level
 from .samples import sample as sample
 from .statistics import describe as describe
+from .synthesis import SelfAffine as SelfAffine
 from .synthesis import spectral as spectral
 from .waves import weierstrass as weierstrass
 
 __all__ = [
+    "SelfAffine",
     "describe",
     "fbm",
     "fill",

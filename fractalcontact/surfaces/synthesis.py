@@ -11,6 +11,7 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.rng import RNGLike
+from fractalcontact.base.spectra import SelfAffine as SelfAffine
 from fractalcontact.surfaces import _arguments
 from fractalcontact.surfaces._filtering import Band, filtered_modes
 
@@ -86,7 +87,7 @@ def spectral(
 
     Notes
     -----
-    Closed forms for the moments of this spectrum: `fractalcontact.base.spectra.SelfAffine`. The Nyquist
+    Closed forms of this spectrum, its moments, autocorrelation and profiles: `SelfAffine`. The Nyquist
     modes of an even grid carry the full density; they count with |q|^2 in the mean square gradient.
     Memory: two arrays of n x n numbers.
     """
