@@ -7,6 +7,7 @@ from docutils.parsers.rst import Directive
 def setup(app):
     """Make the directive `names` known to sphinx."""
     app.add_directive("names", Names)
+    app.add_directive("extremes", Extremes)
     app.connect("autodoc-process-docstring", escape_bars)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -22,21 +23,46 @@ class Names(Directive):
     def run(self):
         from fractalcontact.base.schema import QUANTITIES
 
-        table, group, body = nodes.table(), nodes.tgroup(cols=3), nodes.tbody()
-        group += [nodes.colspec(colwidth=width) for width in (28, 12, 60)]
-        head = nodes.thead("", self._row("name", "units", "meaning"))
-        for name, quantity in sorted(QUANTITIES.items()):
-            body += self._row(nodes.literal(text=name), quantity.units or "text", quantity.long_name)
-        group += [head, body]
-        table += group
-        return [table]
+        rows = [
+            (nodes.literal(text=name), quantity.units or "text", quantity.long_name)
+            for name, quantity in sorted(QUANTITIES.items())
+        ]
+        return [table((28, 12, 60), ("name", "units", "meaning"), rows)]
 
-    def _row(self, *cells):
-        row = nodes.row()
-        for cell in cells:
-            text = nodes.Text(cell) if isinstance(cell, str) else cell
-            row += nodes.entry("", nodes.paragraph("", "", text))
-        return row
+
+class Extremes(Directive):
+    """The catalogue of extreme cases, each examined by this build, with what came out worst."""
+
+    def run(self):
+        from fractalcontact import accuracy
+        from fractalcontact.accuracy.reporting import worst_rows
+
+        cases = {name: case for name, case in accuracy.cases.items() if not case.large}
+        head, *rows = worst_rows({name: accuracy.examine(case) for name, case in cases.items()})
+        told = [
+            (name, accuracy.cases[name].story, nodes.literal(text=quantity), *rest)
+            for name, quantity, *rest in rows
+        ]
+        return [table((16, 28, 26, 12, 12, 8, 8), (head[0], "what is extreme", *head[1:]), told)]
+
+
+def table(widths, head, rows):
+    """Return a table; a cell is text or a node."""
+    whole, group, body = nodes.table(), nodes.tgroup(cols=len(widths)), nodes.tbody()
+    group += [nodes.colspec(colwidth=width) for width in widths]
+    group += nodes.thead("", _row(head))
+    body += [_row(row) for row in rows]
+    group += body
+    whole += group
+    return whole
+
+
+def _row(cells):
+    row = nodes.row()
+    for cell in cells:
+        text = nodes.Text(cell) if isinstance(cell, str) else cell
+        row += nodes.entry("", nodes.paragraph("", "", text))
+    return row
 
 
 def _get_sg_image_scraper():

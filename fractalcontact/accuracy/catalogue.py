@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from fractalcontact.accuracy import calls
 from fractalcontact.base import grid
 from fractalcontact.base.schema import label
 
@@ -35,18 +36,24 @@ class Case:
     name, story : str
         What it is, and what is extreme about it.
     kind : str
-        "surface" or "mask".
+        "surface", "mask", or "call".
     make : callable
-        Returns the input afresh: a `height` in metres, or a boolean mask, dims (y, x).
+        Returns the input afresh: `height` in metres or a boolean mask, dims (y, x); of a call, the result.
     expected : mapping
         `room.function.quantity` to its expectation.
+    modulus : float
+        Contact modulus with which a surface is pressed, Pa.
+    large : bool
+        Takes minutes and gigabytes: left out unless asked for.
     """
 
     name: str
     story: str
-    kind: Literal["surface", "mask"]
-    make: Callable[[], xr.DataArray]
+    kind: Literal["surface", "mask", "call"]
+    make: Callable[[], Any]
     expected: Mapping[str, Expectation] = field(default_factory=dict)
+    modulus: float = 1e9
+    large: bool = False
 
 
 def _surface(
@@ -98,6 +105,12 @@ def _wave(n: int = 64, amplitude: float = 1e-6) -> Array:
     return np.asarray(amplitude * np.cos(2 * np.pi * x / n))
 
 
+def _with_islands(heights: Array) -> Array:
+    heights = heights.copy()
+    heights[5:15, 5:13] = heights[40:50, 30:40] = np.nan
+    return heights
+
+
 def _carpet(levels: int = 4) -> Array:
     cell = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
     mask = np.ones((1, 1), bool)
@@ -133,6 +146,10 @@ _ROUGH: dict[str, Expectation] = {
     "contact.press.contact_fraction": (1e-4, 1.0),
     "joints.dilatancy.rigid_dilatancy": (0.0, np.inf),
 }
+
+# white noise in any unit, with any modulus, on any offset: the area at a load in proportion to slope and
+# modulus is always that of 37 nodes in 32 x 32
+_ALIKE: dict[str, Expectation] = {**_ROUGH, "contact.press.contact_fraction": 37 / 1024}
 
 
 def _between(low: float, high: float) -> dict[str, Expectation]:
@@ -190,9 +207,9 @@ _SURFACES = (
         "rms slopes far outside small strains",
         "surface",
         lambda: _surface(_noise((32, 32), 1e-3)),
-        {"surfaces.describe.rms_slope": (5.0, 30.0), **_ROUGH},
+        {"surfaces.describe.rms_slope": (5.0, 30.0), **_ALIKE},
     ),
-    Case("slope 1e-6", "nearly flat", "surface", lambda: _surface(_noise((32, 32), 1e-10)), _ROUGH),
+    Case("slope 1e-6", "nearly flat", "surface", lambda: _surface(_noise((32, 32), 1e-10)), _ALIKE),
     Case(
         "n = 3",
         "the smallest face: it has no room to slide",
@@ -201,18 +218,74 @@ _SURFACES = (
         {**_ROUGH, "joints.dilatancy.rigid_dilatancy": REFUSED},
     ),
     Case("prime", "31 by 37 points", "surface", lambda: _surface(_noise((31, 37))), _ROUGH),
-    Case("strip", "aspect 1:32", "surface", lambda: _surface(_noise((4, 128))), _ROUGH),
+    Case("strip", "aspect 1:1000", "surface", lambda: _surface(_noise((4, 4000))), _ROUGH),
+    Case(
+        "E* = 1e-6 Pa",
+        "softer than anything",
+        "surface",
+        lambda: _surface(_noise((32, 32))),
+        _ALIKE,
+        modulus=1e-6,
+    ),
+    Case(
+        "E* = 1 Pa",
+        "the modulus of a jelly",
+        "surface",
+        lambda: _surface(_noise((32, 32))),
+        _ALIKE,
+        modulus=1.0,
+    ),
+    Case(
+        "E* = 1e15 Pa",
+        "stiffer than anything",
+        "surface",
+        lambda: _surface(_noise((32, 32))),
+        _ALIKE,
+        modulus=1e15,
+    ),
+    Case(
+        "offset 1e9",
+        "metres on an offset of 10^9 m",
+        "surface",
+        lambda: _surface(1e9 + _noise((32, 32), 1.0), 10.0),
+        _ALIKE,
+    ),
+    Case(
+        "steps below rounding",
+        "nanometres on an offset of 10^9 m: nothing of them is left",
+        "surface",
+        lambda: _surface(1e9 + _noise((16, 16), 1e-9)),
+        _FLAT,
+    ),
+    Case(
+        "a step of one rounding",
+        "one node higher than a flat by the last bit of 10^9 m",
+        "surface",
+        lambda: _surface(np.where(_spike() > 0, np.nextafter(1e9, np.inf), 1e9), 1.0),
+        _ROUGH,
+    ),
+    Case(
+        "islands of NaN",
+        "two blocks that were not observed",
+        "surface",
+        lambda: _surface(_with_islands(_brownian(0.5).values)),
+        {
+            "contact.press.contact_fraction": REFUSED,
+            "surfaces.describe.missing_points": 180.0,
+            "dimensions.estimate.hurst": (0.3, 0.7),
+        },
+    ),
     Case(
         "high up",
         "micrometres on an offset of 10^6 m",
         "surface",
         lambda: _surface(1e6 + _noise((32, 32), 1e-3)),
-        _ROUGH,
+        _ALIKE,
     ),
     Case(
-        "nanometres", "heights of 10^-9 m", "surface", lambda: _surface(_noise((32, 32), 1e-9), 1e-8), _ROUGH
+        "nanometres", "heights of 10^-9 m", "surface", lambda: _surface(_noise((32, 32), 1e-9), 1e-8), _ALIKE
     ),
-    Case("mountains", "heights of 10^6 m", "surface", lambda: _surface(_noise((32, 32), 1e6), 1e7), _ROUGH),
+    Case("mountains", "heights of 10^6 m", "surface", lambda: _surface(_noise((32, 32), 1e6), 1e7), _ALIKE),
     Case(
         "spacings 1:100",
         "cells a hundred times as long as wide",
@@ -321,6 +394,13 @@ _MASKS = (
         lambda: _mask(np.random.default_rng(3).random((64, 64)) < 0.1),
         {"domains.lacunarity.lacunarity": (8.0, 12.0)},
     ),
+    Case(
+        "a mask of one cell",
+        "1 by 1: no scales at all",
+        "mask",
+        lambda: _mask(np.ones((1, 1)), periodic=True),
+        {"domains.islands.n_islands": 1.0},
+    ),
     Case("three by three", "smaller than most boxes", "mask", lambda: _mask(np.eye(3)), {}),
     Case("a strip", "one row of cells", "mask", lambda: _mask(np.ones((2, 64))), {}),
     Case(
@@ -332,4 +412,68 @@ _MASKS = (
     ),
 )
 
-cases: Mapping[str, Case] = {case.name: case for case in (*_SURFACES, *_MASKS)}
+_CALLS = (
+    Case(
+        "modulus ratio 1e6",
+        "a stiff body on a soft one: the limit of a rigid one",
+        "call",
+        calls.stiff_and_soft,
+        {
+            "contact.effective_modulus.ratio_to_soft": 1.0 / (1.0 + 1e-6 * 0.96 / 0.91),
+            "contact.effective_modulus.ratio_turned": 1.0,
+        },
+    ),
+    Case(
+        "one contact",
+        "a force so small that one node bears it: the plate of the closed form",
+        "call",
+        calls.one_contact,
+        {"contact.press.nodes": 1.0, "contact.press.closure_of_a_plate": 1.0},
+    ),
+    Case(
+        "99.99 % contact",
+        "a wave under all but 2.5e-8 of the pressure that closes it (Westergaard)",
+        "call",
+        calls.nearly_full,
+        {"contact.press.open_share": (4e-5, 2e-4), "contact.press.converged": 1.0},
+    ),
+    Case(
+        "loads over 12 decades",
+        "up and down again: an elastic face comes back to where it was",
+        "call",
+        calls.up_and_down,
+        {
+            "contact.press.hysteresis": (0.0, 1e-6),
+            "contact.press.steps_that_fell": 0.0,
+            "contact.press.converged": 1.0,
+        },
+    ),
+    Case(
+        "hardness barely above the mean pressure",
+        "by one part in 10^4: all but as little must yield",
+        "call",
+        calls.barely_hard_enough,
+        {"contact.press.contact_fraction": (0.9998, 1.0), "contact.press.carried": 1.0},
+    ),
+    Case(
+        "a very long path",
+        "2000 steps between two loads: no drift, no more memory than the numbers kept",
+        "call",
+        calls.long_path,
+        {"contact.press.drift": (0.0, 1e-6), "contact.press.kilobytes_a_step": (0.0, 1.0)},
+    ),
+    Case(
+        "n = 8192",
+        "67 million points",
+        "call",
+        calls.huge,
+        {
+            "contact.press.contact_fraction": (0.1, 0.35),
+            "contact.press.converged": 1.0,
+            "surfaces.spectral.rms_slope": (0.09, 0.11),
+        },
+        large=True,
+    ),
+)
+
+cases: Mapping[str, Case] = {case.name: case for case in (*_SURFACES, *_MASKS, *_CALLS)}

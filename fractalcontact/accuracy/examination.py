@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CLOSE = 1e-6
-Probe = Callable[["xr.DataArray"], "xr.Dataset"]
+Probe = Callable[[Any, Case], "xr.Dataset"]
+LONGEST = 120.0  # seconds: a case that takes longer hangs
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class Finding:
     ok : bool
     run_time : float
         Seconds of the whole call.
+    error : float
+        Distance from what is expected, over its size (or that of the case, for zero); NaN where nothing is
+        expected but a finite number.
     """
 
     name: str
@@ -42,6 +47,7 @@ class Finding:
     got: float | str
     ok: bool
     run_time: float
+    error: float = np.nan
 
 
 def examine(case: Case) -> list[Finding]:
@@ -59,6 +65,8 @@ def examine(case: Case) -> list[Finding]:
         it returns with finite numbers, or NaN with a reason, or refuses with an `InvalidInput`; anything
         else that it raises, and an infinite or unexplained value, fails.
     """
+    if case.kind == "call":
+        return _called(case)
     probes = _SURFACE_PROBES if case.kind == "surface" else _MASK_PROBES
     findings: list[Finding] = []
     for name, probe in probes.items():
@@ -68,6 +76,13 @@ def examine(case: Case) -> list[Finding]:
     return findings
 
 
+def _called(case: Case) -> list[Finding]:
+    """Return the findings of a call: what its result says under each key."""
+    functions = dict.fromkeys(key.rpartition(".")[0] for key in case.expected)
+    whole = cache(case.make)  # one call serves all keys
+    return [one for name in functions for one in _run(case, name, lambda *_: whole())]
+
+
 def _run(case: Case, name: str, probe: Probe) -> list[Finding]:
     wanted = {key: value for key, value in case.expected.items() if key.rpartition(".")[0] == name}
     start = time.perf_counter()
@@ -75,7 +90,7 @@ def _run(case: Case, name: str, probe: Probe) -> list[Finding]:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             warnings.simplefilter("ignore", FractalContactWarning)
-            result = probe(case.make())
+            result = probe(None if case.kind == "call" else case.make(), case)
     except InvalidInput as refusal:
         seconds = time.perf_counter() - start
         text = "; ".join(refusal.problems)
@@ -87,7 +102,8 @@ def _run(case: Case, name: str, probe: Probe) -> list[Finding]:
         return [Finding(name, None, text, False, time.perf_counter() - start)]
     seconds = time.perf_counter() - start
     findings = [_held(key, value, result, seconds) for key, value in wanted.items()]
-    return [*findings, _sane(name, result, seconds)]
+    findings.append(_sane(name, result, seconds))
+    return [replace(one, ok=one.ok and (case.large or seconds < LONGEST)) for one in findings]
 
 
 def _held(key: str, expected: Expectation, result: xr.Dataset, seconds: float) -> Finding:
@@ -101,9 +117,11 @@ def _held(key: str, expected: Expectation, result: xr.Dataset, seconds: float) -
     if isinstance(expected, str):
         return Finding(key, expected, got, False, seconds)
     if isinstance(expected, tuple):
-        return Finding(key, expected, got, bool(expected[0] <= got <= expected[1]), seconds)
-    close = bool(abs(got - expected) <= CLOSE * max(abs(expected), _scale(result)))
-    return Finding(key, expected, got, close, seconds)
+        outside = max(expected[0] - got, got - expected[1], 0.0)
+        error = outside / max(abs(expected[0]), _scale(result))
+        return Finding(key, expected, got, bool(expected[0] <= got <= expected[1]), seconds, error)
+    error = abs(got - expected) / max(abs(expected), _scale(result))
+    return Finding(key, expected, got, bool(error <= CLOSE), seconds, error)
 
 
 def _scale(result: xr.Dataset) -> float:
@@ -139,13 +157,13 @@ def _tells(attributes: Mapping[Any, Any]) -> bool:
     )
 
 
-def _described(surface: xr.DataArray) -> xr.Dataset:
+def _described(surface: xr.DataArray, _: Case) -> xr.Dataset:
     from fractalcontact import surfaces
 
     return surfaces.describe(surface)
 
 
-def _levelled(surface: xr.DataArray) -> xr.Dataset:
+def _levelled(surface: xr.DataArray, _: Case) -> xr.Dataset:
     from fractalcontact import surfaces
 
     result = surfaces.describe(surfaces.level(surface))
@@ -153,14 +171,14 @@ def _levelled(surface: xr.DataArray) -> xr.Dataset:
     return result
 
 
-def _estimated(surface: xr.DataArray) -> xr.Dataset:
+def _estimated(surface: xr.DataArray, _: Case) -> xr.Dataset:
     from fractalcontact import dimensions
 
     return dimensions.estimate(surface)
 
 
 def _curve(name: str) -> Probe:
-    def probe(surface: xr.DataArray) -> xr.Dataset:
+    def probe(surface: xr.DataArray, _: Case) -> xr.Dataset:
         from fractalcontact import dimensions
 
         curve: xr.Dataset = getattr(dimensions, name)(surface)
@@ -177,10 +195,10 @@ def _reach(surface: xr.DataArray) -> tuple[float, float]:
     return slope or 1e-3, heights.size * spacing[0] * spacing[1]
 
 
-def _pressed(surface: xr.DataArray) -> xr.Dataset:
+def _pressed(surface: xr.DataArray, case: Case) -> xr.Dataset:
     from fractalcontact import contact
 
-    modulus = 1e9
+    modulus = case.modulus
     slope, area = _reach(surface)
     force = np.array([0.01, 0.1]) * modulus * slope * area
     result = contact.press(
@@ -205,19 +223,19 @@ def _checked_balance(result: xr.Dataset, force: np.ndarray) -> xr.Dataset:
     return result.drop_vars(["gap", "pressure"])
 
 
-def _slid(surface: xr.DataArray) -> xr.Dataset:
+def _slid(surface: xr.DataArray, case: Case) -> xr.Dataset:
     from fractalcontact import joints
 
     step = float(surface.x[1] - surface.x[0])
-    return joints.dilatancy(_crack(surface), shear=[step], direction=["E"]).assign_attrs(
+    return joints.dilatancy(_crack(surface, case), shear=[step], direction=["E"]).assign_attrs(
         examination_scale=step
     )
 
 
-def _closed(surface: xr.DataArray) -> xr.Dataset:
+def _closed(surface: xr.DataArray, case: Case) -> xr.Dataset:
     from fractalcontact import joints
 
-    crack = _crack(surface)
+    crack = _crack(surface, case)
     slope, _ = _reach(surface)
     force = 0.01 * crack.contact_modulus * slope * crack.nominal_area
     step = float(surface.x[1] - surface.x[0])
@@ -226,17 +244,17 @@ def _closed(surface: xr.DataArray) -> xr.Dataset:
     )
 
 
-def _crack(surface: xr.DataArray) -> Any:
+def _crack(surface: xr.DataArray, case: Case) -> Any:
     from fractalcontact import joints
 
     ny, nx = surface.shape
     spacing = float(surface.y[1] - surface.y[0]), float(surface.x[1] - surface.x[0])
     edges = max(3, ny - 2) * spacing[0], max(3, nx - 2) * spacing[1]
-    return joints.Crack(surface, young=1e9, poisson=0.2, block=edges)
+    return joints.Crack(surface, young=case.modulus, poisson=0.2, block=edges)
 
 
 def _mask_function(name: str) -> Probe:
-    def probe(mask: xr.DataArray) -> xr.Dataset:
+    def probe(mask: xr.DataArray, _: Case) -> xr.Dataset:
         from fractalcontact import domains
 
         options = {"q": [0.0, 1.0, 2.0]} if name == "generalised_dimensions" else {}

@@ -118,17 +118,48 @@ def _share(value: float) -> str:
 
 def cases_table(findings: Mapping[str, Sequence[Finding]]) -> str:
     """Return one line for each extreme case and quantity: expected, got, seconds."""
-    rows: list[tuple[str, ...]] = [("case", "function and quantity", "expected", "got", "seconds", "")]
+    rows: list[tuple[str, ...]] = [
+        ("case", "function and quantity", "expected", "got", "error", "seconds", "")
+    ]
     for name, found in findings.items():
         for one in found:
             got = one.got if isinstance(one.got, str) else f"{one.got:.6g}"
             expected = "" if one.expected is None else _expectation(one.expected)
             rows.append(
-                (name, one.name, expected, got[:60], f"{one.run_time:.3f}", "" if one.ok else "FAILED")
+                (
+                    name,
+                    one.name,
+                    expected,
+                    got[:60],
+                    "" if np.isnan(one.error) else f"{one.error:.1e}",
+                    f"{one.run_time:.3f}",
+                    "" if one.ok else "FAILED",
+                )
             )
     failed = sum(not one.ok for found in findings.values() for one in found)
     total = sum(len(found) for found in findings.values())
     return f"{table(rows)}\n\n{total} findings on {len(findings)} cases, {failed} failed"
+
+
+def worst_rows(findings: Mapping[str, Sequence[Finding]]) -> list[tuple[str, ...]]:
+    """Return one row for each extreme case: the quantity that came out worst, and the slowest call."""
+    rows: list[tuple[str, ...]] = [("case", "worst quantity", "expected", "got", "error", "slowest call, s")]
+    for name, found in findings.items():
+        worst = max(found, key=lambda one: (not one.ok, np.nan_to_num(one.error, nan=-1.0)))
+        got = worst.got if isinstance(worst.got, str) else f"{worst.got:.6g}"
+        expected = "finite or explained" if worst.expected is None else _expectation(worst.expected)
+        error = "" if np.isnan(worst.error) else f"{worst.error:.1e}"
+        rows.append(
+            (
+                name,
+                worst.name,
+                expected,
+                got[:60] if worst.ok else f"FAILED: {got[:60]}",
+                error,
+                f"{max(one.run_time for one in found):.2g}",
+            )
+        )
+    return rows
 
 
 def _expectation(expected: object) -> str:
