@@ -12,6 +12,19 @@ energy of the error of the pressure is at most residual * H times the force (for
 closure: (p - p*) K (p - p*) <= p g+ + p* g-). While H is the weighted mean, which is twice the energy over
 the force, the error of the pressure in the energy norm, squared and relative, is therefore at most the
 residual. A yielded node, at the hardness, may overlap: that is the plastic indentation.
+
+That bound is for the worst case. Over 260 drawn problems (self-affine, quantised, noise, balls, cones, waves,
+punches; free and periodic; up to full contact; tolerances of 1e-3 to 1e-9) the error of the pressure, against
+a solution to 1e-13, was
+
+    error over residual                             median    99 %    greatest
+    pressure, root mean square, over its own           0.9       7          12
+    pressure, greatest, over the greatest              1.1      13          38
+    force under an imposed closure, relative           0.0       1           2
+    closure under an imposed force, relative           0.0     0.2         0.8
+    energy of the error over the energy               1e-7    9e-4        4e-3
+
+and from a residual of 1e-5 down the set of contact was that of the solution.
 """
 
 from __future__ import annotations

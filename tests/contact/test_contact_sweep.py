@@ -116,6 +116,34 @@ def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
         assert float(along["normal_force"][step]) == pytest.approx(float(alone["normal_force"][0]), rel=1e-6)
 
 
+def test_what_a_residual_says_about_the_pressure():
+    """The energy of the error is within its bound; the relative error is about the residual."""
+    ratios = []
+    for seed in range(500, 540):
+        case = draw(seed, largest=40)
+        case.options.pop("hardness", None)
+        control = next(
+            name for name in ("closure", "normal_force", "nominal_pressure") if name in case.options
+        )
+        load = {control: case.options[control].max()}
+        exact = case.press(**load, tolerance=1e-13)
+        radius, q = float(exact.get("disc_radius", 0.0)), exact["pressure"].values[0]
+        for tolerance in (0.3, 1e-2, 1e-4, 1e-6):
+            found = case.press(**load, tolerance=tolerance)
+            p, residual = found["pressure"].values[0], float(found["residual"][0])
+            if residual < 1e-12:
+                continue
+            local = p.mean() * np.sqrt(np.prod(case.spacing)) / case.options["contact_modulus"]
+            scale = max(np.sum(p * settle(case, p, radius)) / p.sum(), local)
+            energy = np.sum((p - q) * settle(case, p - q, radius))
+            assert energy <= residual * scale * max(p.sum(), q.sum()) * (1 + 1e-9)
+            if residual < 1e-3:
+                ratios.append(np.linalg.norm(p - q) / np.linalg.norm(q) / residual)
+    assert len(ratios) > 20
+    assert np.median(ratios) < 3
+    assert max(ratios) < 50
+
+
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("control", ["closure", "normal_force", "nominal_pressure"])
 @pytest.mark.parametrize("hardness", [None, 1e6])
