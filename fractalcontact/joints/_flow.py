@@ -212,8 +212,11 @@ def _solve(matrix: Any, b: Array, residual: float) -> Array:
         except ImportError:
             pass
         else:
-            # aggregates must not reach from a wide channel into a narrow one beside it
-            levels = pyamg.smoothed_aggregation_solver(matrix, strength=("classical", {"theta": 0.1}))
+            # aggregates must not reach from a wide channel into a narrow one beside it; local weights need
+            # no estimate of the largest eigenvalue, which took longer than all the rest of the set-up
+            levels = pyamg.smoothed_aggregation_solver(
+                matrix, strength=("classical", {"theta": 0.1}), smooth=("jacobi", {"weighting": "local"})
+            )
             p, failed = cg(matrix, b, rtol=0.0, atol=residual, maxiter=200, M=levels.aspreconditioner())
             if not failed:
                 return np.asarray(p)

@@ -23,6 +23,7 @@ REFERENCES = (
     "Media 23 (1996); Craster, R. V. and Obnosov, Yu. V., Four-phase checkerboard composites, SIAM Journal "
     "on Applied Mathematics 61 (2001)"
 )
+ROUNDING = 1e-9  # relative to the largest opening
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -42,8 +43,10 @@ def transmissivity(
     Parameters
     ----------
     gap : DataArray, dims (..., y, x)
-        Local opening of the joint, m; cells at or below zero are in contact and closed. For example `gap` of
-        `fractalcontact.contact.press`, or upper - lower for two measured faces (no NaN).
+        Local opening of the joint, m, no NaN; cells at or below zero are in contact and closed. For example
+        `gap` of `fractalcontact.joints.closure` for every shear and step at once, or upper - lower of two
+        measured faces. Where these overlap a little they are taken to touch, and overlap_fraction tells how
+        much of the plane that is; a plane below zero everywhere is refused.
     axis : {"x", "y"} or both
         Axis along which the fluid flows.
     viscosity : float, optional
@@ -56,14 +59,14 @@ def transmissivity(
     Dataset over (..., axis)
         transmissivity (m3, hydraulic aperture cubed over 12), hydraulic_aperture (m), percolates (an open
         path of cells that share edges crosses, on a periodic axis to its own image; without one both are
-        zero), residual (of the linear system, relative); over (...): aperture (mean opening, m) and
-        open_fraction. With a viscosity also flow_conductance (m3 Pa-1 s-1), flow per width and pressure
+        zero), residual (of the linear system, relative); over (...): aperture (mechanical: mean opening, m),
+        open_fraction, overlap_fraction. With a viscosity also flow_conductance (m3 Pa-1 s-1), flow per width and pressure
         gradient. run_time (s).
 
     Raises
     ------
     InvalidInput
-        `gap` is not a plane of finite lengths, or an argument is wrong.
+        `gap` is not a plane of finite lengths or is nowhere open nor zero, or an argument is wrong.
     MissingExtra
         The plane is too large for elimination and pyamg (extra `flow`) is not installed.
 
@@ -86,9 +89,15 @@ def transmissivity(
         wraps = resolve_periodic(periodic, grid, problems, "periodic")
         if viscosity is not None:
             problems.number("viscosity", viscosity, above=0)
+        if not problems.found:
+            values = np.asarray(gap.values, dtype=np.float64)
+            below = int(np.count_nonzero(values.max(axis=(-2, -1)) < 0))
+            expected = "an opening, zero in contact (not heights, nor lower - upper)"
+            problems.require(below == 0, "gap", expected, f"{below} planes that are below zero everywhere")
     start = time.perf_counter()
     leading = tuple(str(dim) for dim in gap.dims[:-2])
-    values = np.asarray(gap.values, dtype=np.float64)
+    # what is no more than rounding of the widest opening is no overlap
+    slight = -ROUNDING * np.abs(values).max(axis=(-2, -1), keepdims=True)
     flows = _flows(values.reshape(-1, *values.shape[-2:]), axes, grid.spacing, wraps)
     shape = (*values.shape[:-2], len(axes))
     conductivity = np.reshape([flow.conductivity for flow in flows], shape)
@@ -101,6 +110,7 @@ def transmissivity(
             "residual": (each, np.reshape([flow.residual for flow in flows], shape)),
             "aperture": (leading, np.maximum(values, 0.0).mean(axis=(-2, -1))),
             "open_fraction": (leading, (values > 0).mean(axis=(-2, -1))),
+            "overlap_fraction": (leading, (values < slight).mean(axis=(-2, -1))),
         },
         coords={name: coord for name, coord in gap.coords.items() if not {"y", "x"} & set(coord.dims)},
     ).assign_coords(axis=np.array(axes))

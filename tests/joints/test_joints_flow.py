@@ -302,3 +302,38 @@ def test_a_million_cells_in_ten_seconds(make_face, rough):
         result = flow(make_face, gap, axis="x")
         assert result.run_time < 10
         assert result.residual <= 1e-8
+
+
+def test_overlaps_are_contact_and_counted_but_not_everywhere(make_face):
+    gap = np.full((6, 8), 1e-4)
+    gap[2, 3], gap[4, 4] = -1e-5, -1e-18
+    found = fc.joints.transmissivity(make_face(gap))
+    assert found.overlap_fraction == pytest.approx(1 / 48)
+    closed = np.where(gap < 0, 0.0, gap)
+    np.testing.assert_allclose(
+        found.transmissivity, fc.joints.transmissivity(make_face(closed)).transmissivity, rtol=1e-12
+    )
+    with pytest.raises(ValueError, match="gap: expected an opening.*1 planes that are below zero everywhere"):
+        fc.joints.transmissivity(make_face(np.full((6, 8), -1e-4)))
+    shut = fc.joints.transmissivity(make_face(np.zeros((6, 8))))
+    assert (shut.transmissivity == 0).all()
+    assert not shut.percolates.any()
+    assert shut.overlap_fraction == 0
+
+
+def test_leakage_follows_load_and_shear_in_one_call(make_face, rough):
+    face = make_face(2e-6 * rough((40, 40), 9), 8e-5)
+    crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=20 * 8e-5)
+    closing = fc.joints.closure(
+        crack, shear=[8e-5, 3.2e-4], direction=["E", "N"], normal_force=[0.1, 3.0, 1e3], keep=("gap",)
+    )
+    flow = fc.joints.transmissivity(closing.gap)
+    assert flow.hydraulic_aperture.dims == ("direction", "shear", "step", "axis")
+    assert flow.normal_force.dims == ("direction", "shear", "step")
+    assert (flow.hydraulic_aperture.diff("step") <= 0).all()
+    np.testing.assert_allclose(flow.aperture, closing.mean_gap, rtol=1e-9, atol=1e-20)
+    # no plane conducts more than its cells side by side
+    most = (closing.gap**3).mean(("y", "x")) ** (1 / 3)
+    assert (flow.hydraulic_aperture <= most * (1 + 1e-9)).all()
+    assert not flow.percolates.isel(step=-1).all()
+    assert (flow.hydraulic_aperture.where(~flow.percolates, 0.0) == 0).all()
