@@ -10,6 +10,7 @@ from fractalcontact.domains._masks import Array
 
 # pairs along the axes and along the diagonals, at one step and at two
 OFFSETS = np.array([(0, 1), (1, 0), (0, 2), (2, 0), (1, 1), (1, -1), (2, 2), (2, -2)], np.int64)
+ONCE, TWICE = [0, 1, 4, 5], [2, 3, 6, 7]
 BLOCKS = 4  # along each axis, for the jackknife
 FEWEST = 200  # differing neighbours below which no interval is given
 SMOOTH, WIDER = 1.3, 2.0  # below this dimension blocks are not independent: wider by so much for each unit
@@ -28,19 +29,25 @@ def count(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, Array]:
 
 
 def shares(pairs: Array, differing: Array) -> Array:
-    """Return the share of pairs that differ: axes at one step and two, diagonals at one step and two."""
-    joined = [values.reshape(*values.shape[:-1], 4, 2).sum(-1) for values in (pairs, differing)]
-    return np.asarray(joined[1] / np.maximum(joined[0], 1))
+    """Return the share of pairs that differ, for every offset."""
+    return np.asarray(differing / np.maximum(pairs, 1))
 
 
 def exponent(share: Array) -> Array:
-    """Return d ln share / d ln lag, the mean over four axial and two diagonal directions.
+    """Return d ln share / d ln lag, the mean over two axial and two diagonal directions.
 
     Each direction keeps its own level: it is the doubling of the lag that counts, whatever the spacings.
+    Directions weigh by the inverse third power of the share at one step: across the tilt of a smooth surface
+    the boundary is crossed often, and tells more of the tilt than of its roughness. A direction in which
+    nothing is crossed has no say; NaN if that is so in all.
     """
+    one, two = share[..., ONCE], share[..., TWICE]
+    crossed = one > 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs = np.log2(share)
-    return np.asarray((2.0 * (logs[..., 1] - logs[..., 0]) + logs[..., 3] - logs[..., 2]) / 3.0)
+        logs = np.where(crossed, np.log2(two / one), 0.0)
+        least = np.min(np.where(crossed, one, np.inf), axis=-1, keepdims=True)
+        weights = np.where(crossed, (least / one) ** 3, 0.0)
+        return np.asarray((weights * logs).sum(-1) / weights.sum(-1))
 
 
 def dimension(pairs: Array, differing: Array) -> tuple[float, float]:
@@ -52,14 +59,14 @@ def dimension(pairs: Array, differing: Array) -> tuple[float, float]:
     Both were set on level sets of exact Brownian surfaces.
     """
     share = shares(pairs.sum(0), differing.sum(0))
-    if not np.all(share > 0):
-        return np.nan, np.nan
     raw = float(exponent(share))
+    if not np.isfinite(raw):
+        return np.nan, np.nan
     used = pairs.sum(-1) > 0
     rest = shares(pairs.sum(0) - pairs, differing.sum(0) - differing)[used]
-    if differing[:, :2].sum() < FEWEST or len(rest) < 2 or not np.all(rest > 0):
-        return 2.0 - raw, np.nan
     left = exponent(rest)
+    if differing[:, :2].sum() < FEWEST or left.size < 2 or not np.all(np.isfinite(left)):
+        return 2.0 - raw, np.nan
     departure = (left - left.mean()) ** 2
     total = float(departure.sum())
     if total == 0.0:
