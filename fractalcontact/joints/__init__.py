@@ -3,6 +3,7 @@
 A study starts with a `Crack`: the two faces, the block that slides, and the material. From it come
 
 delta_surface         what separates the faces after a shear
+delta_dimension       how rough that difference is, by methods that disagree
 closure               how they close under a normal force
 closure_laws          the named laws of closure fitted to it, and its stiffness
 dilatancy             how far they open when they slide: rigid, under a normal force, or against a spring

@@ -13,6 +13,7 @@ from .leakage import transmissivity as transmissivity
 from .matching import register as register
 from .opening import dilatancy as dilatancy
 from .profiling import roughness_coefficient as roughness_coefficient
+from .roughening import delta_dimension as delta_dimension
 from .sliding import delta_surface as delta_surface
 from .stiffening import closure_laws as closure_laws
 from .strength import friction as friction
@@ -28,6 +29,7 @@ __all__ = [
     "closure_laws",
     "cyclic_shear",
     "decorrelation_length",
+    "delta_dimension",
     "delta_surface",
     "dilatancy",
     "friction",

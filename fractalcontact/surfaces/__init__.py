@@ -8,6 +8,7 @@ from_array   your own heights on a uniform grid
 read         a file: NetCDF, npy, csv, or an instrument's format
 sample       surfaces that come with the package
 level        remove the mean, a plane or a quadric
+despike      take out points that stand out from all around them
 fill         fill small gaps
 describe     heights, slopes and curvature in numbers
 

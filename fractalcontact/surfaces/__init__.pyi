@@ -1,4 +1,5 @@
 from .brownian import fbm as fbm
+from .despiking import despike as despike
 from .displacement import midpoint as midpoint
 from .measured import from_array as from_array
 from .measured import read as read
@@ -13,6 +14,7 @@ from .waves import weierstrass as weierstrass
 __all__ = [
     "SelfAffine",
     "describe",
+    "despike",
     "fbm",
     "fill",
     "from_array",
