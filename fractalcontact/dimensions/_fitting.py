@@ -16,6 +16,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 LEAST_MODES = 12
 _STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
 _FEW_PROBES, _MANY_POINTS = 3, 1 << 18
+_FEW_POINTS = 1 << 14
+_SLIGHT = 0.01  # share of missing points that one probe is enough for
 
 
 class Modes(Protocol):
@@ -58,14 +60,23 @@ class FreeModes:
         from fractalcontact.dimensions._gaps import PROBES, GappedModes
 
         probes = _FEW_PROBES if heights.size > _MANY_POINTS else PROBES
+        if np.count_nonzero(~observed) < _SLIGHT * heights.size and heights.size > _FEW_POINTS:
+            probes = 1
         gapped = GappedModes(lattice, observed, reference, probes)
         return cls(lattice, chosen, gapped.power(heights)[chosen], order, gapped)
 
     def part(self, kept: Array) -> FreeModes:
-        """Keep some of the chosen modes."""
+        """Keep some of the chosen modes; what slight gaps do to so few is less than their scatter."""
         chosen = np.zeros_like(self.chosen)
         chosen[self.chosen] = kept
-        return replace(self, chosen=chosen, power=self.power[kept], order=self.order[kept])
+        slight = self.gapped is not None and self.gapped.missing < _SLIGHT
+        return replace(
+            self,
+            chosen=chosen,
+            power=self.power[kept],
+            order=self.order[kept],
+            gapped=None if slight else self.gapped,
+        )
 
     def fit(self, start: float, noise: bool) -> _whittle.WhittleFit:
         """Fit from a pilot estimate; with noise from two starts, taking the better end."""
@@ -102,7 +113,8 @@ class FreeModes:
         rows[:, self.chosen] = fit.columns / fit.total * reference[self.chosen]
         meat = 0.25 * self.gapped.score_covariance(rows, fit.hurst, fit.noise / fit.amplitude)
         bread = np.linalg.inv(fit.bread)
-        return float(np.sqrt((bread @ meat @ bread.T)[1, 1]))
+        square = float((bread @ meat @ bread.T)[1, 1])
+        return float(np.sqrt(square)) if square > 0 else float("nan")
 
 
 @dataclass(frozen=True)

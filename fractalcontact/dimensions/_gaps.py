@@ -112,6 +112,7 @@ class GappedModes:
 
     def __init__(self, lattice: Lattice, observed: Array, reference: float, probes: int = PROBES) -> None:
         self.lattice, self.observed = lattice, observed
+        self.missing = float(np.mean(~observed))
         self.filling = Filling(observed, lattice.steps)
         self._root = 1.0 / np.sqrt(expected_power(lattice, reference))
         rng = np.random.default_rng(_SEED)

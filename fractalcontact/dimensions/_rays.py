@@ -26,6 +26,7 @@ FROM_ROUND = 2.447746830680816  # root of 95 % of chi square with two degrees of
 MULTIPLES = (1, 2, 4)
 DIRECTIONS = 8
 LEAST_LAGS = 13  # a curve of three numbers, eight harmonics, and two to spare
+COMPARED = 1 / 3  # of the face, that a second difference may span in a test
 _REACH = 8  # components of a direction that was asked for
 _NEAR = 2.5  # degrees within which the shorter of two lattice directions is better
 _LOWEST, _HIGHEST = 0.02, 0.98  # exponents whose covariances are taken
@@ -57,10 +58,13 @@ class Means:
     steps: tuple[float, float]
 
     @classmethod
-    def of(cls, face: Face, rays: Sequence[Ray], scales: tuple[float, float] | None) -> tuple[Means, Array]:
+    def of(
+        cls, face: Face, rays: Sequence[Ray], scales: tuple[float, float] | None, share: float = 1.0
+    ) -> tuple[Means, Array]:
         """Measure the lags of some directions; return them with the place of the direction of each.
 
-        Lags are 1, 2 and 4 times the step of the lattice, or of the least multiple of it inside `scales` (m).
+        Lags are 1, 2 and 4 times the step of the lattice, or of the least multiple of it inside `scales` (m),
+        as far as the two of them that make a difference fit into a `share` of the face.
         """
         low, high = (0.0, np.inf) if scales is None else scales
         found, owners = [], []
@@ -73,7 +77,7 @@ class Means:
                     found.append((lag * ray.dy, lag * ray.dx))
                     owners.append(place)
         vectors = np.array(found, dtype=np.int64).reshape(-1, 2)
-        inside = (2 * np.abs(vectors) < np.array(face.shape)).all(axis=1)
+        inside = (2 * np.abs(vectors) < share * np.array(face.shape)).all(axis=1)
         vectors, owner = vectors[inside], np.array(owners, dtype=np.int64)[inside]
         slabs = iter([(np.ascontiguousarray(face.heights), face.shape[0])])
         means, counts = _lags.direct(slabs, (0, face.shape[1]), vectors, _lags.SECOND)

@@ -173,7 +173,7 @@ def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] |
         one = undefined(CONSTANT) if face.is_constant else plane()
         return _Turned([one.limited() if np.isfinite(one.hurst) else one] * len(rays), None, one.note)
     means, owner = _rays.Means.of(face, rays, scales)
-    around, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales)
+    around, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales, _rays.COMPARED)
     level = _UNVARIED * max(means.means.max(initial=0.0), around.means.max(initial=0.0))
     varied, smooth = around.part(around.means > level), bool((around.means <= level).any())
     enough = np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > _rays.LEAST_LAGS
