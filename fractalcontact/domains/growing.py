@@ -29,7 +29,7 @@ def minkowski_dimension(
     """Minkowski dimension of a set of cells, from the area within a radius of it.
 
     The area within r of a set of dimension D grows as r^(2 - D). Distances are those between the centres of
-    cells (exact Euclidean distance transform).
+    cells (exact Euclidean distances, up to the longest radius).
 
     Parameters
     ----------
