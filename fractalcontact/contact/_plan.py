@@ -106,7 +106,10 @@ def _range(path: Path, problems: Problems) -> None:
     sizes = (units.length, units.height, units.modulus, units.pressure, units.force, units.energy)
     expected = "spacing, heights and modulus whose products a double can hold"
     if not problems.require(
-        all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes), "surface", expected, f"scales {sizes}"
+        all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes),
+        "surface / contact_modulus",
+        expected,
+        f"scales {sizes}",
     ):
         return
     expected = (

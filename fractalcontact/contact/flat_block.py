@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from fractalcontact.base.checks import Problems
 from fractalcontact.contact._setup import length_unit, make_body
 
@@ -58,7 +60,7 @@ def flat_stiffness(
         modulus = problems.number("contact_modulus", contact_modulus, above=0)
         problems.choice("boundary", boundary, ("free", "periodic"))
         problems.choice("settlement", settlement, ("rigid", "uniform"))
-        if problems.require(len(shape) == 2, "shape", "(ny, nx)", shape):
+        if problems.require(np.shape(shape) == (2,), "shape", "(ny, nx)", shape):
             for n in shape:
                 problems.integer("shape", n, at_least=3)
         steps = problems.numbers("spacing", spacing, above=0)

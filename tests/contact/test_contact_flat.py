@@ -56,6 +56,19 @@ def test_a_nearly_flat_face_closes_like_a_flat_one():
     assert float(found["closure"][0]) == pytest.approx(1e3 / stiffness, rel=1e-8)
 
 
+@pytest.mark.parametrize("shape", [5, None, (3,), ((3, 3), (3, 3)), (3.0, 4.0), (2, 3), "ab"])
+def test_a_stiffness_wants_the_shape_of_a_plane(shape):
+    with pytest.raises(InvalidInput, match="shape"):
+        fc.contact.flat_stiffness(shape, 1.0, contact_modulus=1.0)
+
+
+@pytest.mark.parametrize("factor", [1e-200, 1e200])
+def test_heights_that_no_product_can_hold_are_refused(factor):
+    face = fc.surfaces.from_array(factor * np.eye(8), 1e-3)
+    with pytest.raises(InvalidInput, match="surface / contact_modulus: .* double"):
+        fc.contact.press(face, contact_modulus=MODULUS, closure=0.1 * factor)
+
+
 def test_what_is_wrong_with_a_stiffness_is_listed():
     with pytest.raises(InvalidInput) as caught:
         fc.contact.flat_stiffness((2, 9, 4), -1.0, contact_modulus=0.0, boundary="open")
