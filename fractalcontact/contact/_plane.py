@@ -15,13 +15,15 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
 WHOLE_PLANE = (slice(None), slice(None))
 
-SINGLE_FROM = 96 * 96  # nodes from which single precision first is worth its set-up
+SINGLE_FROM = 384 * 384  # nodes from which single precision first saves time, and is worth being compiled
 SINGLE_ENOUGH = 3e-5  # residual at which double precision takes over
 SINGLE_RANGE = 1e20  # scaled pressures and closures up to which, and down to whose inverse, it may be used
 
 
 def first_precision(problem: Problem, control: Control) -> Any:
-    """Type of number for a first solution: single precision where its range is enough."""
+    """Type of number for a first solution: single precision where it saves time and its range is enough."""
+    if problem.gap.size < SINGLE_FROM:
+        return np.float64
     load = control.value if control.total is None else control.value / problem.gap.size
     small = 1 / SINGLE_RANGE < load < SINGLE_RANGE
     bounded = problem.cap == np.inf or 1 / SINGLE_RANGE < problem.cap < SINGLE_RANGE
@@ -50,8 +52,7 @@ class Plane:
     def solve(self, handed: list[Array], control: Control, tolerance: float) -> Solution:
         """Solve from the pressure in `handed`, which is taken out: nobody else shall hold that array."""
         before = (0, 0)
-        single = first_precision(self.part, control) is np.float32
-        if single and self.part.gap.size >= SINGLE_FROM and tolerance < SINGLE_ENOUGH:
+        if first_precision(self.part, control) is np.float32 and tolerance < SINGLE_ENOUGH:
             rough = self.descent(np.float32).solve(handed.pop(), control, SINGLE_ENOUGH, certify=False)
             before = (rough.iterations, rough.transforms)
             handed.append(rough.pressure)
