@@ -6,12 +6,13 @@ planning   the stages that the wanted results need, and why
 stages     what each stage computes, by calling the rooms
 running    the plan carried out: kept stages, resuming, one NetCDF, the figures
 reporting  the summary on the screen
+statements  what the founding paper says beside what a study finds
 
 Nothing is computed, imported, compiled or stored that no wanted result needs. A scene is TOML:
 
 ``[surface]``     the face: ``read`` a file (with spacing, units, channel), ``sample`` a shipped one, or
-                  ``generate`` with fbm, spectral, midpoint or weierstrass and its arguments; ``level`` and
-                  ``fill`` prepare it
+                  ``generate`` with fbm, spectral, midpoint or weierstrass and its arguments; ``level``,
+                  ``despike`` and ``fill`` prepare it
 ``[upper]``       the facing one, the same way; without it the faces match perfectly
 ``[material]``    young, poisson, basic_friction_angle, hardness
 ``[joint]``       block, direction, shear, normal_force and other arguments of the functions of `joints`;

@@ -1,0 +1,77 @@
+"""The paper's statements beside what a study finds: right on a known joint, and from the file alone."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+from fractalcontact.scenes.statements import caveats, paper_statements, paper_table
+
+
+@pytest.fixture(scope="module")
+def tree():
+    face = fc.surfaces.fbm((128, 128), 8e-5, hurst=0.78, rms_increment=2e-5, rng=3)
+    face = face + 0.1 * (face.x - face.y)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=64 * 8e-5)
+    closing = fc.joints.closure(
+        crack,
+        shear=[8e-5, 2.4e-4, 8e-4],
+        direction="W",
+        normal_force=[5, 100, 300, 1e3, 2e3],
+        keep=("state",),
+    )
+    opening = fc.joints.dilatancy(crack, shear=np.arange(0, 32) * 8e-5)
+    pressed = fc.joints.dilatancy(crack, shear=[0.0, 8e-5, 4e-4], direction=["W"], normal_force=[50, 500])
+    delta = fc.joints.delta_surface(crack, 8e-4, "W")
+    return xr.DataTree.from_dict(
+        {
+            "/joints/closure": closing,
+            "/joints/delta_surface": delta.to_dataset(name="height"),
+            "/joints/rigid_dilatancy": opening,
+            "/joints/elastic_dilatancy": pressed,
+            "/joints/friction": fc.joints.friction(pressed),
+            "/domains/box_dimension": fc.domains.box_dimension(closing.state),
+        }
+    )
+
+
+def row(tree, words):
+    (found,) = [one for one in paper_statements(tree) if words in one.says]
+    return found
+
+
+def test_orders_of_a_self_affine_joint_agree(tree):
+    for words in ("compliance", "equal F falls", "above dimension 2", "less the greater F"):
+        assert row(tree, words).agrees == "yes", words
+    inner = tree["joints/closure"].interface_closure.values[:, -1] * 1e6
+    assert f"{inner[0]:.3g} to {inner[-1]:.3g} um" in row(tree, "compliance").found
+    # few cells touch: the power is told, whether it is near enough to one or not
+    assert row(tree, "proportional").found.startswith("A ~ F^")
+    assert "E +0.1" in row(tree, "mean slope").found
+    assert row(tree, "two directions").agrees == "yes"
+
+
+def test_what_does_not_agree_is_said(tree):
+    backwards = tree.copy()
+    closing = tree["joints/closure"].to_dataset()
+    for name in ("interface_closure", "contact_fraction"):
+        closing[name] = closing[name].copy(data=closing[name].values[::-1])
+    backwards["joints/closure"] = xr.DataTree(closing)
+    assert row(backwards, "compliance").agrees == "no"
+    assert row(backwards, "equal F falls").agrees == "no"
+
+
+def test_caveats_count_cells_and_pressures(tree):
+    told = "\n".join(caveats(tree))
+    closing = tree["joints/closure"]
+    cells = (closing.state.values[:, 0] > 0).sum(axis=(-2, -1))
+    assert f"{cells.min()} to {cells.max()} cells touch" in told
+    pressure = 2e3 / closing.contact_area.values[:, -1] / 1e9
+    assert f"{pressure.min():.2g} to {pressure.max():.2g} GPa" in told
+    assert "small-slope" in told
+
+
+def test_table_is_the_same_from_the_file_alone(tree, tmp_path):
+    path = fc.save(tree, tmp_path / "result.nc")
+    assert paper_table(fc.open(path)) == paper_table(tree)
+    assert fc.scenes.paper_table(xr.DataTree()) == ""
