@@ -1,0 +1,168 @@
+"""What a solution costs, where the work is done, and that the same bits come out however it is done."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base import fft, jit
+from fractalcontact.base.threads import limit
+from fractalcontact.contact import _fast, _plane
+from fractalcontact.contact._descent import Descent
+
+MODULUS = 2.0**30
+
+
+def rough(n, periodic=True, seed=3):
+    cutoffs = {"long_cutoff": n / 4 * 1e-4, "short_cutoff": 4e-4}
+    surface = fc.surfaces.spectral((n, n), 1e-4, hurst=0.8, rms_slope=0.1, rng=seed, **cutoffs)
+    return surface if periodic else fc.surfaces.from_array(surface.values, 1e-4)
+
+
+def press(surface, **options):
+    return fc.contact.press(surface, contact_modulus=MODULUS, **{"keep": (), "tolerance": 1e-6, **options})
+
+
+def same_bits(ours, theirs, exponents):
+    for name, exponent in exponents.items():
+        np.testing.assert_array_equal(
+            np.ldexp(ours[name].values, exponent), theirs[name].values, err_msg=name
+        )
+
+
+@pytest.fixture(params=["ducc0", "scipy"])
+def library(request, monkeypatch):
+    monkeypatch.setenv("FRACTALCONTACT_FFT", request.param)
+    if fft.library() != request.param:
+        pytest.skip(f"{request.param} is not installed")
+    return request.param
+
+
+@pytest.mark.parametrize("single", [True, False])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize(
+    ("control", "force"), [("nominal_pressure", True), ("closure", False), ("hardness", True)]
+)
+def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
+    library, monkeypatch, single, boundary, control, force
+):
+    monkeypatch.setattr(_plane, "SINGLE_FROM", 0 if single else 10**9)
+    monkeypatch.setattr(jit, "SHARE", 1000)  # so that small passes are shared among threads too
+    surface, keep = rough(112), ("state", "pressure", "gap", "displacement")
+    path = (
+        {"nominal_pressure": MODULUS * np.array([1e-3, 4e-3, 2e-3])} if force else {"closure": [2e-5, 3e-5]}
+    )
+    cap = {"hardness": 0.05 * MODULUS} if control == "hardness" else {}
+    with limit(1):
+        ours = press(surface, boundary=boundary, keep=keep, **path, **cap)
+    for threads in (2, 3):
+        with limit(threads):
+            same_bits(
+                ours, press(surface, boundary=boundary, keep=keep, **path, **cap), dict.fromkeys(keep, 0)
+            )
+    # heights and spacing in units 2^7 as long, the modulus in units 2^-9 as great, so pressures too
+    other = fc.surfaces.from_array(surface.values * 2.0**-7, 1e-4 * 2.0**-7, periodic=True)
+    scaled = {name: np.multiply(v, 2.0**9 if force else 2.0**-7) for name, v in path.items()}
+    capped = {name: value * 2.0**9 for name, value in cap.items()}
+    found = fc.contact.press(
+        other,
+        contact_modulus=MODULUS * 2.0**9,
+        boundary=boundary,
+        tolerance=1e-6,
+        keep=keep,
+        **scaled,
+        **capped,
+    )
+    lengths, pressures = dict.fromkeys(("gap", "displacement", "closure"), -7), {"pressure": 9, "state": 0}
+    same_bits(ours, found, {**lengths, **pressures, "iterations": 0, "residual": 0, "elastic_energy": 9 - 21})
+
+
+def test_what_was_solved_before_changes_no_bit():
+    first = press(rough(96), nominal_pressure=MODULUS * 1e-3, keep=("pressure",))
+    press(rough(96, periodic=False, seed=4), closure=1e-5)
+    again = press(rough(96), nominal_pressure=MODULUS * 1e-3, keep=("pressure",))
+    same_bits(first, again, {"pressure": 0, "closure": 0})
+
+
+@pytest.mark.parametrize("share", [0.001, 0.01, 0.03])
+def test_pairs_of_transforms_hardly_grow_with_the_grid(share):
+    sizes = (128, 256, 512)
+    pairs = [
+        np.mean(
+            [
+                press(rough(n, seed=seed), nominal_pressure=share * MODULUS)["transforms"].item()
+                for seed in (1, 2)
+            ]
+        )
+        for n in sizes
+    ]
+    assert np.polyfit(np.log(sizes), np.log(pairs), 1)[0] < 0.35
+    assert max(pairs) < 40
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_a_path_takes_few_pairs_a_step(periodic):
+    path = MODULUS * np.geomspace(5e-4, 5e-2, 20)
+    found = press(rough(128, periodic), nominal_pressure=np.concatenate([path, path[::-1]]))
+    assert bool(found["converged"].all())
+    assert float(found["transforms"].mean()) < 40
+    assert int(found["transforms"].max()) < 60
+
+
+def test_a_periodic_solve_keeps_eight_arrays_beyond_the_heights():
+    surface = rough(640)
+    press(rough(400), nominal_pressure=MODULUS * 1e-2)  # compiled
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        found = press(surface, nominal_pressure=MODULUS * 1e-2)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert bool(found["converged"].all())
+    assert (peak - before) / surface.values.nbytes < 8
+
+
+@pytest.fixture
+def grids(monkeypatch):
+    """Return the shapes of the grids that are solved on, in turn."""
+    seen, honest = [], Descent.solve
+
+    def solve(self, *arguments, **options):
+        seen.append(self.gap.shape)
+        return honest(self, *arguments, **options)
+
+    monkeypatch.setattr(Descent, "solve", solve)
+    return seen
+
+
+@pytest.mark.parametrize("corner", [(40, 50), (150, 170), (199, 0)])
+def test_a_free_contact_is_solved_where_it_touches(monkeypatch, grids, corner):
+    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    y, x = np.ogrid[:200, :200]
+    ball = -((y - corner[0]) ** 2 + (x - corner[1]) ** 2) * 1e-10 / 2
+    surface = fc.surfaces.from_array(ball + 1e-9 * rough(200).values, 1e-5)
+    closure = (20 * 1e-5) ** 2
+    found = press(surface, closure=closure, keep=("state",))
+    assert bool(found["converged"].all())
+    ny, nx = grids[-1]
+    assert ny * nx < 0.15 * surface.size
+    touched = np.argwhere(found["state"].values[0] > 0)
+    assert (np.ptp(touched, axis=0) < (ny, nx)).all()
+    forced = press(surface, normal_force=found["normal_force"].values, keep=("state",))
+    assert grids[-1][0] * grids[-1][1] < 0.15 * surface.size
+    np.testing.assert_array_equal(forced["state"], found["state"])
+
+
+def test_a_periodic_body_looks_for_no_window_and_a_full_contact_takes_the_plane(monkeypatch, grids):
+    press(rough(128, periodic=False), nominal_pressure=MODULUS)
+    assert grids[-1] == (128, 128)
+
+    def never(*arguments):
+        raise AssertionError("a periodic body has no window")
+
+    monkeypatch.setattr(_fast.Fast, "window", never)
+    monkeypatch.setattr(_fast.Fast, "ordered", property(never))
+    press(rough(64), nominal_pressure=[MODULUS * 1e-4, MODULUS])
