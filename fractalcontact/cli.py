@@ -69,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     accuracy.add_argument(
         "--large", action="store_true", help="with --extreme: those of minutes and gigabytes too"
     )
+    accuracy.add_argument("--curves", metavar="FILE", help="write the curves that scenes choose from")
     bench = accuracy.add_argument_group("of estimators")
     bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
     bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (64 256 1024)")
@@ -145,6 +146,10 @@ def _accuracy(options: argparse.Namespace) -> int:
         return _estimators(options)
     result = accuracy.measure(options.parts or None, budget=options.budget)
     print(curves_table(result))
+    if options.curves is not None:
+        from fractalcontact.accuracy.curves import write
+
+        write(result, options.curves)
     if options.out is not None:
         from fractalcontact.base.netcdf import save
         from fractalcontact.plotting import error_against_time
@@ -187,10 +192,9 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from fractalcontact.base.netcdf import open as open_result
     from fractalcontact.scenes.reporting import contents
 
-    print(contents(open_result(options.file)))
+    print(contents(options.file))
     return 0
 
 

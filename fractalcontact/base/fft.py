@@ -13,7 +13,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import scipy.fft
 
 from fractalcontact.base.threads import thread_count
 
@@ -32,7 +31,7 @@ def writes_in_place() -> bool:
 
 def fast_length(n: int, *, real: bool = True) -> int:
     """Return the smallest length >= n that transforms fast."""
-    return int(scipy.fft.next_fast_len(int(n), real=real))
+    return int(_scipy().next_fast_len(int(n), real=real))
 
 
 def rfft2(plane: Array, out: Array | None = None) -> Array:
@@ -61,7 +60,7 @@ def fft2(plane: Array) -> Array:
     """Transform the last two axes of a complex array."""
     if library() == "ducc0":
         return _ducc0().c2c(plane, axes=_axes(plane, (-2, -1)), forward=True, nthreads=_ducc_threads())  # type: ignore[no-any-return]
-    return scipy.fft.fft2(plane, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().fft2(plane, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def ifft(modes: Array) -> Array:
@@ -70,7 +69,7 @@ def ifft(modes: Array) -> Array:
         return _ducc0().c2c(  # type: ignore[no-any-return]
             modes, axes=_axes(modes, (-1,)), forward=False, inorm=2, nthreads=_ducc_threads()
         )
-    return scipy.fft.ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def cosine(corner: Array, axes: tuple[int, ...]) -> Array:
@@ -83,7 +82,7 @@ def cosine(corner: Array, axes: tuple[int, ...]) -> Array:
         return _ducc0().dct(  # type: ignore[no-any-return]
             corner, axes=_axes(corner, axes), type=1, inorm=0, nthreads=_ducc_threads()
         )
-    return scipy.fft.dctn(corner, type=1, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().dctn(corner, type=1, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
@@ -94,7 +93,7 @@ def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     """
     if library() == "ducc0":
         return _ducc0().dct(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
-    return scipy.fft.dctn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().dctn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
@@ -104,7 +103,7 @@ def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     """
     if library() == "ducc0":
         return _ducc0().dst(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
-    return scipy.fft.dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
@@ -123,8 +122,8 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
         _ducc0().r2c(rows, axes=(1,), forward=True, nthreads=_ducc_threads(), out=out[:ny])
         return _ducc0().c2c(out, axes=(0,), forward=True, nthreads=_ducc_threads(), out=out)  # type: ignore[no-any-return]
     threads = thread_count()
-    modes = scipy.fft.rfft(plane, n=padded[1], axis=1, workers=threads)
-    return scipy.fft.fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
+    modes = _scipy().rfft(plane, n=padded[1], axis=1, workers=threads)
+    return _scipy().fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
 
 
 def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]) -> Array:
@@ -138,8 +137,8 @@ def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]
         )
         return np.ascontiguousarray(rows[:, :nx])
     threads = thread_count()
-    modes = scipy.fft.ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
-    return np.ascontiguousarray(scipy.fft.irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx])
+    modes = _scipy().ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
+    return np.ascontiguousarray(_scipy().irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx])
 
 
 def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
@@ -150,6 +149,14 @@ def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
     step = 2.0 * np.pi / (n * spacing)
     index = np.arange(n // 2 + 1) if real else np.fft.fftfreq(n, 1.0 / n)
     return np.asarray(index * step)
+
+
+@cache
+def _scipy() -> Any:
+    """Return scipy's transforms: imported with the first of them, because that takes longer than numpy."""
+    import scipy.fft
+
+    return scipy.fft
 
 
 @cache
@@ -177,7 +184,7 @@ def _forward(array: Array, axes: tuple[int, ...], out: Array | None) -> Array:
         return _ducc0().r2c(  # type: ignore[no-any-return]
             array, axes=_axes(array, axes), forward=True, nthreads=_ducc_threads(), out=out
         )
-    modes = scipy.fft.rfftn(array, axes=axes, workers=thread_count())
+    modes = _scipy().rfftn(array, axes=axes, workers=thread_count())
     if out is None:
         return modes  # type: ignore[no-any-return]
     out[...] = modes
@@ -198,7 +205,7 @@ def _backward(
             out=out,
             allow_overwriting_input=overwrite,
         )
-    plane = scipy.fft.irfftn(modes, s=shape, axes=axes, workers=thread_count(), overwrite_x=overwrite)
+    plane = _scipy().irfftn(modes, s=shape, axes=axes, workers=thread_count(), overwrite_x=overwrite)
     if out is None:
         return plane  # type: ignore[no-any-return]
     out[...] = plane

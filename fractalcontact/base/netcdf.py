@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +101,57 @@ def open(path: str | os.PathLike[str]) -> Any:
     array = dataset[kind]
     array.attrs.update({key: dataset.attrs[key] for key in _GLOBAL if key in dataset.attrs})
     return array
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a group of a file holds: its attributes, and the sizes and attributes of each variable."""
+
+    attrs: dict[str, Any]
+    variables: dict[str, tuple[dict[str, int], dict[str, Any]]]
+
+
+def outline(path: str | os.PathLike[str]) -> dict[str, Outline]:
+    """Return what a NetCDF file holds, group by group, without reading a number.
+
+    Raises
+    ------
+    UnreadableFile
+        The file does not exist, is truncated, or is not NetCDF.
+    """
+    import netCDF4
+
+    source = Path(path)
+    where = "fractalcontact.open"
+    if not source.is_file():
+        raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    found: dict[str, Outline] = {}
+
+    def walk(group: Any, place: str) -> None:
+        found[place or "/"] = Outline(
+            dict(group.__dict__),
+            {
+                str(name): (_sizes(variable), dict(variable.__dict__))
+                for name, variable in group.variables.items()
+            },
+        )
+        for name, child in group.groups.items():
+            walk(child, f"{place}/{name}")
+
+    try:
+        with netCDF4.Dataset(source) as file:
+            walk(file, "")
+    except (OSError, RuntimeError) as error:
+        raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+    return found
+
+
+def _sizes(variable: Any) -> dict[str, int]:
+    """Return dims and lengths; the characters of words are no dim."""
+    sizes = dict(zip(variable.dimensions, map(int, variable.shape), strict=True))
+    return {
+        dim: size for dim, size in sizes.items() if not (variable.dtype == "S1" and dim.startswith("string"))
+    }
 
 
 def _why_not(folder: Path, error: Exception) -> str:

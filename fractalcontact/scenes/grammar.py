@@ -10,7 +10,7 @@ import importlib
 import inspect
 from collections.abc import Mapping
 
-READING = ("read", "sample", "channel", "units", "spacing", "level", "fill")
+READING = ("read", "sample", "channel", "units", "spacing", "level", "despike", "fill")
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
 SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
 
@@ -80,7 +80,19 @@ WANTED: Mapping[str, tuple[str, ...]] = {
     "domains": tuple(DOMAIN_STAGES),
     "keep": ("state", "pressure", "gap"),
 }
-TABLES = ("title", "surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
+CHOICE = ("error", "budget")
+TABLES = (
+    "title",
+    *CHOICE,
+    "surface",
+    "upper",
+    "material",
+    "contact",
+    "joint",
+    "dimensions",
+    "domains",
+    "want",
+)
 
 # bounds of the plain numbers of a scene: (above, at_least, below)
 BOUNDS: Mapping[str, tuple[float | None, float | None, float | None]] = {

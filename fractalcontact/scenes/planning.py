@@ -10,6 +10,7 @@ from fractalcontact.base.text import table
 from fractalcontact.scenes.grammar import LOADS
 
 if TYPE_CHECKING:
+    from fractalcontact.scenes.choosing import Choice
     from fractalcontact.scenes.scene import Scene
 
 
@@ -44,6 +45,7 @@ class Plan:
 
     scene: str
     stages: tuple[Stage, ...] = field(default=())
+    choices: tuple[Choice, ...] = field(default=())
 
     def __iter__(self) -> Iterator[Stage]:
         """Iterate over the stages in order."""
@@ -57,11 +59,14 @@ class Plan:
         """Return a table: stage, what it needs, why it is there."""
         rows: list[tuple[str, ...]] = [("stage", "needs", "because")]
         rows += [(s.name + ("" if s.stored else " (not stored)"), ", ".join(s.needs), s.reason) for s in self]
-        return table(rows)
+        picked = [f"picked: {choice}" for choice in self.choices]
+        return "\n".join([table(rows), *picked])
 
 
 def plan(scene: Scene) -> Plan:
     """Return the stages that the wanted results of a scene need, and no other.
+
+    With `error` or `budget` in the scene, also the methods and tolerances that are picked for it.
 
     Parameters
     ----------
@@ -73,6 +78,14 @@ def plan(scene: Scene) -> Plan:
     Plan
         Prints as a table.
     """
+    from fractalcontact.scenes.choosing import choose
+
+    scene, choices = choose(scene)
+    return Plan(scene.name, stages_of(scene), choices)
+
+
+def stages_of(scene: Scene) -> tuple[Stage, ...]:
+    """Return the stages of a scene in which nothing is left to be picked."""
     stages: list[Stage] = []
     wanted_surface = scene.wanted("surfaces")
     height_stored = "height" in wanted_surface or scene.figures
@@ -87,7 +100,7 @@ def plan(scene: Scene) -> Plan:
     if scene.figures:
         stored = tuple(stage.name for stage in stages if stage.stored)
         stages.append(Stage(FIGURES, stored, "figures are wanted", stored=False))
-    return Plan(scene.name, tuple(stages))
+    return tuple(stages)
 
 
 FIGURES = "figures"
@@ -184,7 +197,7 @@ def _maps(scene: Scene, *, of_contact: bool) -> tuple[str, ...]:
 
 def check_loads(scene: Scene, problems: list[str]) -> None:
     """Note which stages of the joint lack their shear or their load, or have more than one."""
-    for stage in plan(scene):
+    for stage in stages_of(scene):
         room, _, name = stage.name.partition("/")
         if room != "joints":
             continue

@@ -109,7 +109,8 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
 
 def _check(scene: Scene, problems: Problems) -> None:
     _known_keys(scene.tables, grammar.TABLES, "", problems)
-    for name in grammar.TABLES[1:]:
+    _check_choice(scene, problems)
+    for name in grammar.TABLES[3:]:
         if not isinstance(scene.tables.get(name, {}), dict):
             problems.add(name, "a table", scene.tables[name])
             return
@@ -130,6 +131,14 @@ def _check(scene: Scene, problems: Problems) -> None:
     _check_wanted(scene, problems)
     for name in ("surface", "upper", "material", "contact", "joint"):
         _check_numbers(scene.table(name), name, problems)
+
+
+def _check_choice(scene: Scene, problems: Problems) -> None:
+    given = [key for key in grammar.CHOICE if key in scene.tables]
+    if len(given) > 1:
+        problems.add("error / budget", "one of them", "both")
+    for key in given:
+        problems.number(key, scene.tables[key], above=0, below=1 if key == "error" else None)
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.netcdf import Outline, outline
 from fractalcontact.base.text import table
+from fractalcontact.scenes.statements import paper_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import xarray as xr
 
 
@@ -19,6 +21,7 @@ def summary(tree: xr.DataTree) -> str:
     """Return the main figures of a study with the errors reached and the run time of every stage."""
     parts = [
         str(tree.attrs.get("title", tree.name or "result")),
+        _picked(tree),
         _dimensions(tree),
         _contact(tree),
         _faces(tree),
@@ -26,25 +29,32 @@ def summary(tree: xr.DataTree) -> str:
         _dilatancy(tree),
         _friction(tree),
         _domains(tree),
+        paper_table(tree),
         stage_table(tree),
     ]
     return "\n\n".join(part for part in parts if part)
 
 
-def contents(result: xr.DataTree | xr.Dataset | xr.DataArray) -> str:
-    """Return what a file holds: its groups and variables, then the stages with their errors and times."""
-    import xarray as xr
+def contents(path: str | os.PathLike[str]) -> str:
+    """Return what a file holds: its groups and variables, then the stages with their errors and times.
 
-    if isinstance(result, xr.DataTree):
-        groups = {node.path: node.to_dataset(inherit=False) for node in result.subtree}
-    else:
-        groups = {"/": result.to_dataset() if isinstance(result, xr.DataArray) else result}
-    lines = [str(result.attrs[key]) for key in ("title", "source", "completeness") if key in result.attrs]
-    for path, dataset in groups.items():
-        if dataset.variables:
-            lines += ["", path, *_variable_lines(dataset), *_reason_lines(dataset)]
-    stages = stage_table(result)
-    return "\n".join(lines) + (f"\n\n{stages}" if stages else "")
+    Raises
+    ------
+    UnreadableFile
+        There is no such file, or it is not complete.
+    """
+    groups = outline(path)
+    root = groups["/"]
+    told = ("title", "source", "completeness", "picked")
+    lines = [str(root.attrs[key]) for key in told if key in root.attrs]
+    for place, group in groups.items():
+        if group.variables:
+            lines += ["", place, *_variable_lines(group), *_reason_lines(group)]
+    for place, group in groups.items():
+        stages = stage_table(group)
+        if stages and (place == "/" or not root.attrs.get("provenance")):
+            lines += ["", stages]
+    return "\n".join(lines)
 
 
 def stage_table(result: Any) -> str:
@@ -71,9 +81,17 @@ def _entry(result: Any) -> dict[str, Any]:
     return entry if isinstance(entry, dict) else {}
 
 
+_ORIGIN = ("parameters", "version", "fft", "threads", "random", "stages")
+
+
 def _single_entry(entry: dict[str, Any]) -> str:
-    told = {key: entry[key] for key in ("call", "run_time", "residual", "iterations") if key in entry}
-    return ", ".join(f"{key} {value}" for key, value in told.items())
+    """Return the call of a single result with its run time and its achieved errors."""
+    told = {key: value for key, value in entry.items() if key not in _ORIGIN and value is not None}
+    return ", ".join(f"{key.replace('_', ' ')} {_short(value)}" for key, value in told.items())
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _told(facts: dict[str, Any]) -> Iterable[str]:
@@ -87,21 +105,18 @@ def _told(facts: dict[str, Any]) -> Iterable[str]:
             yield f"{word} {value:.2g}" if isinstance(value, float) else f"{word} {value}"
 
 
-def _variable_lines(dataset: xr.Dataset) -> Iterable[str]:
-    for name, variable in dataset.variables.items():
-        dims = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
-        units = variable.attrs.get("units", "")
-        yield f"  {name!s:<28} ({dims})  {variable.attrs.get('long_name', '')}" + (
-            f" [{units}]" if units else ""
-        )
+def _variable_lines(group: Outline) -> Iterable[str]:
+    for name, (sizes, attributes) in group.variables.items():
+        dims = ", ".join(f"{dim} {size}" for dim, size in sizes.items())
+        units = attributes.get("units", "")
+        yield f"  {name:<28} ({dims})  {attributes.get('long_name', '')}" + (f" [{units}]" if units else "")
 
 
-def _reason_lines(dataset: xr.Dataset) -> Iterable[str]:
-    for name, variable in dataset.variables.items():
+def _reason_lines(group: Outline) -> Iterable[str]:
+    for name, (_, attributes) in group.variables.items():
         for key in ("note", "not_given"):
-            if key in variable.attrs:
-                for methods, reason in _reasons(dataset[name], key).items():
-                    yield f"    {name}, {methods}: {reason}"
+            for methods, reason in _reasons(attributes, key).items():
+                yield f"    {name}, {methods}: {reason}"
 
 
 def _group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
@@ -110,6 +125,10 @@ def _group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
     except KeyError:
         return None
     return node.to_dataset() if node.has_data else None
+
+
+def _picked(tree: xr.DataTree) -> str:
+    return "\n".join(f"picked: {one}" for one in str(tree.attrs.get("picked", "")).split("; ") if one)
 
 
 def _dimensions(tree: xr.DataTree) -> str:
@@ -132,14 +151,18 @@ def _dimensions(tree: xr.DataTree) -> str:
                 f"{abs(misfit):.1f} standard deviations" if np.isfinite(misfit) else "",
             )
         )
-    notes = _reasons(found["hurst"], "note") | _reasons(found["ci_low"], "not_given")
+    notes = _reasons(found["hurst"].attrs, "note") | _reasons(found["ci_low"].attrs, "not_given")
     return "\n".join([table(rows), *(f"  {method}: {reason}" for method, reason in notes.items() if reason)])
 
 
-def _reasons(variable: xr.DataArray, key: str) -> dict[str, str]:
+def _reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
     """Return the reasons that a variable gives, by method; one for several methods is told once."""
+    try:
+        given = json.loads(attributes.get(key, "{}"))
+    except (TypeError, ValueError):
+        return {}
     reasons: dict[str, list[str]] = {}
-    for method, reason in json.loads(variable.attrs.get(key, "{}")).items():
+    for method, reason in given.items() if isinstance(given, dict) else ():
         reasons.setdefault(str(reason), []).append(method)
     return {", ".join(methods): reason for reason, methods in reasons.items()}
 

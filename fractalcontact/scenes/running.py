@@ -15,8 +15,9 @@ from fractalcontact.base import netcdf, provenance, schema, stopping
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
 from fractalcontact.scenes import stages
+from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.keeping import Store, digest
-from fractalcontact.scenes.planning import FIGURES, Stage, plan
+from fractalcontact.scenes.planning import FIGURES, Stage, stages_of
 from fractalcontact.scenes.reading import load
 from fractalcontact.scenes.scene import Scene
 
@@ -109,8 +110,9 @@ class _Study:
     """
 
     def __init__(self, scene: Scene, store: Store, progress: bool, client: Any) -> None:
+        scene, self.choices = choose(scene)
         self.scene, self.store, self.progress, self.client = scene, store, progress, client
-        self.plan = plan(scene)
+        self.plan = stages_of(scene)
         self.parts: dict[str, dict[int, xr.Dataset]] = {}
         self.results: dict[str, xr.Dataset] = {}
         self.seconds: dict[str, float] = {}
@@ -246,6 +248,8 @@ class _Study:
             stages=self.record(),
         )
         tree.attrs = root.attrs
+        if self.choices:
+            tree.attrs["picked"] = "; ".join(map(str, self.choices))
         if missing:
             tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
         return tree

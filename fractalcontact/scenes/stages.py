@@ -22,7 +22,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
-from fractalcontact.scenes.planning import loads_of, plan
+from fractalcontact.scenes.planning import loads_of, stages_of
 from fractalcontact.scenes.scene import Scene, Table
 
 if TYPE_CHECKING:
@@ -203,7 +203,7 @@ def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Pro
         crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
     if crack is None:
         return
-    for stage in plan(scene):
+    for stage in stages_of(scene):
         given = scene.options("joint", stage.name.removeprefix("joints/"), ("shear", "direction"))
         if stage.name.startswith("joints/") and "shear" in given:
             _check_travel(crack, given, stage.name, problems)
@@ -240,7 +240,7 @@ def read_surface(table: Table, folder: Path) -> xr.DataArray:
     """Return the face that a table of the scene describes."""
     from fractalcontact import surfaces
 
-    options = {key: value for key, value in table.items() if key not in ("level", "fill")}
+    options = {key: value for key, value in table.items() if key not in ("level", "despike", "fill")}
     if "generate" in options:
         generate: Callable[..., xr.DataArray] = getattr(surfaces, options.pop("generate"))
         face = generate(**options)
@@ -248,11 +248,24 @@ def read_surface(table: Table, folder: Path) -> xr.DataArray:
         face = surfaces.sample(options.pop("sample"))
     else:
         face = surfaces.read(locate(options.pop("read"), folder), **options)
+    if table.get("despike"):
+        face = surfaces.despike(face)
     if table.get("fill"):
         face = surfaces.fill(face)
     if "level" in table:
         face = surfaces.level(face, table["level"])
     return face
+
+
+def face_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return shape and spacings (y, x; m) of the face; one that is generated is not made for that."""
+    table = scene.table("surface")
+    if "generate" in table:
+        shape, spacing = np.broadcast_to(table["shape"], 2), np.broadcast_to(table["spacing"], 2)
+        return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
+    face = read_surface(table, scene.folder)
+    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
+    return (face.sizes["y"], face.sizes["x"]), (steps[0], steps[1])
 
 
 def locate(path: str, folder: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,8 @@ from fractalcontact.accuracy.trials.trial import Contest, Experiment
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Case = tuple["xr.DataArray", dict[str, Any]]
 
 HURST, MEMBERS = 0.7, 12
 NOISE = 0.1  # variance over half the variogram at lag 1
@@ -28,12 +31,16 @@ def contests() -> tuple[Contest, ...]:
         _experiment(f"{default}, noise told", default, SIZES[:4], NOISE, {"noise": True}),
         _experiment(f"{default}, noise untold", default, SIZES[:4], NOISE, {}),
     )
+
+    def window(knob: float) -> Case:
+        return _faces(256, 0.0), {"scales": (1.0, 256.0 / knob)}
+
     windows = Experiment(
         "variogram, lags to n / knob",
         (32, 16, 8, 4, 2),
-        lambda knob: (_faces(256, 0.0), {"scales": (1.0, 256.0 / knob)}),
+        window,
         partial(_hurst, "variogram"),
-        _error,
+        _errors("variogram", window),
         "points along an edge over the longest lag",
     )
     return (
@@ -52,9 +59,10 @@ def contests() -> tuple[Contest, ...]:
 def _experiment(
     name: str, method: str, sizes: tuple[int, ...], noise: float, options: dict[str, Any]
 ) -> Experiment:
-    return Experiment(
-        name, sizes, lambda n: (_faces(int(n), noise), options), partial(_hurst, method), _error
-    )
+    def prepare(n: float) -> Case:
+        return _faces(int(n), noise), options
+
+    return Experiment(name, sizes, prepare, partial(_hurst, method), _errors(method, prepare))
 
 
 @lru_cache(maxsize=8)
@@ -68,13 +76,23 @@ def _faces(n: int, noise: float) -> xr.DataArray:
     return faces
 
 
-def _hurst(method: str, case: tuple[xr.DataArray, dict[str, Any]]) -> list[float]:
-    """Return the exponent of the first surface; the others are estimated with it."""
+def _hurst(method: str, case: Case) -> float:
+    """Return the exponent of one surface: what is timed."""
+    faces, options = case
+    return _exponents(method, faces.isel(member=0), options)[0]
+
+
+def _exponents(method: str, faces: xr.DataArray, options: dict[str, Any]) -> list[float]:
     from fractalcontact import dimensions as room
 
-    faces, options = case
     return [float(v) for v in room.estimate(faces, [method], **options)["hurst"].values.ravel()]
 
 
-def _error(found: list[float], _: float) -> float:
-    return float(np.sqrt(np.nanmean((np.asarray(found) - HURST) ** 2)))
+def _errors(method: str, prepare: Callable[[float], Case]) -> Callable[[float, float], float]:
+    """Return the error over all surfaces, of which one was timed."""
+
+    def error(_: float, knob: float) -> float:
+        faces, options = prepare(knob)
+        return float(np.sqrt(np.nanmean((np.asarray(_exponents(method, faces, options)) - HURST) ** 2)))
+
+    return error
