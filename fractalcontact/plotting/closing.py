@@ -156,16 +156,16 @@ def shear_key(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
         _style.key(ax, title, texts, colours)
 
 
-def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0, *, below: bool = False) -> None:
-    """Mark points of a curve with letters, beginning with letter number `first`, above or below it."""
-    place: dict[str, Any] = {"xytext": (-5, 4), "ha": "right"}
-    if below:
-        place = {"xytext": (3, -4), "ha": "left", "va": "top"}
-    ax.plot(x, y, "o", color=colour, mec="white", mew=0.8, ms=5.5, zorder=4)
+def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
+    """Mark points of a curve with letters in rings, beginning with letter number `first`.
+
+    The letters stand on their points, so that none lies on another curve.
+    """
+    ax.plot(x, y, "o", mfc="white", mec=colour, mew=1.2, ms=10.5, zorder=4, clip_on=False)
     for number, (a, b) in enumerate(zip(x, y, strict=True), first):
         if np.isfinite(a) and np.isfinite(b):
-            ax.annotate(_style.letter(number), (a, b), textcoords="offset points", fontsize=8, weight="bold",
-                        path_effects=_style.halo(), zorder=5, **place)  # fmt: skip
+            ax.annotate(_style.letter(number), (a, b), fontsize=7, weight="bold", ha="center",
+                        va="center_baseline", zorder=5, annotation_clip=False)  # fmt: skip
 
 
 def from_zero(ax: Axes, x: Any, y: Any) -> None:

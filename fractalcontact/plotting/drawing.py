@@ -66,6 +66,7 @@ def drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
         ("domains/lacunarity", "lacunarity", _lacunarity),
         ("domains/islands", "islands", domain_maps.islands),
         ("joints/transmissivity", "hydraulic_aperture", leakage.hydraulic_aperture),
+        ("contact", "closure_law", closing.closure_laws),
         ("contact", "contact_area", closing.contact_area),
     ):
         data = group(tree, path)

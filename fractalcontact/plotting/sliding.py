@@ -127,14 +127,8 @@ def elastic_dilatancy(
     for number, place in enumerate(marked):
         at = nearest(shear, place)
         if np.isclose(shear[at], place, rtol=1e-6, atol=0.0):
-            mark(
-                ax,
-                along(shear[at : at + 1]),
-                across(opening[at : at + 1, -1]),
-                colours[-1],
-                number,
-                below=True,
-            )
+            point = slice(at, at + 1)
+            mark(ax, along(shear[point]), across(opening[point, -1]), colours[-1], number)
     title, texts = load_words(data)
     entries += [_style.line_entry(text, color=colour) for text, colour in zip(texts, colours, strict=True)]
     ax.set_xlabel(axis_label(data["shear"], along))

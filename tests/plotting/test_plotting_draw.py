@@ -69,9 +69,9 @@ def test_study_without_a_joint(whole_study, tmp_path):
 
     pressed = whole_study["joints/closure"].to_dataset().isel(shear=0, drop=True)
     tree = xr.DataTree.from_dict({"/contact": pressed})
-    assert names(plotting.draw(tree, tmp_path)) == ["contact_area", "contact_domains"]
+    assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area", "contact_domains"]
     tree = xr.DataTree.from_dict({"/contact": pressed.drop_vars("state")})
-    assert names(plotting.draw(tree, tmp_path)) == ["contact_area"]
+    assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area"]
 
 
 def test_closure_without_maps(whole_study, tmp_path):
