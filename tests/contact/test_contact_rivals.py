@@ -69,6 +69,7 @@ def aspher(heights, pressure, boundary):
     return np.array(found.pressure, dtype=float).reshape(N, N)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 @pytest.mark.parametrize("rival", [tamaas, contact_mechanics, aspher])
 def test_pressure_and_area_agree(rival, boundary):

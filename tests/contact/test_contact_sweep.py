@@ -17,8 +17,6 @@ from fractalcontact.base.threads import limit
 pytestmark = pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.ConvergenceWarning")
 ROUNDED = 1  # stop_reason: the tolerance is beyond what rounding leaves
 
-FEW, MANY = range(120), range(1000, 1700)
-
 
 def verdict(case):
     """What is wrong with the result of a case; a step that stopped at rounding has said why."""
@@ -57,7 +55,7 @@ def test_the_judge_finds_a_wrong_result():
         assert judge(case, spoilt), name
 
 
-@pytest.mark.parametrize("seed", range(200, 240))
+@pytest.mark.parametrize("seed", range(200, 224))
 def test_a_power_of_two_in_units_changes_no_bit(seed):
     case = draw(seed, largest=64)
     metre, pascal = 2.0**-13, 2.0**11
@@ -80,7 +78,7 @@ def test_a_power_of_two_in_units_changes_no_bit(seed):
         np.testing.assert_array_equal(case.press()["pressure"], ours["pressure"])
 
 
-@pytest.mark.parametrize("seed", range(300, 340))
+@pytest.mark.parametrize("seed", range(300, 324))
 def test_elimination_finds_the_same_set_and_force(seed):
     case = draw(seed, largest=16)
     case.options.pop("hardness", None)
@@ -97,7 +95,7 @@ def test_elimination_finds_the_same_set_and_force(seed):
         np.testing.assert_array_equal(one["state"].where(~doubtful), other["state"].where(~doubtful))
 
 
-@pytest.mark.parametrize("seed", range(400, 430))
+@pytest.mark.parametrize("seed", range(400, 416))
 def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
     case = draw(seed, largest=96)
     case.options.pop("hardness", None)
@@ -119,7 +117,7 @@ def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
 def test_what_a_residual_says_about_the_pressure():
     """The energy of the error is within its bound; the relative error is about the residual."""
     ratios = []
-    for seed in range(500, 540):
+    for seed in range(500, 530):
         case = draw(seed, largest=40)
         case.options.pop("hardness", None)
         control = next(
@@ -139,7 +137,7 @@ def test_what_a_residual_says_about_the_pressure():
             assert energy <= residual * scale * max(p.sum(), q.sum()) * (1 + 1e-9)
             if residual < 1e-3:
                 ratios.append(np.linalg.norm(p - q) / np.linalg.norm(q) / residual)
-    assert len(ratios) > 20
+    assert len(ratios) > 15
     assert np.median(ratios) < 3
     assert max(ratios) < 50
 
