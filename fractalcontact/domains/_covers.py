@@ -63,8 +63,8 @@ def every_offset(cells: Array, size: int, periodic: Sequence[bool]) -> tuple[Arr
     rows, across = (bands(n, size, wraps) for n, wraps in zip(cells.shape, periodic, strict=True))
     whole = across[:, 1] - across[:, 0] == size
     count, area = np.zeros((2, size, size), np.int64)
-    columns = np.zeros((2, nx), np.int32)
-    prefix = np.zeros((2, nx + 1 + (size if periodic[1] else 0)), np.int32)
+    columns = np.zeros((3, nx), np.int32)
+    prefix = np.zeros((2, nx + 1 + (2 * size if periodic[1] else 0)), np.int32)
     met, lost = np.zeros((2, size, int(whole.sum())), np.int32)
     cover(cells, size, rows, across[~whole], columns, prefix, met, lost, count, area)
     count += _by_offset(met, size)
@@ -82,29 +82,23 @@ def _by_offset(values: Array, size: int) -> Array:
 def bands(n: int, size: int, wraps: bool) -> Array:
     """Cut an axis of n cells into bands of `size`, for every offset of the grid.
 
-    Each row is (start, stop, start and stop of the band before, of the band after, offset). Whole bands come
-    first, in order. On a free axis the bands at the ends are cut; on a periodic one there is a remainder
-    between the last band and the first, where starts and stops may lie beyond n. Neighbours are given for
-    cut bands only.
+    Each row is (start, stop, start and stop with the bands beside it, offset). Whole bands come first, in
+    order. On a free axis the bands at the ends are cut; on a periodic one there is a remainder between the
+    last band and the first, where starts and stops may lie beyond n. Neighbours are given for cut bands only.
     """
+    start = np.arange(n // size * size if wraps else n - size + 1)
+    whole = np.stack([start, start + size, 0 * start, 0 * start, start % size], axis=-1)
     if wraps:
-        start = np.arange(n // size * size)
-        rest = np.arange(size) + n // size * size
-        stop = np.arange(size) + n
-        near, far = (size, size) if n >= size else (0, 0)
-        ends = np.stack([rest, stop, rest - near, rest, stop - n, stop - n + far, np.arange(size)], axis=-1)
-        ends = ends[rest < stop]
+        offset = np.arange(size)
+        start, stop = offset + n // size * size, offset + n
+        beyond = size if n >= size else 0
+        ends = np.stack([start, stop, start - beyond, stop + beyond, offset], axis=-1)[start < stop]
     else:
-        start = np.arange(n - size + 1)
-        low = np.arange(1, size)  # the rows of the band at the low end, or of that at the high end
-        top = np.stack([0 * low, low, low, low + size, low, low, low], axis=-1)
-        bottom = np.stack(
-            [n - low, 0 * low + n, n - low - size, n - low, n - low, n - low, (n - low) % size], -1
-        )
-        ends = np.concatenate([top, bottom[low <= n]])
-        ends[:, :6] = np.clip(ends[:, :6], 0, n)
-    blank = np.zeros_like(start)
-    whole = np.stack([start, start + size, blank, blank, blank, blank, start % size], axis=-1)
+        cut = np.arange(1, size)  # cells of the band at the low end, or of that at the high end
+        top = np.stack([0 * cut, cut, 0 * cut, cut + size, cut], axis=-1)
+        bottom = np.stack([n - cut, 0 * cut + n, n - cut - size, 0 * cut + n, (n - cut) % size], axis=-1)
+        ends = np.concatenate([top, bottom[cut <= n][::-1]])  # each follows from the one before
+        ends[:, :4] = np.clip(ends[:, :4], 0, n)
     return np.concatenate([whole, ends]).astype(np.int64)
 
 

@@ -34,13 +34,13 @@ def _slide(mask: Array, columns: Array, start: int, stop: int, new_start: int, n
 
 
 @kernel
-def _occupied_before(columns: Array, prefix: Array) -> None:
-    """Number of columns that hold a cell, left of each position; goes round where prefix is longer."""
+def _occupied_before(columns: Array, less: Array, prefix: Array) -> None:
+    """Number of columns that hold more cells than `less`, left of each position; goes round where longer."""
     nx = columns.size
     total = np.int32(0)
     prefix[0] = 0
     for j in range(nx):
-        total += np.int32(columns[j] > 0)
+        total += np.int32(columns[j] > less[j])
         prefix[j + 1] = total
     for j in range(nx + 1, prefix.size):
         prefix[j] = total + prefix[j - nx]
@@ -64,43 +64,35 @@ def cover(
     `rows` lists the bands of rows, `cut` those of columns that are cut by the edge. `met` and `lost` (size,
     positions) get for each whole band of columns the boxes met, and the rows that those of them lose that
     count by their part inside; `count` and `area` (size, size) the boxes cut in x and their area in cells.
-    `columns` (2, nx) and `prefix` (2, at least nx + 1) are zeros to work in: of the band, and of the bands
-    beside one that is cut in y.
+    `columns` (3, nx) and `prefix` (2, at least nx + 1) are zeros to work in: of the band, of a band that is
+    cut in y with those beside it, and nothing.
     """
     positions = met.shape[1]
-    last = last_stop = last_near = last_near_stop = 0
+    last = last_stop = last_wide = last_wide_stop = 0
+    here, beside = prefix[0], prefix[1]
     for k in range(rows.shape[0]):
-        start, stop, near, near_stop = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
-        far, far_stop, offset = rows[k, 4], rows[k, 5], rows[k, 6]
+        start, stop, wide, wide_stop, offset = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4]
         _slide(mask, columns[0], last, last_stop, start, stop)
-        _occupied_before(columns[0], prefix[0])
+        _occupied_before(columns[0], columns[2], here)
         last, last_stop = start, stop
         missing = size - (stop - start)
-        here, beside = prefix[0], prefix[1]
-        if missing == 0:
+        if missing > 0:
+            _slide(mask, columns[1], last_wide, last_wide_stop, wide, wide_stop)
+            _occupied_before(columns[1], columns[0], beside)
+            last_wide, last_wide_stop = wide, wide_stop
             for j in range(positions):
-                met[offset, j] += np.int32(here[j + size] > here[j])
-        else:
-            _slide(mask, columns[1], last_near, last_near_stop, near, near_stop)
-            last_near, last_near_stop = near, near_stop
-            for i in range(far, far_stop):
-                for j in range(mask.shape[1]):
-                    columns[1, j] += mask[i % mask.shape[0], j]
-            _occupied_before(columns[1], beside)
-            for i in range(far, far_stop):
-                for j in range(mask.shape[1]):
-                    columns[1, j] -= mask[i % mask.shape[0], j]
-            for j in range(positions):
-                inside = here[j + size] > here[j]
-                met[offset, j] += np.int32(inside)
-                lost[offset, j] += np.int32(missing * (inside and beside[j + size] > beside[j]))
+                inside = here[j + size] > here[j] and beside[j + size] > beside[j]
+                lost[offset, j] += np.int32(missing * inside)
+        for j in range(positions):
+            met[offset, j] += np.int32(here[j + size] > here[j])
         for c in range(cut.shape[0]):
-            left, right = cut[c, 0], cut[c, 1]
-            if here[right] > here[left]:
+            left, right, column = cut[c, 0], cut[c, 1], cut[c, 4]
+            inside = here[right] - here[left]
+            if inside > 0:
                 width, height = size, size
-                if here[cut[c, 3]] > here[cut[c, 2]] or here[cut[c, 5]] > here[cut[c, 4]]:
+                if here[cut[c, 3]] - here[cut[c, 2]] > inside:
                     width = right - left
                 if missing > 0 and beside[right] > beside[left]:
                     height = stop - start
-                count[offset, cut[c, 6]] += 1
-                area[offset, cut[c, 6]] += width * height
+                count[offset, column] += 1
+                area[offset, column] += width * height
