@@ -132,6 +132,33 @@ def roughness(heights: Array, edges: Array) -> tuple[Array, Array]:
     return means, numbers
 
 
+def expected_roughness(edges: Array, steps: tuple[float, float], hurst: float) -> Array:
+    """Return what `roughness` is expected to be for a fractional Brownian surface of unit rms increment.
+
+    The root of the mean square about a plane in windows of few points: half the sum over all pairs of points
+    of the projection on the plane times distance^(2 hurst), over the number of points.
+    """
+    found = np.empty(len(edges))
+    for k, (ey, ex) in enumerate(edges):
+        (flat_y, tilt_y), (flat_x, tilt_x) = _overlaps(max(int(ey), 1)), _overlaps(int(ex))
+        weights = np.outer(flat_y + tilt_y, flat_x) + np.outer(flat_y, tilt_x)
+        y, x = np.arange(flat_y.size) * steps[0], np.arange(flat_x.size) * steps[1]
+        square = np.sum(weights * (y[:, None] ** 2 + x**2) ** hurst)
+        found[k] = np.sqrt(0.5 * square / (max(int(ey), 1) * int(ex)))
+    return found
+
+
+def _overlaps(n: int) -> tuple[Array, Array]:
+    """Return how a constant and a tilt of n points, of norm one, overlap with themselves at each lag."""
+    places = np.arange(n) - 0.5 * (n - 1)
+    norm = np.sqrt(np.sum(places**2))
+    lines = np.full(n, n**-0.5), places / norm if n > 1 else np.zeros(1)
+    found = [np.correlate(line, line, "full")[n - 1 :] for line in lines]
+    for one in found:
+        one[1:] *= 2.0  # lags of both signs
+    return found[0], found[1]
+
+
 def _mean(values: Array) -> float:
     values = values[np.isfinite(values)]
     return float(np.sum(values)) / values.size if values.size else float("nan")

@@ -22,13 +22,15 @@ SMALLEST = {"roughness_length": 5, "cube_counts": 3, "covering": 3}
 class Curve:
     """Scales in m (rad m-1 for a spectrum), ascending, with the value and the count at each.
 
-    `factor` is what the heights were multiplied by, where that matters.
+    `factor` is what the heights were multiplied by, where that matters; `edges` (k, 2) are the edges of
+    windows in points, along y and x.
     """
 
     scale: Array
     value: Array
     count: Array
     factor: float = np.nan
+    edges: Array | None = None
 
 
 def spectrum(face: Face, window: str, tile: int | None = None) -> Curve:
@@ -180,7 +182,7 @@ def roughness_length(face: Face) -> Curve:
         edges = _covers.sizes(face.shape, face.spacing, smallest=4.0, share=1.0)
     edges = edges[np.argsort(edges[:, 1])]
     means, numbers = _covers.roughness(face.heights, edges)
-    return Curve(_edge_lengths(face, edges), means * face.unit, numbers)
+    return Curve(_edge_lengths(face, edges), means * face.unit, numbers, edges=edges)
 
 
 def cube_counts(face: Face, vertical_scale: float | str = "range") -> Curve:

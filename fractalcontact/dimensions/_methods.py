@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.scaling import fit_line
-from fractalcontact.dimensions import _increments, _measures
+from fractalcontact.dimensions import _covers, _increments, _measures
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
 from fractalcontact.dimensions._faces import LEAST, MOST, Face
 from fractalcontact.dimensions._likelihood import Scales, likelihood
@@ -103,8 +103,9 @@ class CurveMethod:
     `to_hurst` turns slope and number of axes into H; `power` weighs the points by scale^power, or by their
     counts where it is None. `octaves` lets every octave of a free face weigh alike: a measured face leaves
     its power law at the short end first, where most of the modes are; on a periodic one counts are right.
-    `window` chooses the scales of a face. `levels` tells that the measure does not see a plane; `also` is a
-    note to every estimate.
+    `window` chooses the scales of a face. `levels` tells that the measure does not see a plane; `discrete`
+    sets the line against what windows of few points are expected to give; `also` is a note to every
+    estimate.
     """
 
     measure: Callable[[Face], _measures.Curve]
@@ -114,6 +115,7 @@ class CurveMethod:
     as_wavelength: bool = False
     octaves: bool = False
     levels: bool = False
+    discrete: bool = False
     also: str = ""
 
     def __call__(self, face: Face, scales: Scales, noise: bool) -> Estimate:
@@ -133,14 +135,32 @@ class CurveMethod:
         power = -1.0 if self.octaves and not all(face.grid.periodic) else self.power
         weights = curve.count[inside].astype(float) if power is None else (x / x[0]) ** power
         slope = fit_line(x, y / y[0], weights).slope  # a constant curve has slope 0 to the last bit
+        hurst = self.to_hurst(slope, face.axes)
+        if self.discrete and curve.edges is not None:
+            hurst = _of_few_points(x, y / y[0], weights, curve.edges[inside], face.plane_steps, hurst)
         return Estimate(
-            self.to_hurst(slope, face.axes),
+            hurst,
             scale_min=float(lengths[inside].min()),
             scale_max=float(lengths[inside].max()),
             window=rule,
             not_given=_DEPENDENT,
             note="noise is not in the model of this method" if noise else self.also,
         )
+
+
+def _of_few_points(
+    x: Array, y: Array, weights: Array, edges: Array, steps: tuple[float, float], plain: float
+) -> float:
+    """Return the exponent whose expected roughness grows as found; the plain one if there is none."""
+    from scipy.optimize import brentq
+
+    def excess(hurst: float) -> float:
+        return fit_line(x, y / _covers.expected_roughness(edges, steps, hurst), weights).slope
+
+    low, high = 1e-3, 0.999
+    if not excess(low) > 0.0 > excess(high):
+        return plain
+    return float(brentq(excess, low, high, xtol=1e-6))
 
 
 def _wave_window(face: Face) -> tuple[float, float, str]:
@@ -233,9 +253,11 @@ METHODS: dict[str, Method] = {
         CurveMethod(_measures.second_variogram, lambda slope, _: 0.5 * slope, 0.0, _short_lags, levels=True),
     ),
     "roughness_length": Method(
-        "slope of the rms height in windows about their planes; fractional Brownian faces, H too high by "
-        "0.01 to 0.05; no interval",
-        CurveMethod(_measures.roughness_length, lambda slope, _: slope, 0.0, _windows, levels=True),
+        "growth of the rms height in windows about their planes, as expected of so few points; fractional "
+        "Brownian faces; no interval",
+        CurveMethod(
+            _measures.roughness_length, lambda slope, _: slope, 0.0, _windows, levels=True, discrete=True
+        ),
         smallest=5,
     ),
     "cube_counts": Method(

@@ -325,3 +325,28 @@ def test_bad_input_is_told_all_at_once(rough):
         fc.dimensions.madogram(rough * np.nan)
     with pytest.raises(ValueError, match="infinite"):
         fc.dimensions.cube_counts(rough.where(rough.x > 5e-3, np.inf))
+
+
+@pytest.mark.parametrize("steps", [(1.0, 1.0), (2.0, 1.0)])
+@pytest.mark.parametrize("hurst", [0.2, 0.8])
+def test_expected_roughness_of_a_window(hurst, steps):
+    """The mean square about a plane, over exact surfaces of the size of a window."""
+    from fractalcontact.dimensions._covers import expected_roughness
+
+    shape = (5, 8)
+    faces = fc.surfaces.fbm(
+        shape, steps, hurst=hurst, rms_increment=1.0, lag=1.0, members=4000, rng=40
+    ).values
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    plane = np.linalg.qr(np.stack([np.ones(x.size), x.ravel(), y.ravel()], axis=1))[0]
+    flat = faces.reshape(len(faces), -1)
+    rest = flat - (flat @ plane) @ plane.T
+    found = np.sqrt(np.mean(rest**2))
+    assert expected_roughness(np.array([shape]), steps, hurst)[0] == pytest.approx(found, rel=0.015)
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
+def test_roughness_length_knows_how_few_points_a_window_has(hurst):
+    faces = fc.surfaces.fbm((96, 96), 1e-4, hurst=hurst, rms_increment=1e-6, members=12, rng=41)
+    found = fc.dimensions.estimate(faces, "roughness_length").hurst
+    assert float(found.mean()) == pytest.approx(hurst, abs=0.03)
