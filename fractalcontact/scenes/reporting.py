@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 
 def summary(tree: xr.DataTree) -> str:
-    """Return the main figures of a study with the errors reached and the run time of every stage."""
+    """Return the main figures of a study with the errors reached and the run time of every stage.
+
+    Of an ensemble the figures are those of the first member.
+    """
+    tree = first_member(tree)
     parts = [
         str(tree.attrs.get("title", tree.name or "result")),
         _picked(tree),
@@ -33,6 +37,13 @@ def summary(tree: xr.DataTree) -> str:
         stage_table(tree),
     ]
     return "\n\n".join(part for part in parts if part)
+
+
+def first_member(tree: xr.DataTree) -> xr.DataTree:
+    """Return the results of the first member of an ensemble; of a single study all."""
+    first: xr.DataTree = tree.map_over_datasets(lambda one: one.isel(member=0, missing_dims="ignore"))
+    first.attrs = dict(tree.attrs)
+    return first
 
 
 def contents(path: str | os.PathLike[str]) -> str:

@@ -19,6 +19,7 @@ from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.keeping import Store, digest
 from fractalcontact.scenes.planning import FIGURES, Stage, stages_of
 from fractalcontact.scenes.reading import load
+from fractalcontact.scenes.reporting import first_member
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -274,7 +275,7 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> None:
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    plotting.draw(tree, folder, progress=progress)
+    plotting.draw(first_member(tree), folder, progress=progress)
     entry = json.loads(tree.attrs["provenance"])
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)

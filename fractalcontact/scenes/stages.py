@@ -20,6 +20,7 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import as_dataset
+from fractalcontact.base.schema import encoded, label
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
 from fractalcontact.scenes.planning import loads_of, stages_of
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
+MEMBER = "member"
 WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
 Part = Callable[[], "xr.Dataset"]
 
@@ -78,6 +80,24 @@ class Followed:
             results.append(one(source))
             seconds.append(time.perf_counter() - start)
         return [without(source, self.dropped), *results], seconds
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """A part of one member of an ensemble, whose result says which."""
+
+    part: Part
+    member: int
+
+    def __call__(self) -> xr.Dataset:
+        """Return the result with the number of the member ahead of its dims."""
+        result = self.part()
+        # what a load came to may differ from member to member
+        beside = [name for name, coord in result.coords.items() if name != "step" and "step" in coord.dims]
+        told = result.reset_coords(beside).expand_dims({MEMBER: [self.member]}).set_coords(beside)
+        for name, variable in told.variables.items():
+            variable.attrs = dict(result[name].attrs) if name in result.variables else {}
+        return encoded(told.assign_coords({MEMBER: label(told[MEMBER])})).assign_attrs(result.attrs)
 
 
 @dataclass(frozen=True)
@@ -138,7 +158,10 @@ def _joined(results: list[xr.Dataset], dim: str) -> xr.Dataset:
 
 
 def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]) -> Work:
-    """Return what is to be done for a stage, given the results and the work of those it needs."""
+    """Return what is to be done for a stage, given the results and the work of those it needs.
+
+    Of an ensemble every member is a part by itself.
+    """
     room, _, name = stage.name.partition("/")
     if reads_part(stage):
         source = works[stage.needs[0]]
@@ -147,6 +170,23 @@ def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]
         return Work((partial(measure(stage, scene), results[stage.needs[0]]),))
     if room == "surfaces":
         return _surface_work(name, scene, results)
+    if MEMBER not in results["surfaces"].dims:
+        return _work(stage, scene, results)
+    members = range(results["surfaces"].sizes[MEMBER])
+    works_of = [
+        _work(stage, scene, {key: of_member(one, m) for key, one in results.items()}) for m in members
+    ]
+    parts = tuple(Numbered(part, m) for m, one in zip(members, works_of, strict=True) for part in one.parts)
+    return Work(parts, (MEMBER, *works_of[0].along), (len(members), *works_of[0].shape))
+
+
+def of_member(result: xr.Dataset, number: int) -> xr.Dataset:
+    """Return the result of one member of an ensemble."""
+    return result.isel({MEMBER: number}, drop=True) if MEMBER in result.dims else result
+
+
+def _work(stage: Stage, scene: Scene, results: Results) -> Work:
+    room, _, name = stage.name.partition("/")
     if room == "dimensions":
         return _dimension_work(name, scene, results)
     if room == "contact":
@@ -200,7 +240,8 @@ def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Pro
 
     crack = None
     with _gather(problems, "joint"):
-        crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
+        lower = faces["surface"].isel({MEMBER: 0}, missing_dims="ignore", drop=True)
+        crack = joints.Crack(lower, faces.get("upper"), **_crack_options(scene))
     if crack is None:
         return
     for stage in stages_of(scene):

@@ -1,0 +1,110 @@
+"""An ensemble, member by member: as single studies, here or on workers, and few maps at a time."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from study import SOUND
+
+import fractalcontact as fc
+from fractalcontact.scenes import stages
+
+ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 3").replace(
+    'joints = ["closure", "rigid_dilatancy"]',
+    'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
+    'joints = ["closure", "elastic_dilatancy", "friction"]\ndomains = ["box_dimension", "islands"]\n'
+    "figures = true\n",
+)
+
+
+@pytest.fixture(scope="module")
+def ensemble(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ensemble")
+    (folder / "study.toml").write_text(ENSEMBLE, encoding="utf-8")
+    return fc.scenes.run(folder / "study.toml", out=folder / "out", progress=False), folder
+
+
+def test_each_member_is_what_a_study_of_its_face_gives(ensemble):
+    tree, _ = ensemble
+    faces = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5, members=3)
+    for number in range(3):
+        face = faces.isel(member=number)
+        crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
+        closed = fc.joints.closure(
+            crack, shear=[1e-4, 4e-4], direction="W", normal_force=[1.0, 10.0], keep=("state",)
+        )
+        found = tree["joints/closure"].isel(member=number)
+        for name in ("closure", "contact_fraction", "normal_force"):
+            np.testing.assert_array_equal(found[name], closed[name])
+        boxes = fc.domains.box_dimension(closed["state"])
+        np.testing.assert_array_equal(
+            tree["domains/box_dimension/box_dimension"][number], boxes["box_dimension"]
+        )
+        hurst = fc.dimensions.estimate(face)["hurst"]
+        np.testing.assert_array_equal(tree["dimensions/hurst"][number], hurst)
+
+
+def test_an_ensemble_is_written_drawn_and_told(ensemble, compliance, tmp_path):
+    from fractalcontact.scenes.reporting import summary
+
+    tree, folder = ensemble
+    assert list((folder / "out").glob("*.png"))
+    assert "closure at shear" in summary(tree)
+    for path in ("joints/closure", "joints/friction", "domains/box_dimension", "dimensions"):
+        tree[path].to_dataset().to_netcdf(tmp_path / "one.nc")
+        assert compliance(tmp_path / "one.nc") == [], path
+    xr.testing.assert_identical(
+        fc.open(folder / "out" / "result.nc")["joints/closure"].to_dataset(),
+        tree["joints/closure"].to_dataset(),
+    )
+
+
+PATH = """
+[surface]
+generate = "fbm"
+shape = [32, 32]
+spacing = 1e-4
+hurst = 0.8
+rms_increment = 4e-6
+rng = 5
+[contact]
+contact_modulus = 1e9
+nominal_pressure = { first = 1e3, last = 1e7, count = 60 }
+[want]
+contact = ["press"]
+domains = ["box_dimension"]
+"""
+
+
+def test_a_long_path_is_solved_in_parts_and_keeps_no_map(tmp_path, monkeypatch):
+    (tmp_path / "path.toml").write_text(PATH, encoding="utf-8")
+    whole = fc.scenes.run(tmp_path / "path.toml", progress=False)
+    monkeypatch.setattr(stages, "CHUNK", 8 * 32 * 32)
+    kept = []
+    original = stages.Followed.__call__
+    monkeypatch.setattr(
+        stages.Followed, "__call__", lambda part: kept.append(found := original(part)) or found
+    )
+    parts = fc.scenes.run(tmp_path / "path.toml", progress=False)
+    assert sum(1 for results, _ in kept if "closure" in results[0] and results[0].sizes["step"] <= 8) == 8
+    assert all("y" not in result.dims for results, _ in kept[1:] for result in results)
+    assert parts["contact"].sizes["step"] == 60
+    np.testing.assert_array_equal(parts["contact/step"], np.arange(60))
+    for name in ("closure", "contact_fraction"):
+        np.testing.assert_allclose(parts["contact"][name], whole["contact"][name], rtol=1e-3)
+    assert parts["domains/box_dimension/box_dimension"].dims == ("step",)
+    np.testing.assert_array_equal(parts["contact/nominal_pressure"], whole["contact/nominal_pressure"])
+
+
+@pytest.mark.slow
+def test_workers_give_the_same_bytes(ensemble):
+    distributed = pytest.importorskip("distributed")
+    tree, folder = ensemble
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        there = fc.scenes.run(folder / "study.toml", progress=False, client=client)
+    for node in tree.subtree:
+        for name, variable in node.to_dataset(inherit=False).variables.items():
+            if not str(name).endswith("run_time"):
+                assert variable.values.tobytes() == there[node.path][name].values.tobytes(), (node.path, name)
