@@ -79,7 +79,8 @@ def press(
     hardness : float, optional
         Greatest pressure (Pa). Where it is reached the surface yields: the overlap of the bodies there is
         indentation, which stays. Unloading is elastic, loading back follows it, and yielding goes on where
-        it ended. A force of all of hardness times area determines the indentation from below only.
+        it ended; under a growing load the steps in between make no difference. A force of all of hardness
+        times area determines the indentation from below only.
     tolerance : float
         Bound on `residual`, the scale-free optimality error: weighted open gap plus greatest overlap over the
         mean settlement (see Notes).
@@ -124,6 +125,10 @@ def press(
 
     The energy of the elastic body obeys d(elastic_energy) = normal_force d(closure); with a hardness the work
     of the force is d(elastic_energy) + d(plastic_work).
+
+    A step stops as "converged"; at "rounding", where the tolerance asks for more than the rounding of the
+    closure leaves; "stagnated" or at the "iteration_limit", short of the tolerance; with "force_missed",
+    where the pressures do not add up to the force; or as "beyond_full_contact".
 
     The residual is (mean open gap weighted by pressure + greatest overlap) over the mean settlement weighted
     by pressure. It bounds the square of the relative error of the pressure in the energy norm; what that

@@ -106,6 +106,16 @@ def test_a_yielded_surface_unloads_on_another_way_and_loads_back_on_it(boundary)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_under_a_growing_load_the_steps_in_between_make_no_difference(boundary):
+    options = {"contact_modulus": MODULUS, "boundary": boundary, "hardness": 2e7, "tolerance": 1e-11}
+    many = fc.contact.press(face(), nominal_pressure=np.linspace(0, 1.3e7, 14), **options)
+    one = fc.contact.press(face(), nominal_pressure=1.3e7, **options)
+    for name in ("closure", "plastic_work", "elastic_energy", "contact_fraction"):
+        assert float(many[name][-1]) == pytest.approx(float(one[name][0]), rel=1e-9)
+    np.testing.assert_array_equal(many["state"][-1], one["state"][0])
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_the_residual_height_is_the_surface_that_is_left(boundary):
     """Pressed again from its residual height, an unloaded surface answers as it does along the path."""
     options = {"contact_modulus": MODULUS, "boundary": boundary, "tolerance": 1e-12}
