@@ -240,6 +240,25 @@ def test_site_percolation_sets_in_at_its_threshold():
     assert shares == [0, 1]
 
 
+def test_published_numbers_of_site_percolation_on_the_torus():
+    # wrapping: Newman and Ziff, Phys. Rev. Lett. 85:4104 (2000), from Pinson (1994); number of clusters: Ziff,
+    # Finch and Adamchik, Phys. Rev. Lett. 79:3447 (1997)
+    rng = np.random.default_rng(5)
+    n, planes = 32, 400
+    mask = as_mask(rng.random((planes, n, n)) < 0.59274605, periodic=(True, True))
+    along = fc.domains.percolation(mask).percolates.values
+    for share, published in (
+        (along[:, 0].mean(), 0.521058290),
+        (along[:, 1].mean(), 0.521058290),
+        (along.any(-1).mean(), 0.690473725),
+        (along.all(-1).mean(), 0.351642855),
+    ):
+        assert share == pytest.approx(published, abs=4 * np.sqrt(published * (1 - published) / planes))
+    found = fc.domains.islands(mask, keep=()).n_islands.values
+    published = 0.0275981 * n**2 + 0.8835
+    assert found.mean() == pytest.approx(published, abs=4 * found.std() / np.sqrt(planes))
+
+
 def test_largest_island_grows_with_load():
     planes = np.array([level_set(64, 0.8, c, np.random.default_rng(5)) for c in (0.05, 0.2, 0.6)])
     result = fc.domains.islands(as_mask(planes, periodic=(True, True)))
