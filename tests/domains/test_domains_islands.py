@@ -241,8 +241,8 @@ def test_site_percolation_sets_in_at_its_threshold():
 
 
 def test_published_numbers_of_site_percolation_on_the_torus():
-    # wrapping: Newman and Ziff, Phys. Rev. Lett. 85:4104 (2000), from Pinson (1994); number of clusters: Ziff,
-    # Finch and Adamchik, Phys. Rev. Lett. 79:3447 (1997)
+    # wrapping: Newman and Ziff, Phys. Rev. Lett. 85:4104 (2000), from Pinson (1994); number of clusters:
+    # Ziff, Finch and Adamchik, Phys. Rev. Lett. 79:3447 (1997)
     rng = np.random.default_rng(5)
     n, planes = 32, 400
     mask = as_mask(rng.random((planes, n, n)) < 0.59274605, periodic=(True, True))
