@@ -207,7 +207,7 @@ def check_loads(scene: Scene, problems: list[str]) -> None:
         if name == "elastic_dilatancy" and "normal_force" not in given:
             problems.append(f"joint.normal_force: expected a value for {name}, got none")
         direction = scene.options("joint", name, ("direction",)).get("direction", "E")
-        if name in ("closure", "delta_surface", "decorrelation_length") and not isinstance(direction, str):
+        if name in ("closure", "delta_surface", "decorrelation_length") and isinstance(direction, list):
             problems.append(f"joint.direction: expected one direction for {name}, got {direction}")
         if name == "closure" and len(loads_of(scene)) != 1:
             words = "a closure, normal_force or nominal_pressure"

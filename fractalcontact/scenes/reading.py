@@ -213,7 +213,9 @@ def _check_numbers(table: Table, name: str, problems: Problems) -> None:
         if key in table and not isinstance(table[key], dict):
             problems.numbers(f"{name}.{key}", table[key], above=above, at_least=at_least, below=below)
     if "direction" in table:
-        problems.choices(f"{name}.direction", table["direction"], ("E", "N", "W", "S"))
+        from fractalcontact.joints._directions import several_directions
+
+        several_directions(table["direction"], problems, f"{name}.direction")
 
 
 def _known_keys(

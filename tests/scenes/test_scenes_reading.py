@@ -34,7 +34,7 @@ def test_ranges_are_spelled_out(write):
 
 def test_everything_wrong_is_listed_at_once(write):
     text = SOUND.replace("hurst", "hirst").replace("30e9", "-30e9").replace("poisson = 0.2", "poisson = 0.7")
-    text = text.replace('"closure"', '"closing"').replace('"W"', '"NW"').replace("block", "blok")
+    text = text.replace('"closure"', '"closing"').replace('"W"', '"Q"').replace("block", "blok")
     with pytest.raises(InvalidInput) as caught:
         fc.scenes.load(write(text))
     message = str(caught.value)
@@ -46,7 +46,7 @@ def test_everything_wrong_is_listed_at_once(write):
         "material.poisson",
     ):
         assert part in message
-    for part in ("closing", "joint.direction", "'NW'", "joint.blok", "did you mean 'block'"):
+    for part in ("closing", "joint.direction", "'Q'", "joint.blok", "did you mean 'block'"):
         assert part in message
 
 

@@ -187,3 +187,45 @@ def test_parts_can_run_elsewhere(tmp_path):
     assert Worker.sent == 2
     for name in ("closure", "contact_fraction", "normal_force"):
         np.testing.assert_array_equal(here["joints/closure"][name], there["joints/closure"][name])
+
+
+def test_azimuths_strengths_of_rigid_faces_and_springs_from_a_scene(tmp_path):
+    path = tmp_path / "turned.toml"
+    path.write_text(
+        """
+[surface]
+generate = "fbm"
+shape = [48, 48]
+spacing = 1e-4
+hurst = 0.8
+rms_increment = 1e-6
+rng = 1
+[material]
+young = 30e9
+poisson = 0.2
+[joint]
+block = 2e-3
+direction = 30
+nominal_pressure = [1e6, 2e6]
+shear = [1e-4, 4e-4]
+[joint.rigid_dilatancy]
+direction = ["NE", 200]
+[joint.friction]
+nominal_pressure = [1e6, 3e6]
+[want]
+joints = ["closure", "rigid_dilatancy", "friction"]
+"""
+    )
+    tree = fc.scenes.run(fc.scenes.load(path), out=None, progress=False)
+    assert tree["joints/closure"].azimuth == 30
+    assert list(tree["joints/rigid_dilatancy"].direction.values) == ["NE", "200"]
+    assert tree["joints/friction"].shear_strength.dims == ("direction", "shear", "step")
+    text = path.read_text().replace("[joint.friction]\nnominal_pressure = [1e6, 3e6]\n", "")
+    text = text.replace(
+        "[joint.rigid_dilatancy]\n",
+        "[joint.elastic_dilatancy]\nnormal_force = 1.0\nnormal_stiffness = 1e11\n",
+    )
+    path.write_text(text.replace('"rigid_dilatancy"', '"elastic_dilatancy"'))
+    tree = fc.scenes.run(fc.scenes.load(path), out=None, progress=False)
+    assert tree["joints/elastic_dilatancy"].normal_force.dims == ("direction", "shear", "step")
+    assert np.isfinite(tree["joints/friction"].friction_angle).all()
