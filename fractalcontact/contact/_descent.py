@@ -45,6 +45,7 @@ FEW = 0.003  # share of the set that may always enter
 SLIGHT = 0.001  # share of the set that may change without losing the conjugacy
 GREATEST_ITERATIONS = 2000
 PATIENCE = 40  # iterations without progress
+FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 HALVINGS = 20
 CAPPINGS = 50
 
@@ -139,7 +140,7 @@ class Run:
     def solve(self, tolerance: float, certify: bool) -> Solution:
         """Iterate."""
         self.begin()
-        best, stale, iteration, reason = np.inf, 0, 0, "iteration_limit"
+        best, least, stale, iteration, reason = np.inf, np.inf, 0, 0, "iteration_limit"
         while iteration <= GREATEST_ITERATIONS:
             balance = self.weigh()
             # nodes may change places for ever at one level of the objective: where nothing comes of it, less
@@ -155,7 +156,10 @@ class Run:
                     break
                 self.refresh()
                 continue
-            best, stale = (residual, 0) if residual < 0.9 * best else (best, stale + 1)
+            fallen = balance.objective < least - FALL * balance.noise / (8 * self.precise)
+            stale = 0 if residual < 0.9 * best or fallen else stale + 1
+            best = residual if residual < 0.9 * best else best
+            least = balance.objective if fallen else least
             rounded = residual <= balance.floor
             iteration += 1
             if stale <= (PATIENCE // 8 if rounded else PATIENCE) and self.turn(balance, inner, outer):
