@@ -225,3 +225,29 @@ def test_gneiss_pair_goes_through_the_whole_study(gneiss):
     assert (opening.dilatancy < opening.rigid_dilatancy).all()
     assert (flow.hydraulic_aperture > 0).all()
     assert flow.percolates.all()
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13, 14])
+def test_shift_turn_and_tilt_together_with_noise_gaps_and_part_of_the_face(make_face, rough, seed):
+    rng = np.random.default_rng(seed)
+    shift, angle = rng.uniform(-8, 8, 2), float(rng.uniform(-2, 2))
+    noise = 0.02
+    lower, upper = moved_pair(rough, shift, noise=noise, seed=seed, angle=angle, size=130)
+    tilt_y, tilt_x = rng.uniform(-0.05, 0.05, 2)
+    y, x = np.indices(upper.shape) * S
+    upper = upper - tilt_y * y - tilt_x * x
+    lower[20:30, 60:75], upper[80:84, 30:60] = np.nan, np.nan
+    # the upper face was seen over two thirds of the lower one only
+    part = make_face(upper, S).isel(y=slice(0, 100), x=slice(25, 130))
+    result = fc.joints.register(make_face(lower, S), part)
+    assert result.converged
+    assert result.rotation == pytest.approx(angle, abs=4 * float(result.rotation_error) + 5e-3)
+    assert result.tilt_x == pytest.approx(tilt_x, abs=2e-3)
+    assert result.tilt_y == pytest.approx(tilt_y, abs=2e-3)
+    for name, cells in zip(("shift_y", "shift_x"), shift, strict=True):
+        allowed = 4 * float(result[f"{name}_error"]) / S + 5e-3
+        assert result[name] / S == pytest.approx(cells, abs=allowed), name
+    # what is left is the noise, a little less for being read between the points
+    assert 0.6 * noise * 1e-3 < result.mismatch < 1.3 * noise * 1e-3
+    assert result.correlation > 0.995
+    assert 0.5 < result.common_fraction < 0.75
