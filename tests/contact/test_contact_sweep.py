@@ -31,6 +31,20 @@ def test_small_problems_are_right(tens):
     assert {seed: lines for seed, lines in wrong.items() if lines} == {}
 
 
+HARD = {
+    (1187, 128): "a light load far below the hardness",
+    (1248, 256): "nodes that change places at one level of the objective",
+    (13773, 40): "a flat face saturated twice",
+    (16954, 40): "a force of so many nodes at the hardness and none between",
+    (50925, 512): "a body four thousand times longer than wide",
+}
+
+
+@pytest.mark.parametrize(("seed", "largest"), HARD)
+def test_what_was_hard_once_is_right(seed, largest):
+    assert verdict(draw(seed, largest)) == ([], 0), HARD[seed, largest]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hundred", range(10))
 def test_large_problems_are_right(hundred):
