@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from fractalcontact.domains._masks import Array, Planes, together
 
@@ -260,6 +261,13 @@ def blend(slopes: Sequence[float], variances: Sequence[float]) -> tuple[float, f
 
 
 TINY = 1e-24  # variance of slopes that differ by rounding alone
+
+
+def deviations(sizes: Array) -> float:
+    """Return how many standard deviations of the local slopes make 95 %: Student's t, of the sizes less 2."""
+    return float(stdtrit(max(sizes.size - 2, 1), 0.975))
+
+
 APART = 0.02  # of the difference of two covers that counts for the interval
 
 
@@ -279,6 +287,6 @@ def estimate(sizes: Array, fewest: Array, mean: Array, cover: str) -> tuple[floa
     both, spread, _ = blend((first.dimension, second.dimension), variance)
     apart = abs(first.dimension - second.dimension)
     if cover == "minimum":
-        return both, 2.0 * spread + min(apart, APART + 0.5 * spread)
+        return both, deviations(sizes) * spread + min(apart, APART + 0.5 * spread)
     deviation = float(np.hypot(second.spread, second.dimension - both))
-    return second.dimension, 2.0 * deviation + min(apart, APART + deviation)
+    return second.dimension, deviations(sizes) * deviation + min(apart, APART + deviation)

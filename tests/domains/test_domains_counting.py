@@ -170,7 +170,7 @@ def test_interval_holds_the_dimension_of_fractals_placed_anywhere(n, cover):
 def test_interval_holds_the_dimension_of_sets_of_every_kind(cover):
     rng = np.random.default_rng(77)
     inside = []
-    for n in (250, 512):
+    for n in (100, 250, 512):
         sets = [(91 / 48, percolating_cluster(n, rng)) for _ in range(3)]
         for ratio, keeps in ((2, (2, 3)), (3, (2, 4, 6, 7)), (4, (5, 8, 11)), (5, (8, 13, 18))):
             level = int(np.log(n) / np.log(ratio) + 1e-9)
