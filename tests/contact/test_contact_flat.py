@@ -173,3 +173,26 @@ def test_bad_faces_are_refused():
             fc.contact.press(fc.surfaces.from_array(heights, 1.0), contact_modulus=1.0, closure=0.1)
     with pytest.raises(InvalidInput, match="DataArray"):
         fc.contact.press(good, contact_modulus=1.0, closure=0.1)
+
+
+@pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.ConvergenceWarning")
+def test_a_path_of_mated_periodic_faces_survives_and_is_written(tmp_path, compliance):
+    """Mated faces of zero range touch everywhere; any closure is beyond what a periodic body can do."""
+    flat = fc.surfaces.from_array(np.zeros((6, 8)), 1e-4, periodic=True)
+    keep = ("state", "pressure", "gap", "displacement", "residual_height")
+    found = fc.contact.press(flat, contact_modulus=MODULUS, closure=[0.0, 1e-6], keep=keep)
+    np.testing.assert_array_equal(found["normal_force"], [0.0, np.nan])
+    np.testing.assert_array_equal(found["stop_reason"], [0, 5])
+    np.testing.assert_array_equal(found["contact_fraction"], [0.0, 1.0])
+    np.testing.assert_array_equal(found["mean_gap"], [0.0, 0.0])
+    assert json.loads(found.attrs["provenance"])["achieved_residual"] == 0.0
+    path = fc.save(found, tmp_path / "mated.nc")
+    back = fc.open(path)
+    assert "mean plane" in back["normal_force"].attrs["reason"]
+    np.testing.assert_array_equal(back["normal_force"], found["normal_force"])
+    found.to_netcdf(tmp_path / "flat.nc")
+    assert compliance(tmp_path / "flat.nc") == []
+    beyond = fc.contact.press(flat, contact_modulus=MODULUS, closure=1e-6)
+    assert np.isnan(float(beyond["residual"][0]))
+    pressed = fc.contact.press(flat, contact_modulus=MODULUS, normal_force=[0.0, 2.0], keep=keep)
+    np.testing.assert_array_equal(pressed["closure"], [0.0, 0.0])
