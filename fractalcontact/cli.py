@@ -92,7 +92,9 @@ def _run(options: argparse.Namespace) -> int:
     scene = _checked_scene(options.scene)
     if options.plan:
         from fractalcontact.scenes.planning import plan
+        from fractalcontact.scenes.stages import preflight
 
+        preflight(scene)
         print(plan(scene))
         return 0
     if options.out is None:

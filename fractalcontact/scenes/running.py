@@ -14,7 +14,7 @@ import numpy as np
 from fractalcontact.base import netcdf, provenance, schema, stopping
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
-from fractalcontact.scenes import stages
+from fractalcontact.scenes import doubting, stages
 from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.keeping import Store, digest
 from fractalcontact.scenes.planning import FIGURES, Stage, stages_of
@@ -157,6 +157,10 @@ class _Study:
         joined = job.join(done)
         if joined is not None:
             self.results[stage.name] = joined
+            if stage.name in ("contact", "joints/closure"):
+                doubting.warn(
+                    doubting.of_the_found(stage.name, joined, float(joined["nominal_area"].max()) ** 0.5)
+                )
         self.seconds.setdefault(stage.name, 0.0)
         if missing:
             self.seconds[stage.name] += time.perf_counter() - start

@@ -22,6 +22,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.schema import encoded, label
 from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.scenes import doubting
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
 from fractalcontact.scenes.planning import loads_of, stages_of
 from fractalcontact.scenes.scene import Scene, Table
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     Results = Mapping[str, xr.Dataset]
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
+LARGE = 1 << 22  # nodes of a face that is not made twice
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 MEMBER = "member"
 WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
@@ -216,6 +218,13 @@ def measure(stage: Stage, scene: Scene) -> Measure:
 def preflight(scene: Scene) -> None:
     """Find all that is wrong with a scene before anything is computed or written.
 
+    A large face that is to be generated is not made for that: a flat one of its size stands for it.
+
+    Warns
+    -----
+    ScaleWarning
+        A slope or a pressure is hardly meant.
+
     Raises
     ------
     InvalidInput
@@ -226,13 +235,27 @@ def preflight(scene: Scene) -> None:
         for name in ("surface", "upper"):
             if name in scene.tables and (name == "surface" or scene.wanted("joints")):
                 with _gather(problems, name):
-                    faces[name] = read_surface(scene.table(name), scene.folder)
+                    stand_in = _stand_in(scene.table(name))
+                    faces[name] = (
+                        read_surface(scene.table(name), scene.folder) if stand_in is None else stand_in
+                    )
         if (
             not problems.found
             and (scene.wanted("joints") or scene.wanted("domains"))
             and not scene.wanted("contact")
         ):
             _preflight_joint(scene, faces, problems)
+    doubting.warn(doubting.of_the_given(scene, faces["surface"]))
+
+
+def _stand_in(table: Table) -> xr.DataArray | None:
+    """Return a flat face in place of a large one that is generated."""
+    if "generate" not in table or np.prod(np.broadcast_to(table["shape"], 2), dtype=float) < LARGE:
+        return None
+    from fractalcontact import surfaces
+
+    shape = tuple(int(n) for n in np.broadcast_to(table["shape"], 2))
+    return surfaces.from_array(np.zeros(shape), table["spacing"])
 
 
 def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:
@@ -254,7 +277,7 @@ def _check_travel(crack: Crack, given: dict[str, Any], place: str, problems: Pro
     """Note the shears that would push the block off its face."""
     directions = given.get("direction", ("E", "N", "W", "S") if place.endswith("dilatancy") else "E")
     longest = max(given["shear"]) if isinstance(given["shear"], list) else given["shear"]
-    for word in [directions] if isinstance(directions, str) else directions:
+    for word in directions if isinstance(directions, (list, tuple)) else [directions]:
         travel = crack.travel(word)
         if longest > travel * (1.0 + 1e-6):
             problems.add(f"{place}: shear", f"at most {travel:g} m towards {word}", longest)
@@ -389,6 +412,9 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
         )
     options = scene.options("joint", name, stage_keys("joints", name))
     if name == "friction":
+        own = scene.table("joint").get(name, {})
+        if "nominal_pressure" not in own:  # in [joint] it is the load of the closure
+            options.pop("nominal_pressure", None)
         return Work((partial(_call, "joints", name, results[stage.needs[0]], **options),))
     crack = _crack(scene, results)
     if name in ("closure", "elastic_dilatancy") and "hardness" in scene.table("material"):
