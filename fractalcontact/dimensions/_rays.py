@@ -33,6 +33,7 @@ _LOWEST, _HIGHEST = 0.02, 0.98  # exponents whose covariances are taken
 _ROUNDS, _STEEPEST = 12, 6.0  # of the fit of a stretch; its largest logarithm
 _OPEN = 50.0  # logarithm of a stretch beyond which nothing is known
 _GRID = 64
+_BLOCK = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,15 @@ class Ray:
 
 @dataclass(frozen=True)
 class Means:
-    """Mean square second differences at lag vectors, and how many there were.
+    """Mean square second differences at lag vectors.
 
-    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x.
+    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x; `shares` (k, k) tells how many
+    middle points the differences of two lags have in common, over the numbers of both.
     """
 
     vectors: Array
     means: Array
-    counts: Array
+    shares: Array
     steps: tuple[float, float]
 
     @classmethod
@@ -82,11 +84,13 @@ class Means:
         slabs = iter([(np.ascontiguousarray(face.heights), face.shape[0])])
         means, counts = _lags.direct(slabs, (0, face.shape[1]), vectors, _lags.SECOND)
         kept = counts > 0
-        return cls(vectors[kept], means[kept], counts[kept], face.plane_steps), owner[kept]
+        vectors, counts = vectors[kept], counts[kept].astype(float)
+        shares = _common(face, vectors) / np.outer(counts, counts)
+        return cls(vectors, means[kept], shares, face.plane_steps), owner[kept]
 
     def part(self, kept: Array) -> Means:
         """Keep some of the lag vectors."""
-        return Means(self.vectors[kept], self.means[kept], self.counts[kept], self.steps)
+        return Means(self.vectors[kept], self.means[kept], self.shares[np.ix_(kept, kept)], self.steps)
 
     @property
     def places(self) -> Array:
@@ -161,14 +165,37 @@ def rays(azimuths: Array | None, steps: tuple[float, float]) -> list[Ray]:
     return found
 
 
-def covariance(vectors: Array, counts: Array, hurst: float, form: Array) -> Array:
+def _common(face: Face, vectors: Array) -> Array:
+    """Count the middle points from which the differences over both of two lag vectors can be taken."""
+    ny, nx = face.shape
+    if face.complete:
+        farthest = np.maximum(np.abs(vectors)[:, None], np.abs(vectors))
+        return np.asarray((ny - 2 * farthest[..., 0]) * (nx - 2 * farthest[..., 1]), dtype=np.float64)
+    seen = np.isfinite(face.heights)
+    whole = np.zeros((len(vectors), ny, nx), dtype=bool)
+    for one, (dy, dx) in zip(whole, vectors, strict=True):
+        far = abs(int(dx))
+        one[dy : ny - dy, far : nx - far] = (
+            seen[dy : ny - dy, far : nx - far]
+            & seen[: ny - 2 * dy, far - dx : nx - far - dx]
+            & seen[2 * dy :, far + dx : nx - far + dx]
+        )
+    flat = whole.reshape(len(vectors), -1)
+    total = np.zeros((len(vectors), len(vectors)))
+    for start in range(0, flat.shape[1], _BLOCK):  # counts of a block are exact in single precision
+        part = flat[:, start : start + _BLOCK].astype(np.float32)
+        total += part @ part.T
+    return total
+
+
+def covariance(vectors: Array, shares: Array, hurst: float, form: Array) -> Array:
     """Return the covariance of the logarithms of mean square second differences: shape (k, k).
 
     Parameters
     ----------
     vectors : ndarray of int, shape (k, 2)
-    counts : ndarray, shape (k,)
-        How many differences each mean is over.
+    shares : ndarray, shape (k, k)
+        As of `Means`.
     hurst : float
     form : ndarray, shape (2, 2)
         Matrix by which wavevectors in rad per cell are measured, y first.
@@ -181,7 +208,7 @@ def covariance(vectors: Array, counts: Array, hurst: float, form: Array) -> Arra
     powers = np.stack([(2.0 - 2.0 * np.cos(wy[:, None] * dy + wx * dx)) ** 2 * density for dy, dx in vectors])
     powers = powers.reshape(len(vectors), -1)
     powers /= powers.mean(axis=1)[:, None]
-    return np.asarray(2.0 * (powers @ powers.T) / powers.shape[1] / np.sqrt(np.outer(counts, counts)))
+    return np.asarray(2.0 * (powers @ powers.T) / powers.shape[1] * shares)
 
 
 def slope(means: Means, hurst: float, form: Array) -> tuple[float, float, float]:
@@ -190,7 +217,7 @@ def slope(means: Means, hurst: float, form: Array) -> tuple[float, float, float]
     The lag vectors lie along one direction.
     """
     lengths = np.hypot(*means.places.T)
-    spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+    spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
     design = np.stack([np.ones(lengths.size), 2.0 * np.log(lengths)], axis=1)
     (level, exponent), errors = _least_squares(design, np.log(means.means), spread)
     return float(exponent), float(np.sqrt(errors[1, 1])), float(np.exp(level))
@@ -202,14 +229,14 @@ def isotropy(means: Means) -> Isotropy:
     round_form = np.eye(2)
     hurst = 0.5
     for _ in range(3):
-        spread = covariance(means.vectors, means.counts, hurst, _waves(round_form, means.steps))
+        spread = covariance(means.vectors, means.shares, hurst, _waves(round_form, means.steps))
         design, _ = _columns(means.places, round_form)
         hurst = _inside(_least_squares(design[:, :2], values, spread)[0][1])
     p_value = _wald(means, values, round_form, spread, freely=True)
     u = v = 0.0
     for _ in range(_ROUNDS):
         form = matrix(u, v)
-        spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+        spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
         slopes = log_square_slopes(means.places, u, v)
         design = np.stack(
             [np.ones(values.size), log_squares(means.places, form), hurst * slopes[0], hurst * slopes[1]],
@@ -224,7 +251,7 @@ def isotropy(means: Means) -> Isotropy:
         if np.hypot(*coefficients[2:]) < 1e-4 or size > _STEEPEST:
             break
     form = matrix(u, v)
-    spread = covariance(means.vectors, means.counts, hurst, _waves(form, means.steps))
+    spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
     stretched = _wald(means, values, form, spread, freely=False)
     return Isotropy.of(p_value, stretched, hurst, (u, v), errors[2:, 2:])
 

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.spectra import aliased_power_law
 from fractalcontact.dimensions import _rays
+from fractalcontact.dimensions._faces import read_faces
 
 SPACING = 1e-4
 
@@ -192,8 +194,9 @@ def test_scatter_of_second_differences_is_the_one_expected(hurst):
             middle, far = heights[dy : n - dy, dx : n - dx], heights[2 * dy :, 2 * dx :]
             means.append(np.mean((heights[: n - 2 * dy, : n - 2 * dx] - 2 * middle + far) ** 2))
         logs.append(np.log(means))
-    counts = np.array([(n - 2 * dy) * (n - 2 * dx) for dy, dx in vectors])
-    expected = _rays.covariance(vectors, counts, hurst, np.eye(2))
+    means, _ = _rays.Means.of(read_faces(brownian(n, hurst, 1), Problems("test"))[0], rays[:4], (0.0, 5e-4))
+    place = [np.flatnonzero((means.vectors == vector).all(axis=1))[0] for vector in vectors]
+    expected = _rays.covariance(vectors, means.shares[np.ix_(place, place)], hurst, np.eye(2))
     assert np.cov(np.transpose(logs)) == pytest.approx(expected, rel=0.3, abs=0.15 * expected.max())
 
 
@@ -231,3 +234,21 @@ def test_size_of_the_test_and_coverage(kind, hurst):
     assert float(given.mean()) > 0.98
     covered = ((found["ci_low"] <= hurst) & (hurst <= found["ci_high"])).where(given).mean("member")
     assert (abs(covered - 0.95) < 0.035).all()
+
+
+def test_common_points_of_a_face_with_gaps_are_counted():
+    heights = brownian(20, 0.5, 22).values.copy()
+    heights[np.random.default_rng(23).random(heights.shape) < 0.2] = np.nan
+    face = read_faces(fc.surfaces.from_array(heights, SPACING), Problems("test"))[0]
+    vectors = np.array([(0, 1), (1, -2), (3, 2)])
+    middles = [
+        {
+            (y, x)
+            for y in range(dy, 20 - dy)
+            for x in range(abs(dx), 20 - abs(dx))
+            if np.isfinite([heights[y, x], heights[y - dy, x - dx], heights[y + dy, x + dx]]).all()
+        }
+        for dy, dx in vectors
+    ]
+    expected = [[len(one & other) for other in middles] for one in middles]
+    assert np.array_equal(_rays._common(face, vectors), expected)
