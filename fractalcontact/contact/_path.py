@@ -97,6 +97,8 @@ class Step:
     @cached_property
     def overlap(self) -> Array | None:
         """Scaled overlap of the bodies at yielded nodes, which this step adds to the indentation."""
+        if self.problem.cap == np.inf:
+            return None
         yielded = self.yielded
         if not yielded.any():
             return None
