@@ -50,8 +50,10 @@ class Ray:
 class Means:
     """Mean square second differences at lag vectors.
 
-    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x; `shares` (k, k) tells how many
-    middle points the differences of two lags have in common, over the numbers of both.
+    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x; `shares` (2, k, k) tells how
+    many middle points the differences of two lags have in common, over the numbers of both: as observed, and
+    on the complete face. Differences with one middle are paired as often as the first, others as the second
+    (whether one was observed says little about the other).
     """
 
     vectors: Array
@@ -84,13 +86,15 @@ class Means:
         slabs = iter([(np.ascontiguousarray(face.heights), face.shape[0])])
         means, counts = _lags.direct(slabs, (0, face.shape[1]), vectors, _lags.SECOND)
         kept = counts > 0
-        vectors, counts = vectors[kept], counts[kept].astype(float)
-        shares = _common(face, vectors) / np.outer(counts, counts)
+        vectors = vectors[kept]
+        complete = _common_of_all(face.shape, vectors)
+        common = complete if face.complete else _common(np.isfinite(face.heights), vectors)
+        shares = np.stack([one / np.outer(np.diag(one), np.diag(one)) for one in (common, complete)])
         return cls(vectors, means[kept], shares, face.plane_steps), owner[kept]
 
     def part(self, kept: Array) -> Means:
         """Keep some of the lag vectors."""
-        return Means(self.vectors[kept], self.means[kept], self.shares[np.ix_(kept, kept)], self.steps)
+        return Means(self.vectors[kept], self.means[kept], self.shares[:, kept][:, :, kept], self.steps)
 
     @property
     def places(self) -> Array:
@@ -165,13 +169,15 @@ def rays(azimuths: Array | None, steps: tuple[float, float]) -> list[Ray]:
     return found
 
 
-def _common(face: Face, vectors: Array) -> Array:
-    """Count the middle points from which the differences over both of two lag vectors can be taken."""
-    ny, nx = face.shape
-    if face.complete:
-        farthest = np.maximum(np.abs(vectors)[:, None], np.abs(vectors))
-        return np.asarray((ny - 2 * farthest[..., 0]) * (nx - 2 * farthest[..., 1]), dtype=np.float64)
-    seen = np.isfinite(face.heights)
+def _common_of_all(shape: tuple[int, int], vectors: Array) -> Array:
+    """Count, on a complete face, the middle points of differences over both of two lag vectors."""
+    farthest = np.maximum(np.abs(vectors)[:, None], np.abs(vectors))
+    return np.asarray(np.prod(np.array(shape) - 2.0 * farthest, axis=-1))
+
+
+def _common(seen: Array, vectors: Array) -> Array:
+    """Count the same where only some points were seen."""
+    ny, nx = seen.shape
     whole = np.zeros((len(vectors), ny, nx), dtype=bool)
     for one, (dy, dx) in zip(whole, vectors, strict=True):
         far = abs(int(dx))
@@ -194,7 +200,7 @@ def covariance(vectors: Array, shares: Array, hurst: float, form: Array) -> Arra
     Parameters
     ----------
     vectors : ndarray of int, shape (k, 2)
-    shares : ndarray, shape (k, k)
+    shares : ndarray, shape (2, k, k)
         As of `Means`.
     hurst : float
     form : ndarray, shape (2, 2)
@@ -204,11 +210,14 @@ def covariance(vectors: Array, shares: Array, hurst: float, form: Array) -> Arra
     wy = (np.arange(points) + 0.5) / points * 2.0 * np.pi - np.pi
     wx = (np.arange(points // 2) + 0.5) / (points // 2) * np.pi
     density = aliased_power_law((wy[:, None], wx), hurst, form, images=3)
-    # |1 - exp(i w h)|^4 is the response of a second difference
-    powers = np.stack([(2.0 - 2.0 * np.cos(wy[:, None] * dy + wx * dx)) ** 2 * density for dy, dx in vectors])
-    powers = powers.reshape(len(vectors), -1)
-    powers /= powers.mean(axis=1)[:, None]
-    return np.asarray(2.0 * (powers @ powers.T) / powers.shape[1] * shares)
+    # the response of a second difference about its middle point
+    response = np.stack([(2.0 - 2.0 * np.cos(wy[:, None] * dy + wx * dx)).ravel() for dy, dx in vectors])
+    density = density.ravel()
+    response /= np.sqrt((response**2 @ density) / density.size)[:, None]
+    near = ((response * density) @ response.T / density.size) ** 2
+    powers = response**2 * density
+    whole = powers @ powers.T / density.size
+    return np.asarray(2.0 * (near * shares[0] + (whole - near) * shares[1]))
 
 
 def slope(means: Means, hurst: float, form: Array) -> tuple[float, float, float]:

@@ -196,7 +196,7 @@ def test_scatter_of_second_differences_is_the_one_expected(hurst):
         logs.append(np.log(means))
     means, _ = _rays.Means.of(read_faces(brownian(n, hurst, 1), Problems("test"))[0], rays[:4], (0.0, 5e-4))
     place = [np.flatnonzero((means.vectors == vector).all(axis=1))[0] for vector in vectors]
-    expected = _rays.covariance(vectors, means.shares[np.ix_(place, place)], hurst, np.eye(2))
+    expected = _rays.covariance(vectors, means.part(place).shares, hurst, np.eye(2))
     assert np.cov(np.transpose(logs)) == pytest.approx(expected, rel=0.3, abs=0.15 * expected.max())
 
 
@@ -239,7 +239,6 @@ def test_size_of_the_test_and_coverage(kind, hurst):
 def test_common_points_of_a_face_with_gaps_are_counted():
     heights = brownian(20, 0.5, 22).values.copy()
     heights[np.random.default_rng(23).random(heights.shape) < 0.2] = np.nan
-    face = read_faces(fc.surfaces.from_array(heights, SPACING), Problems("test"))[0]
     vectors = np.array([(0, 1), (1, -2), (3, 2)])
     middles = [
         {
@@ -251,4 +250,6 @@ def test_common_points_of_a_face_with_gaps_are_counted():
         for dy, dx in vectors
     ]
     expected = [[len(one & other) for other in middles] for one in middles]
-    assert np.array_equal(_rays._common(face, vectors), expected)
+    assert np.array_equal(_rays._common(np.isfinite(heights), vectors), expected)
+    whole = _rays._common(np.ones((20, 20), bool), vectors)
+    assert np.array_equal(_rays._common_of_all((20, 20), vectors), whole)
