@@ -18,6 +18,8 @@ free set, precondition its gap, turn the direction, step and cut. What costs tim
   GATE from .1 to .8 and FEW from .0003 to .01 give the same count of pairs within a tenth.
 - Conjugacy is kept while the set changes by less than SLIGHT; at n = 2048 that saves a sixth of the pairs.
 - Leaving a little tension uncut, to spare K p, saves a tenth of the pairs at best and swings at worst: no.
+- Taking the last measured length for a step that will be cut, to spare K direction, makes an iteration cost
+  two pairs, and needs so many more that cold starts gain nothing and paths take four times as many: no.
 - A start on coarser grids (`_nested`) saves up to half of the iterations from n = 1024 on, and it does not
   matter how well the coarse grids are solved; adding the fine detail of the gap to it does not help.
 - Should the objective rise all the same, the step is halved until it does not; should there be no progress,

@@ -1,4 +1,9 @@
-"""The iteration on a plane or on a window of it, first in single and then in double precision."""
+"""The iteration on a plane or on a window of it, first in single and then in double precision.
+
+At n = 512 single precision first saves a quarter of the time, at n = 256 nothing: there the transforms fit
+the caches either way. Each precision compiles all passes of the iteration once, so small faces, the usual
+size of a block that is slid, take double precision alone and start in half the time.
+"""
 
 from __future__ import annotations
 

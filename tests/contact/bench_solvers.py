@@ -515,10 +515,12 @@ def main(arguments: list[str] | None = None) -> None:
     names = [name for name, (module, _) in SOLVERS.items() if find_spec(module)]
     names = [name for name in names if not {name, name.split()[0]} & set(options.without)]
     rows: list[dict[str, Any]] = []
+    options.out.mkdir(parents=True, exist_ok=True)
     for threads in options.threads:
         alone = argparse.Namespace(**(vars(options) | {"threads": threads}))
         for case in cases(options):
             rows += apart(worker, alone, case, names)
+            write(rows, options.out / "solvers.csv")  # a long run may be stopped
             told = f"{case.boundary} {case.start} {case.loads[0]:g} .. {case.loads[-1]:g}, seed {case.seed}"
             print(f"done: {threads} threads, n {case.n} {told}", file=sys.stderr, flush=True)
     if "memory" in options.only:
@@ -528,7 +530,6 @@ def main(arguments: list[str] | None = None) -> None:
                 case = Case(n, boundary, "cold", (0.01,), options.seeds[0])
                 for name in names:
                     rows += apart(footprint, alone, case, [name])
-    options.out.mkdir(parents=True, exist_ok=True)
     write(rows, options.out / "solvers.csv")
     draw(rows, options.target, options.out / "solvers.png")
     text = table(rows)
