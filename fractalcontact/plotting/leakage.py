@@ -17,19 +17,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FLOW_LINES = ("-", (0, (4, 2)))
+MEAN: dict[str, Any] = {"lw": 1.0, "ls": ":"}
 
 
 @_style.styled
 def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
     """Draw the hydraulic aperture against load, one curve for each shear and each direction of the flow.
 
-    Where contacts bar the way from side to side the aperture is zero.
+    Where contacts bar the way from side to side the aperture is zero. The mechanical aperture, the mean
+    opening, is drawn thin and dotted beside it where it is known.
 
     Parameters
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
-        over some of them. With a single step it is drawn against shear.
+        over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
     ax : Axes, optional
         Draw here; otherwise on a new figure.
 
@@ -56,11 +58,14 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
     )
     along = scale_of(data[against]) if known else scale_for("", 1.0)
     across = scale_of(data["hydraulic_aperture"])
+    opening = table(data, "aperture", (over, dim)) if "aperture" in data else None
     colours = _style.family(len(aperture))
     for i, colour in enumerate(colours):
         for j in range(aperture.shape[2]):
             ax.plot(along(places[i]), across(aperture[i, :, j]), color=colour, ls=FLOW_LINES[j % 2],
                     marker="o" if aperture.shape[1] <= FEW else "")  # fmt: skip
+        if opening is not None:
+            ax.plot(along(places[i]), across(opening[i]), color=colour, **MEAN)
     wide_axis(ax, places)
     if np.nanmax(aperture, initial=0.0) > 0:
         ax.set_ylim(bottom=0)
@@ -73,5 +78,7 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
     flows = words(data["axis"]) if "axis" in data.coords else []
     if flows:
         entries = [_style.line_entry(f"along {word}", ls=FLOW_LINES[j % 2]) for j, word in enumerate(flows)]
+        if opening is not None:
+            entries.append(_style.line_entry("mean opening", **MEAN))
         _style.beside(ax, entries, title="flow", low=True)
     return figure

@@ -176,7 +176,7 @@ def friction(
     chosen = one_direction(whole, direction) if by_force or direction else whole
     data = result_of(chosen, "friction", (*shown, "shear"), ("shear", over))
     sheet = _style.sheet(figure, (_style.WIDTH if len(shown) > 1 else _style.PANEL[0], 3.1))
-    axes = sheet.subplots(1, len(shown), squeeze=False)[0]
+    axes = sheet.subplots(1, len(shown), squeeze=False, sharex=True)[0]
     entries, title = _friction_key(data, over)
     for ax, name in zip(axes, shown, strict=True):
         _style.dress(ax)
