@@ -122,4 +122,10 @@ def _notes(planes: Planes, values: Array, boxes: str) -> dict[str, dict[str, str
     attributes = {"long_name": "lacunarity (fixed grid of boxes)"} if boxes == "fixed" else {}
     if reasons:
         attributes["comment"] = "NaN where " + " or where ".join(reasons)
-    return {"lacunarity": attributes}
+    notes = {"lacunarity": attributes}
+    if (planes.coverage == 1).any():
+        notes["normalised_lacunarity"] = {"comment": "NaN where the set is full or empty: it has no odds"}
+    if values.shape[-1] < 2:
+        single = {"comment": "NaN: one size of box gives no curve"}
+        notes |= {f"{kind}lacunarity_{name}": single for kind in ("", "dust_") for name in ("slope", "area")}
+    return notes
