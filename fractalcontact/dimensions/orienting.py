@@ -96,8 +96,9 @@ def directions(
     harmonics of the direction, in level and in slope (chi square with 8 degrees of freedom, 6 beyond a
     stretch). The spectrum may have any form. A face with free edges is tapered, and tested by its waves from
     6 spacings to a third of the extent. Where heights are missing, or fewer than about 90 points stand along
-    an edge, its second differences are tested in the same way, for fractional Brownian heights. Below .05 fall,
-    as measured, 2 to 7 % of complete isotropic faces of 32 to 256 points and 5 to 8 % of faces with gaps.
+    an edge, its second differences are tested in the same way, for fractional Brownian heights. As
+    measured, 2 to 7 % of complete isotropic faces of 32 to 256 points and 5 to 8 % of faces with gaps fall
+    below .05.
 
     Exponents: a face with free edges is measured by second differences over 1, 2 and 4 steps of the lattice
     along each direction; `azimuth` is that of the nearest direction of the lattice, and the interval is that
