@@ -97,7 +97,7 @@ def directions(
     stretch). The spectrum may have any form. A face with free edges is tapered, and tested by its waves from
     6 spacings to a third of the extent. Where heights are missing, or fewer than about 90 points stand along
     an edge, its second differences are tested in the same way, for fractional Brownian heights. As
-    measured, 2 to 7 % of complete isotropic faces of 32 to 256 points and 5 to 8 % of faces with gaps fall
+    measured, 1 to 9 % of complete isotropic faces of 32 to 256 points and 5 to 8 % of faces with gaps fall
     below .05.
 
     Exponents: a face with free edges is measured by second differences over 1, 2 and 4 steps of the lattice
