@@ -27,7 +27,6 @@ def warn(told: Iterable[str]) -> None:
 
 def of_the_given(scene: Scene, face: xr.DataArray) -> Iterator[str]:
     """Yield what is hardly meant in a scene and its face."""
-    face = face.isel(member=0, missing_dims="ignore")
     steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
     squares = [np.nanmean((np.diff(face.values, axis=axis) / steps[axis]) ** 2) for axis in (0, 1)]
     slope = float(np.sqrt(np.sum(squares)))

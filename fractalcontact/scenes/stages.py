@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Results = Mapping[str, xr.Dataset]
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
-LARGE = 1 << 22  # nodes of a face that is not made twice
+LARGE = 1 << 18  # nodes of a face that is not made twice
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 MEMBER = "member"
 WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
@@ -63,7 +63,7 @@ class Work:
         return found[0] if found else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Followed:
     """A part, and the measures of its maps taken before the maps go."""
 
@@ -84,7 +84,7 @@ class Followed:
         return [without(source, self.dropped), *results], seconds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Numbered:
     """A part of one member of an ensemble, whose result says which."""
 
@@ -102,7 +102,7 @@ class Numbered:
         return encoded(told.assign_coords({MEMBER: label(told[MEMBER])})).assign_attrs(result.attrs)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Given:
     """A part that was computed before."""
 
@@ -113,7 +113,7 @@ class Given:
         return self.result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Measure:
     """A function of one map of a part."""
 
@@ -218,7 +218,7 @@ def measure(stage: Stage, scene: Scene) -> Measure:
 def preflight(scene: Scene) -> None:
     """Find all that is wrong with a scene before anything is computed or written.
 
-    A large face that is to be generated is not made for that: a flat one of its size stands for it.
+    Of an ensemble one face is made for that; of a large one none: a flat one of its size stands for it.
 
     Warns
     -----
@@ -235,10 +235,9 @@ def preflight(scene: Scene) -> None:
         for name in ("surface", "upper"):
             if name in scene.tables and (name == "surface" or scene.wanted("joints")):
                 with _gather(problems, name):
-                    stand_in = _stand_in(scene.table(name))
-                    faces[name] = (
-                        read_surface(scene.table(name), scene.folder) if stand_in is None else stand_in
-                    )
+                    table = {key: value for key, value in scene.table(name).items() if key != "members"}
+                    stand_in = _stand_in(table)
+                    faces[name] = read_surface(table, scene.folder) if stand_in is None else stand_in
         if (
             not problems.found
             and (scene.wanted("joints") or scene.wanted("domains"))
@@ -263,8 +262,7 @@ def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Pro
 
     crack = None
     with _gather(problems, "joint"):
-        lower = faces["surface"].isel({MEMBER: 0}, missing_dims="ignore", drop=True)
-        crack = joints.Crack(lower, faces.get("upper"), **_crack_options(scene))
+        crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
     if crack is None:
         return
     for stage in stages_of(scene):
