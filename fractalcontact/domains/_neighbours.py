@@ -24,81 +24,36 @@ def grown_area(cells: Array, valid: Array | None, grid: Grid, radii: Array) -> A
         return np.zeros(radii.size)
     side = np.sqrt(grid.cell_area)
     steps = [spacing / side for spacing in grid.spacing]
-    reach = [int((radii.max() + 0.5) / step) for step in steps]
-    down, right = nearest(cells, reach, steps, grid.periodic)
-    near = down <= reach[0]
-    if valid is not None:
-        near &= valid > 0
-    offsets = down[near].astype(np.int64), right[near].astype(np.int64)
-    width = reach[1] + 1
-    codes = np.abs(offsets[0]) * width + np.abs(offsets[1])
-    counts = np.bincount(codes, minlength=(reach[0] + 1) * width)
-    if valid is not None or not all(grid.periodic):
-        there = _mirrored(np.nonzero(near), offsets, valid, cells.shape, grid.periodic)
-        twice = ~there & (codes > 0)
-        counts += np.bincount(codes[twice], minlength=counts.size)
-    rows, columns = np.divmod(np.arange(counts.size), width)
-    distance = np.hypot(rows * steps[0], columns * steps[1])
-    return np.asarray((np.clip(radii[:, None] - distance + 0.5, 0.0, 1.0) * counts).sum(-1))
+    counts = offsets(cells, valid, [int((radii.max() + 0.5) / step) for step in steps], steps, grid.periodic)
+    rows, columns = (np.arange(n) * step for n, step in zip(counts.shape, steps, strict=True))
+    distance = np.hypot(rows[:, None], columns).ravel()
+    return np.asarray((np.clip(radii[:, None] - distance + 0.5, 0.0, 1.0) * counts.ravel()).sum(-1))
 
 
-def nearest(
-    cells: Array, reach: Sequence[int], steps: Sequence[float], periodic: Sequence[bool]
-) -> tuple[Array, Array]:
-    """Return the rows and columns from the nearest cell of the set to every cell, (ny, nx) int16 each.
-
-    Looks `reach` (rows, columns) far; `steps` are the spacings. Rows are reach + 1 where there is none.
-    """
-    ny, nx = cells.shape
-    far = reach[0] + 1
-    inner = cells > 0
-    for axis, (width, wraps) in enumerate(zip(reach, periodic, strict=True)):
-        margin = [(width, width) if k == axis else (0, 0) for k in (0, 1)]
-        inner = np.pad(inner, margin, mode="wrap") if wraps else np.pad(inner, margin)
-    down = np.empty(inner.shape, np.int16)
-    last = np.full(inner.shape[1], far, np.int16)
-    for i in range(inner.shape[0]):  # below the last cell of the set in each column
-        last = np.where(inner[i], np.int16(0), np.minimum(last + np.int16(1), np.int16(far)))
-        down[i] = last
-    last[:] = far
-    for i in range(inner.shape[0] - 1, -1, -1):  # above the next one, where that is nearer
-        last = np.where(inner[i], np.int16(0), np.minimum(last + np.int16(1), np.int16(far)))
-        down[i] = np.where(last < down[i], -last, down[i])
-    rows, columns = np.empty((2, ny, nx), np.int16)
-    order = sorted(range(-reach[1], reach[1] + 1), key=abs)
-    for start in range(0, ny, BAND):
-        band = down[reach[0] + start : reach[0] + min(start + BAND, ny)]
-        square = np.where(np.abs(band) < far, (band * steps[0]) ** 2, np.inf)
-        best = np.full((len(band), nx), np.inf)
-        row, column = rows[start : start + BAND], columns[start : start + BAND]
-        row[:], column[:] = far, 0
-        for right in order:
-            beside = slice(reach[1] - right, reach[1] - right + nx)
-            trial = square[:, beside] + (right * steps[1]) ** 2
-            nearer = trial < best
-            np.copyto(best, trial, where=nearer)
-            np.copyto(row, band[:, beside], where=nearer)
-            np.copyto(column, np.int16(right), where=nearer)
-    return rows, columns
-
-
-BAND = 32  # rows that are gone through at a time, to stay near the processor
-
-
-def _mirrored(
-    places: Sequence[Array],
-    offsets: Sequence[Array],
+def offsets(
+    cells: Array,
     valid: Array | None,
-    shape: Sequence[int],
+    reach: Sequence[int],
+    steps: Sequence[float],
     periodic: Sequence[bool],
 ) -> Array:
-    """Return whether the mirror image of each place about its nearest cell of the set was observed."""
-    image, there = [], np.ones(places[0].size, bool)
-    for place, offset, n, wraps in zip(places, offsets, shape, periodic, strict=True):
-        mirrored = place - 2 * offset
-        there &= wraps | ((mirrored >= 0) & (mirrored < n))
-        image.append(mirrored % n)
-    return there if valid is None else there & (valid[image[0], image[1]] > 0)
+    """Count the observed cells by how many rows and columns the nearest cell of the set is away.
+
+    Looks `reach` (rows, columns) far; `steps` are the spacings. Cells without an observed mirror image about
+    their nearest cell of the set count twice.
+    """
+    from fractalcontact.domains._near_kernels import above_and_below, count_offsets
+
+    down = np.empty(cells.shape, np.int16 if max(reach) < NARROW else np.int32)
+    above_and_below(cells, reach[0], periodic[0], down)
+    observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
+    above, right = ((np.arange(n + 1) * step) ** 2 for n, step in zip(reach, steps, strict=True))
+    counts = np.zeros((reach[0] + 1, reach[1] + 1), np.int64)
+    count_offsets(down, observed, above, right, periodic[0], periodic[1], counts)
+    return counts
+
+
+NARROW = 2**14  # cells of reach that short numbers hold
 
 
 def dust_area(cells: float, observed: float, grid: Grid, radii: Array) -> Array:

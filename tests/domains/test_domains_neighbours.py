@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from domains.sets import DIMENSION, as_mask, koch_raster, lattice_set, placed, random_dust
+from scipy.ndimage import distance_transform_edt
 
 import fractalcontact as fc
 from fractalcontact.base.grid import Grid
@@ -45,6 +46,17 @@ def test_grown_area_cell_by_cell(wraps):
                 want += np.clip(radii - distance + 0.5, 0, 1)
         found = _neighbours.grown_area(cells, None, Grid((ny, nx), spacing, wraps), radii)
         assert found == pytest.approx(want, rel=1e-13)
+
+
+@pytest.mark.parametrize("reach", [100, 20000])
+def test_offsets_agree_with_the_distance_transform(reach):
+    cells = random_dust(128, 90, np.random.default_rng(4)).astype(np.uint8)
+    tiled = np.tile(cells, (3, 3)) == 0
+    distance = distance_transform_edt(tiled, sampling=(1.5, 1.0))[128:256, 128:256]
+    counts = _neighbours.offsets(cells, None, (reach, 100), (1.5, 1.0), (True, True))
+    rows, columns = np.nonzero(counts)
+    found = np.repeat(np.hypot(1.5 * rows, columns), counts[rows, columns])
+    assert np.sort(found) == pytest.approx(np.sort(distance.ravel()), rel=1e-14)
 
 
 def test_area_beyond_a_free_edge_is_the_mirror_image():
