@@ -168,16 +168,29 @@ def _observed(valid: Any, mask: xr.DataArray, problems: Problems) -> Array | Non
     if valid.shape != mask.shape[-valid.ndim :]:
         problems.add("valid", f"the shape of the mask, {mask.shape[-valid.ndim :]}", f"shape {valid.shape}")
         return None
+    for dim in dims:
+        if dim in mask.coords and dim in valid.coords:
+            here, there = mask.coords[dim].values, valid.coords[dim].values
+            expected, got = (np.array2string(values, threshold=6) for values in (here, there))
+            problems.require(_same_places(here, there), f"valid.{dim}", f"that of the mask, {expected}", got)
     return _flags(valid).view(np.uint8).reshape(-1, ny, nx)
 
 
+def _same_places(here: Array, there: Array) -> bool:
+    """Return whether two coordinates are the same, numbers to a millionth of their step."""
+    if here.dtype.kind not in "iuf" or there.dtype.kind not in "iuf":
+        return bool(np.array_equal(here, there))
+    step = np.abs(np.diff(here)).min() if here.size > 1 else 0.0
+    return bool(np.all(np.abs(here - there) <= 1e-6 * step))
+
+
 def _leading_coords(mask: xr.DataArray) -> dict[str, xr.DataArray]:
-    """Return the known coordinates that live on the leading dims alone."""
+    """Return the coordinates of the leading dims, and the known ones that live on these alone."""
     leading = set(mask.dims[:-2])
     return {
         str(name): coordinate.reset_coords(drop=True)
         for name, coordinate in mask.coords.items()
-        if name in QUANTITIES and set(coordinate.dims) <= leading
+        if (name in QUANTITIES and set(coordinate.dims) <= leading) or name in leading
     }
 
 
@@ -198,14 +211,30 @@ def assemble(
     import xarray as xr
 
     known, unknown = _row_coords(planes, *rows) if rows else ({}, {})
-    there = {**planes.coords, **(planes.plane_coords if on_plane else {}), **known, **(coords or {})}
+    told = {name: values for name, values in planes.coords.items() if name in QUANTITIES}
+    there = {**told, **(planes.plane_coords if on_plane else {}), **known, **(coords or {})}
     dataset = label(xr.Dataset(variables, coords=there))
+    for dim in set(planes.dims) & (set(planes.coords) - set(told)) & set(dataset.dims):
+        dataset.coords[dim] = _own(planes.coords[dim])
     for name, values in unknown.items():
         dataset.coords[name] = values
         dataset.coords[name].encoding["_FillValue"] = None
     for name, attributes in (notes or {}).items():
         dataset[name].attrs.update(attributes)
     return dataset
+
+
+def _own(coordinate: xr.DataArray) -> xr.Variable:
+    """Return the coordinate of a leading dim that the schema does not know, in its own units."""
+    import xarray as xr
+
+    name = str(coordinate.name)
+    attributes = {"long_name": str(coordinate.attrs.get("long_name", f"{name} of the mask"))}
+    if coordinate.dtype.kind in "biuf":
+        attributes["units"] = str(coordinate.attrs.get("units", "1"))
+    own = xr.Variable(coordinate.dims, coordinate.values, attributes)
+    own.encoding["_FillValue"] = None
+    return own
 
 
 def _row_coords(planes: Planes, row: str, plane: Array) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -256,7 +256,8 @@ def _notes(known: Array, sizes: Array, *, chosen: bool) -> dict[str, dict[str, s
         "local_slope": {"long_name": "local dimension, -d ln(box_measure)/d ln(box_size)"},
     }
     if sizes.size < 2:
-        notes["box_dimension"] = {"comment": "NaN: one size of box gives no slope; the mask is too narrow"}
+        reason = "" if chosen else "; the mask is too narrow"
+        notes["box_dimension"] = {"comment": f"NaN: one size of box gives no slope{reason}"}
     elif not known.all():
         notes["box_dimension"] = {"comment": f"NaN where the set is empty ({int((~known).sum())} planes)"}
     return notes

@@ -72,7 +72,7 @@ def boundary_dimension(
         "boundary_sides": planes.variable(np.array([one[1][:, :2].sum() for one in counts], np.int64)),
         "run_time": ((), time.perf_counter() - begin),
     }
-    dataset = assemble(planes, variables, notes=_notes(known, half))
+    dataset = assemble(planes, variables, notes=_notes(known, half, planes.grid.shape))
     parameters = {"mask": mask, "periodic": periodic, "valid": valid}
     return stamp(
         dataset,
@@ -83,7 +83,7 @@ def boundary_dimension(
     )
 
 
-def _notes(known: Array, half: Array) -> dict[str, dict[str, str]]:
+def _notes(known: Array, half: Array, shape: tuple[int, ...]) -> dict[str, dict[str, str]]:
     notes = {
         "ci_low": {"long_name": "lower end of the 95 % interval of the dimension of the boundary"},
         "ci_high": {"long_name": "upper end of the 95 % interval of the dimension of the boundary"},
@@ -92,7 +92,8 @@ def _notes(known: Array, half: Array) -> dict[str, dict[str, str]]:
     }
     if not known.all():
         without = int((~known).sum())
-        notes["boundary_dimension"] = {"comment": f"NaN where there is no boundary ({without} planes)"}
+        reason = "there is no boundary" if min(shape) > 2 else "no boundary can be compared at two steps"
+        notes["boundary_dimension"] = {"comment": f"NaN where {reason} ({without} planes)"}
     if np.isnan(half[known]).any():
         reason = (
             f"NaN where fewer than {_edges.FEWEST} sides lie on the boundary, or one block holds all of them"

@@ -69,7 +69,7 @@ def islands(
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.islands") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-        maps = problems.choices("keep", keep, ("label",)) if len(keep) else ()
+        maps = problems.choices("keep", keep, ("label",))
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
     found = find(planes, connectivity, keep="label" in maps)
     tables = [measure(labels, planes) for labels in found]

@@ -157,3 +157,34 @@ def test_importing_the_room_loads_nothing_heavy():
         "assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_what_was_observed_must_lie_where_the_mask_does(name, mask):
+    valid = xr.ones_like(mask.isel(step=0, drop=True))
+    FUNCTIONS[name](mask, valid=valid.assign_coords(x=valid.x * (1 + 1e-12)))
+    with pytest.raises(ValueError, match=r"valid\.y: expected that of the mask"):
+        FUNCTIONS[name](mask, valid=valid.isel(y=slice(None, None, -1)))
+    with pytest.raises(ValueError, match=r"valid\.step: expected that of the mask, \[0 1\], got \[1 0\]"):
+        FUNCTIONS[name](mask, valid=xr.ones_like(mask).isel(step=[1, 0]))
+
+
+def test_the_coordinate_of_any_leading_dim_is_kept(mask, tmp_path):
+    stack = mask.rename(step="batch").drop_vars("closure").assign_coords(batch=["rough", "ground"])
+    result = fc.domains.percolation(stack)
+    assert result.batch.values.tolist() == ["rough", "ground"]
+    hours = mask.rename(step="time").drop_vars("closure").assign_coords(time=[0.5, 2.0])
+    hours["time"].attrs.update(units="h", history="somewhere")
+    result = fc.domains.describe(hours)
+    assert result.time.attrs == {"units": "h", "long_name": "time of the mask"}
+    fc.save(result, tmp_path / "hours.nc")
+    assert fc.open(tmp_path / "hours.nc").coverage.sel(time=2.0) == result.coverage[1]
+
+
+def test_reasons_fit_what_was_asked():
+    strip = as_mask(np.arange(40).reshape(2, 20) % 3 == 0)
+    assert "two steps" in fc.domains.boundary_dimension(strip).boundary_dimension.comment
+    one = fc.domains.box_dimension(as_mask(np.eye(30, dtype=bool)), scales=4).box_dimension
+    assert one.comment == "NaN: one size of box gives no slope"
+    with pytest.raises(ValueError, match="keep: expected a sequence out of 'label'"):
+        fc.domains.islands(strip, keep=None)
