@@ -18,6 +18,7 @@ UNLABELLED = {
     "joints.bandis_constants",
     "joints.barton_bandis_scaled",
     "joints.barton_choubey_strength",
+    "joints.self_weight_strength",
     "joints.size_effect",
     "contact.effective_modulus",
     "contact.flat_stiffness",
@@ -67,6 +68,7 @@ CALLS = {
     "surfaces.sample": lambda: fc.surfaces.sample("concrete_crack"),
     "surfaces.level": lambda: fc.surfaces.level(face()),
     "surfaces.fill": lambda: fc.surfaces.fill(face().where(face().x > 2e-4)),
+    "surfaces.despike": lambda: fc.surfaces.despike(face()),
     "surfaces.describe": lambda: fc.surfaces.describe(face()),
     "dimensions.estimate": lambda: fc.dimensions.estimate(face(), list(fc.dimensions.methods())),
     "dimensions.spectrum": lambda: fc.dimensions.spectrum(wavy()),
@@ -75,9 +77,17 @@ CALLS = {
     "joints.closure": lambda: fc.joints.closure(
         crack(), shear=[1e-4], normal_force=[1.0, 10.0], keep=("state",)
     ),
+    "joints.closure_laws": lambda: fc.joints.closure_laws(
+        fc.joints.closure(crack(), shear=[1e-4], normal_force=[1.0, 3.0, 10.0, 30.0])
+    ),
+    "joints.cyclic_shear": lambda: fc.joints.cyclic_shear(
+        slid().sel(direction=["E", "W"]), [0.0, 3e-4, -3e-4, 0.0]
+    ),
+    "joints.delta_dimension": lambda: fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4]),
     "joints.dilatancy": slid,
     "joints.friction": lambda: fc.joints.friction(slid()),
     "joints.register": lambda: fc.joints.register(face(), face() + 1e-5),
+    "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(face(), lag=4e-4),
     "joints.transmissivity": lambda: fc.joints.transmissivity(gap()),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
     "domains.area_dimension": lambda: fc.domains.area_dimension(
