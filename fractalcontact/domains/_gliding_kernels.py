@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import kernel
+from fractalcontact.base.jit import inner_loop, kernel
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-@kernel
+@inner_loop
 def _slide(columns: Array, leaving: Array, entering: Array) -> None:
     for j in range(columns.size):
         columns[j] += np.int32(entering[j]) - np.int32(leaving[j])
 
 
-@kernel
+@inner_loop
 def _first_band(mask: Array, size: int, columns: Array) -> None:
     for k in range(size):
         for j in range(columns.size):

@@ -12,95 +12,149 @@ from fractalcontact.base.grid import Grid
 from fractalcontact.domains._masks import Array
 
 STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
-BAND = 2**24  # cells that are labelled at a time where no map is kept
+BAND = 2**22  # cells that are labelled at a time where no map is kept
+MANY = 2**22  # islands of a plane up to which all of them are measured unasked
 FAR = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True)
+class Details:
+    """What `_island_kernels.measure` counted of every part; part k stands at k - 1."""
+
+    sums: Array
+    sides: Array
+    box: Array
 
 
 @dataclass(frozen=True)
 class Labels:
     """Islands of one plane.
 
-    The connected parts of each band of rows are numbered from 1 (0 outside). Part k belongs to island
-    `island[k]` (numbered from 1 in the order of their first cells) and lies `shift[k]` periods (y, x) from
-    where it continues the rest of it. `closes[i]` says whether island i goes round (y, x). `sums`, `sides`
-    and `box` are what `_island_kernels.measure` counted of every part. `ends` are the parts at the first and
-    last row and column; `parts` is the map of parts, (ny, nx) int32, or None where it was not kept.
+    The connected parts of each band of rows are numbered from 1 (0 outside). The part `merged[k]` (ascending)
+    belongs to the island that begins with the part `root[k]`, and lies `shift[k]` periods (y, x) from where
+    it continues the rest of it; every other part begins an island of its own. The island that begins with the
+    part `closing[k]` goes round (y, x) where `around[k]` says so. `cells` are those of every part, and
+    `details` the rest of its measures where they were wanted. `ends` are the parts at the first and last row
+    and column; `parts` is the map of parts, (ny, nx) int32, or None where it was not kept.
     """
 
-    island: Array
+    merged: Array
+    root: Array
     shift: Array
-    closes: Array
-    sums: Array
-    sides: Array
-    box: Array
+    closing: Array
+    around: Array
+    cells: Array
+    details: Details | None
     ends: tuple[Array, Array, Array, Array]
     parts: Array | None
 
     @property
     def count(self) -> int:
         """Number of islands."""
-        return int(self.closes.shape[0]) - 1
+        return int(self.cells.size - self.merged.size)
 
     @property
     def sizes(self) -> Array:
         """Number of cells of every island."""
-        return self.gather(self.sums[:, 0])
+        return self.gather(self.cells)
+
+    @property
+    def closes(self) -> Array:
+        """Whether each island goes round (y, x)."""
+        closes = np.zeros((self.count, 2), bool)
+        closes[self.number(self.closing) - 1] = self.around
+        return closes
 
     @property
     def map(self) -> Array:
         """Number of the island at every cell, (ny, nx) int32."""
         if self.parts is None:
             raise ValueError("the map of the islands was not kept")
-        return np.asarray(self.island.astype(np.int32)[self.parts])
+        return np.asarray(self.number(np.arange(self.cells.size + 1)).astype(np.int32)[self.parts])
 
-    def gather(self, values: Array) -> Array:
-        """Sum a count of the parts over every island."""
-        total = np.zeros(self.count + 1, np.int64)
-        np.add.at(total, self.island, values)
-        return total[1:]
+    def number(self, parts: Array) -> Array:
+        """Return the islands, numbered from 1 in the order of their first cells, that parts belong to."""
+        begins = parts.copy()
+        there = np.isin(parts, self.merged)
+        begins[there] = self.root[np.searchsorted(self.merged, parts[there])]
+        return begins - np.searchsorted(self.merged, begins)
+
+    def gather(self, values: Array, reduce: np.ufunc = np.add) -> Array:
+        """Reduce a measure of the parts over every island."""
+        if self.merged.size == 0:
+            return values
+        total = values.copy()
+        reduce.at(total, self.root - 1, values[self.merged - 1])
+        return np.delete(total, self.merged - 1)
+
+    def moved(self, axis: int) -> Array:
+        """Return the shift of every part along an axis, in periods."""
+        shift = np.zeros(self.cells.size, np.int64)
+        shift[self.merged - 1] = self.shift[:, axis]
+        return shift
 
     def crosses(self, axis: int, wraps: bool) -> bool:
         """Return whether an island goes round a periodic axis, or touches both ends of a free one."""
         if wraps:
-            return bool(self.closes[1:, axis].any())
-        first, last = (np.unique(self.island[end[end > 0]]) for end in self.ends[2 * axis : 2 * axis + 2])
+            return bool(self.around[:, axis].any())
+        first, last = (np.unique(self.number(end[end > 0])) for end in self.ends[2 * axis : 2 * axis + 2])
         return bool(np.intersect1d(first, last).size)
 
 
-def label_plane(cells: Array, connectivity: int, periodic: Sequence[bool], *, keep: bool = True) -> Labels:
-    """Find and measure the islands of a plane; connectivity 1 joins 4 neighbours, 2 joins 8.
+def label_plane(
+    cells: Array, connectivity: int, periodic: Sequence[bool], *, keep: bool, detailed: bool | None = False
+) -> Labels:
+    """Find the islands of a plane; connectivity 1 joins 4 neighbours, 2 joins 8.
 
-    Without `keep` no map is made, and the plane is gone through in bands of rows.
+    Without `keep` no map is made, and the plane is gone through in bands of rows. `detailed` measures more
+    than cells; None does unless there are more than `MANY`.
     """
-    from fractalcontact.domains._island_kernels import join, measure
+    from fractalcontact.domains._island_kernels import measure
 
     wrap_y, wrap_x = periodic
     ny, nx = cells.shape
     height = ny if keep else max(1, BAND // nx)
     steps = (0,) if connectivity == 1 else (-1, 0, 1)
+    short = np.int32 if cells.size < 2**31 else np.int64
+    wanted = detailed is not False
     count, links, counts, columns = 0, [], [], []
     rows: list[Array] = []
+    measured: list[tuple[Array, ...]] = []
     for start in range(0, ny, height):
         parts, found = ndimage.label(cells[start : start + height], STRUCTURES[connectivity])
-        measured = _blank(found + 1)
-        measure(parts, cells, start, wrap_y, wrap_x, *measured)
+        counts.append(np.bincount(parts.ravel(), minlength=found + 1)[1:].astype(short))
+        wanted &= detailed is not None or count + found <= MANY
+        if wanted:
+            blank = _blank(found + 1)
+            measure(parts, cells, start, wrap_y, wrap_x, *blank)
+            measured.append(tuple(values[1:] for values in blank))
+        else:
+            measured.clear()
         parts[parts > 0] += count
         links += [_pairs(rows[-1], parts[0], step, wrap_x, down=0) for step in steps if rows]
         rows += [parts[0].copy(), parts[-1].copy()]
-        counts.append([values[1:] for values in measured])
         columns.append(parts[:, [0, -1]].copy())
         count += found
     left, right = np.concatenate(columns).T
     ends = (rows[0], rows[-1], left, right)
     links += [_pairs(rows[-1], rows[0], step, wrap_x, down=1) for step in steps if wrap_y]
     links += [_pairs(right, left, step, wrap_y, down=1)[:, [0, 1, 3, 2]] for step in steps if wrap_x]
-    root, shift = np.arange(count + 1), np.zeros((count + 1, 2), np.int64)
-    closes = np.zeros((count + 1, 2), bool)
-    join(np.concatenate([np.empty((0, 4), np.int64), *links]), root, shift, closes)
-    roots, island = np.unique(root, return_inverse=True)
-    blank = _blank(1)
-    sums, sides, box = (np.concatenate([blank[k], *(each[k] for each in counts)]) for k in range(3))
-    return Labels(island, shift, closes[roots], sums, sides, box, ends, parts if keep else None)
+    details = Details(*(np.concatenate(each) for each in zip(*measured, strict=True))) if wanted else None
+    joined = _joined(np.concatenate([np.empty((0, 4), np.int64), *links]))
+    return Labels(*joined, np.concatenate(counts), details, ends, parts if keep else None)
+
+
+def _joined(links: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Join parts by links; return `merged`, `root`, `shift`, `closing` and `around` of the islands."""
+    from fractalcontact.domains._island_kernels import join
+
+    linked, places = np.unique(links[:, :2], return_inverse=True)
+    parent, shift = np.arange(linked.size), np.zeros((linked.size, 2), np.int64)
+    closes = np.zeros((linked.size, 2), bool)
+    join(np.concatenate([places.reshape(-1, 2), links[:, 2:]], axis=1), parent, shift, closes)
+    own = parent == np.arange(linked.size)
+    closing = own & closes.any(1)
+    return linked[~own], linked[parent[~own]], shift[~own], linked[closing], closes[closing]
 
 
 def _blank(parts: int) -> tuple[Array, Array, Array]:
@@ -119,31 +173,48 @@ def _pairs(edge: Array, facing: Array, step: int, wraps: bool, *, down: int) -> 
     return np.unique(links.astype(np.int64), axis=0)
 
 
-def table(labels: Labels, grid: Grid, origin: Sequence[float]) -> dict[str, Array]:
-    """Return cells, area, perimeter, centroid and bounding box of every island, in metres.
+PLAIN = ("cells", "area")
+COLUMNS = (*PLAIN, "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
+
+
+def table(labels: Labels, grid: Grid, origin: Sequence[float], columns: Sequence[str]) -> dict[str, Array]:
+    """Return columns out of `COLUMNS` for every island, in metres.
 
     `origin` holds the first cell centres (y, x). The perimeter is along sides of cells, towards open cells
     inside the extent. An island that goes round a period has no centroid along it (NaN), and spans it.
     """
     size = labels.sizes
+    out: dict[str, Array] = {}
+    if "cells" in columns:
+        out["cells"] = size.astype(np.int64)
+    if "area" in columns:
+        out["area"] = size * grid.cell_area
+    if labels.details is None:
+        return out
     dy, dx = grid.spacing
-    perimeter = labels.gather(labels.sides[:, 0]) * dx + labels.gather(labels.sides[:, 1]) * dy
-    out = {"cells": size, "area": size * grid.cell_area, "perimeter": perimeter}
+    sides = labels.details.sides
+    out["perimeter"] = labels.gather(sides[:, 0]) * dx + labels.gather(sides[:, 1]) * dy
     for axis, name in enumerate(("y", "x")):
-        n, spacing, around = grid.shape[axis], grid.spacing[axis], labels.closes[1:, axis]
-        first = origin[axis] - 0.5 * spacing
-        shift = labels.shift[1:, axis] * n
-        low, high = np.full(labels.count + 1, FAR), np.full(labels.count + 1, -FAR)
-        np.minimum.at(low, labels.island[1:], labels.box[1:, 2 * axis] + shift)
-        np.maximum.at(high, labels.island[1:], labels.box[1:, 2 * axis + 1] + shift + 1)
-        low, high = low[1:], high[1:]
-        turn = low // n * n  # back to where the first cell lies inside the extent
-        place = labels.sums[:, axis + 1] + labels.sums[:, 0] * labels.shift[:, axis] * n
-        centre = labels.gather(place) / size + 0.5
-        out[f"centroid_{name}"] = np.where(around, np.nan, first + centre % n * spacing)
-        out[f"{name}_min"] = first + np.where(around, 0, low - turn) * spacing
-        out[f"{name}_max"] = first + np.where(around, n, high - turn) * spacing
-    return out
+        out |= _places(labels, labels.details, size, grid, origin, axis, name)
+    return {name: out[name] for name in columns}
+
+
+def _places(
+    labels: Labels, details: Details, size: Array, grid: Grid, origin: Sequence[float], axis: int, name: str
+) -> dict[str, Array]:
+    """Return centroid and ends of every island along an axis."""
+    n, spacing, around = grid.shape[axis], grid.spacing[axis], labels.closes[:, axis]
+    first = origin[axis] - 0.5 * spacing
+    shift = labels.moved(axis) * n
+    low = labels.gather(details.box[:, 2 * axis] + shift, np.minimum)
+    high = labels.gather(details.box[:, 2 * axis + 1] + shift + 1, np.maximum)
+    turn = low // n * n  # back to where the first cell lies inside the extent
+    centre = labels.gather(details.sums[:, axis + 1] + details.sums[:, 0] * shift) / size + 0.5
+    return {
+        f"centroid_{name}": np.where(around, np.nan, first + centre % n * spacing),
+        f"{name}_min": first + np.where(around, 0, low - turn) * spacing,
+        f"{name}_max": first + np.where(around, n, high - turn) * spacing,
+    }
 
 
 def euler_number(cells: Array, connectivity: int, periodic: Sequence[bool]) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
-METRIC = ("area", "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
 
 
 def islands(
@@ -27,6 +26,7 @@ def islands(
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
     keep: Sequence[str] = ("label",),
+    table: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Islands of a set of cells: their number, their map, and a table of their sizes.
 
@@ -43,6 +43,9 @@ def islands(
     keep : sequence of str
         Maps to keep: ("label",) or (). Without the map a plane is gone through band by band, in little
         memory beyond the mask itself.
+    table : sequence of str, optional
+        Columns of the table, out of those below; () for no table. By default all of them, but `cells` and
+        `area` alone where a plane has more than 2^22 islands: the whole table takes some 200 bytes for each.
 
     Returns
     -------
@@ -70,26 +73,32 @@ def islands(
     with Problems("fractalcontact.domains.islands") as problems:
         problems.integer("connectivity", connectivity, at_least=1, at_most=2)
         maps = problems.choices("keep", keep, ("label",))
+        wanted = _labels.COLUMNS if table is None else problems.choices("table", table, _labels.COLUMNS)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
-    found = find(planes, connectivity, keep="label" in maps)
-    tables = [measure(labels, planes) for labels in found]
-    columns = {name: np.concatenate([one[name] for one in tables]) for name in tables[0]}
+    detailed = None if table is None else bool(set(wanted) - set(_labels.PLAIN))
+    found = find(planes, connectivity, keep="label" in maps, detailed=detailed)
+    many = table is None and any(labels.details is None for labels in found)
+    wanted = _labels.PLAIN if many else wanted
+    counts = [labels.count if wanted else 0 for labels in found]
     variables = {
         **{name: planes.variable(values) for name, values in summary(found, planes, connectivity).items()},
         **{name: planes.variable(np.array([labels.map for labels in found]), "y", "x") for name in maps},
-        **{name: ("island", values) for name, values in columns.items()},
+        **{name: ("island", values) for name, values in _table(found, planes, wanted).items()},
         "run_time": ((), time.perf_counter() - begin),
     }
-    counts = [one["cells"].size for one in tables]
-    coords = {"island_label": ("island", np.concatenate([np.arange(1, count + 1) for count in counts]))}
-    rows = ("island", np.repeat(np.arange(planes.count), counts))
-    dataset = assemble(planes, variables, coords, on_plane="label" in maps, notes=_notes(planes), rows=rows)
+    coords: dict[str, Any] = {}
+    if wanted:
+        coords["island_label"] = ("island", _chain([np.arange(1, n + 1, dtype=np.int32) for n in counts]))
+    rows = ("island", np.repeat(np.arange(planes.count), counts)) if wanted and planes.dims else None
+    notes = _notes(planes, many=many)
+    dataset = assemble(planes, variables, coords, on_plane="label" in maps, notes=notes, rows=rows)
     parameters = {
         "mask": mask,
         "connectivity": connectivity,
         "periodic": periodic,
         "valid": valid,
         "keep": maps,
+        "table": wanted,
     }
     return stamp(
         dataset, "fractalcontact.domains.islands", parameters, title="Islands of a set", references=SOURCE
@@ -112,28 +121,45 @@ def summary(found: Sequence[_labels.Labels], planes: Planes, connectivity: int) 
     }
 
 
-def find(planes: Planes, connectivity: int, *, keep: bool = True) -> list[_labels.Labels]:
-    """Find the islands of every plane, with or without their map."""
+def find(
+    planes: Planes, connectivity: int, *, keep: bool = True, detailed: bool | None = False
+) -> list[_labels.Labels]:
+    """Find the islands of every plane, with or without their map and the measures for their table."""
     wraps = planes.grid.periodic
-    return together(lambda cells: _labels.label_plane(cells, connectivity, wraps, keep=keep), planes.cells)
+    return together(
+        lambda cells: _labels.label_plane(cells, connectivity, wraps, keep=keep, detailed=detailed),
+        planes.cells,
+    )
 
 
-def measure(labels: _labels.Labels, planes: Planes) -> dict[str, Array]:
-    """Return the table of one plane; lengths are NaN where the mask has no coordinates."""
-    origin = [float(planes.plane_coords[dim].values[0]) if planes.grid.known else 0.0 for dim in ("y", "x")]
-    measured = _labels.table(labels, planes.grid, origin)
-    if planes.grid.known:
-        return measured
+def _table(found: Sequence[_labels.Labels], planes: Planes, columns: Sequence[str]) -> dict[str, Array]:
+    """Return the table of all planes; lengths are NaN where the mask has no coordinates."""
+    if not columns:
+        return {}
+    known = planes.grid.known
+    origin = [float(planes.plane_coords[dim].values[0]) if known else 0.0 for dim in ("y", "x")]
+    tables = [_labels.table(labels, planes.grid, origin, columns) for labels in found]
+    joined = {name: _chain([one.pop(name) for one in tables]) for name in columns}
+    if known:
+        return joined
     return {
-        name: np.full(values.shape, np.nan) if name in METRIC else values for name, values in measured.items()
+        name: values if name == "cells" else np.full(values.shape, np.nan) for name, values in joined.items()
     }
 
 
-def _notes(planes: Planes) -> dict[str, dict[str, str]]:
+def _chain(arrays: Sequence[Array]) -> Array:
+    """Join arrays end to end, without a copy of a single one."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _notes(planes: Planes, *, many: bool) -> dict[str, dict[str, str]]:
     reasons = []
     if not planes.grid.known:
         reasons.append("the mask has no coordinates")
     if np.any(planes.occupied == 0):
         reasons.append("the set is empty")
     comment = {"comment": "NaN where " + " or where ".join(reasons)}
-    return {"largest_island": comment, "mean_island_area": comment} if reasons else {}
+    notes = {"largest_island": comment, "mean_island_area": comment} if reasons else {}
+    if many:
+        notes["n_islands"] = {"comment": "too many for the whole table: name the columns to have them all"}
+    return notes

@@ -102,6 +102,33 @@ def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, m
                 assert np.array_equal(bands[name], whole[name], equal_nan=True), name
 
 
+TABLE = ["cells", "area", "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max"]
+
+
+def test_only_the_wanted_columns_are_measured(monkeypatch):
+    from fractalcontact.domains import _labels
+
+    mask = as_mask(np.random.default_rng(9).random((2, 30, 20)) < 0.4, periodic=(True, False))
+    whole = fc.domains.islands(mask, keep=()).drop_vars("run_time")
+    none = fc.domains.islands(mask, keep=(), table=()).drop_vars("run_time")
+    assert none.identical(whole.drop_dims("island").assign_attrs(none.attrs))
+    for columns in (["area"], ["y_max", "cells"], ["perimeter"]):
+        some = fc.domains.islands(mask, keep=(), table=columns).drop_vars("run_time")
+        assert some.identical(whole.drop_vars(set(TABLE) - set(columns)).assign_attrs(some.attrs))
+    with pytest.raises(ValueError, match="table: expected words out of 'cells', 'area'"):
+        fc.domains.islands(mask, table=["hue"])
+    most = int(whole.n_islands.max())
+    with monkeypatch.context() as patch:
+        patch.setattr(_labels, "BAND", 3 * 20)
+        patch.setattr(_labels, "MANY", most - 1)
+        few = fc.domains.islands(mask, keep=()).drop_vars("run_time")
+        assert "name the columns" in few.n_islands.comment
+        del few.n_islands.attrs["comment"]
+        assert few.identical(whole.drop_vars(TABLE[2:]).assign_attrs(few.attrs))
+        all_of_them = fc.domains.islands(mask, keep=(), table=TABLE).drop_vars("run_time")
+        assert all_of_them.identical(whole.assign_attrs(all_of_them.attrs))
+
+
 def test_chunked_masks_give_what_whole_ones_give():
     pytest.importorskip("dask")
     mask = as_mask(np.random.default_rng(7).random((2, 30, 20)) < 0.4)
