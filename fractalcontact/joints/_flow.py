@@ -20,7 +20,10 @@ from fractalcontact.base.errors import MissingExtra
 Array = np.ndarray[Any, np.dtype[Any]]
 
 DIRECT = 300_000  # up to so many unknowns elimination is faster than multigrid
-TOLERANCE = 1e-8  # of the iterative solver; the flow itself is of second order in it
+# of the iterative solver: relative error of the flow as its preconditioner sees it, and relative residual
+FLOW_ERROR, TOLERANCE = 1e-9, 1e-6
+MOST = 200  # iterations
+COARSEST = 400  # unknowns
 
 
 @dataclass(frozen=True)
@@ -178,18 +181,24 @@ def _pressures(network: Network, crossing: Array) -> tuple[Array, float]:
     total = np.bincount(i, link, size) + np.bincount(j, link, size) + ends.ravel()[crossing]
     driven = link * network.jump[inside]
     source = np.bincount(j, driven, size) - np.bincount(i, driven, size) + inflow.ravel()[crossing]
-    links = coo_array((link, (i, j)), shape=(size, size)).tocsr()
+    narrow = np.int32 if size < 2**29 else np.int64  # four links to a cell
+    links = coo_array((link, (i.astype(narrow), j.astype(narrow))), shape=(size, size)).tocsr()
     matrix = (diags_array(total) - links - links.T).tocsr()
     p = np.broadcast_to(1.0 - (np.arange(nx) + 0.5) / nx, (ny, nx)).ravel()[crossing]
     scale = float(np.linalg.norm(source)) or 1.0
     rest = source - matrix @ p
     if np.linalg.norm(rest) > 1e-14 * scale:
         free = _ungrounded(matrix) if network.jump.any() else np.ones(size, bool)
-        p[free] += _solve(matrix[free][:, free], rest[free], TOLERANCE * scale)
+        before = _dissipation(network, _on_plane(p, crossing, network.shape), crossing)
+        p[free] += _solve(matrix[free][:, free], rest[free], before, TOLERANCE * scale)
         rest = source - matrix @ p
+    return _on_plane(p, crossing, network.shape), float(np.linalg.norm(rest)) / scale
+
+
+def _on_plane(p: Array, crossing: Array, shape: tuple[int, int]) -> Array:
     pressure = np.zeros(crossing.size)
     pressure[crossing] = p
-    return pressure.reshape(network.shape), float(np.linalg.norm(rest)) / scale
+    return pressure.reshape(shape)
 
 
 def _ungrounded(matrix: Any) -> Array:
@@ -202,30 +211,82 @@ def _ungrounded(matrix: Any) -> Array:
     return free
 
 
-def _solve(matrix: Any, b: Array, residual: float) -> Array:
-    """Solve to a residual by multigrid where it is installed and pays, else by elimination."""
-    from scipy.sparse.linalg import cg, splu
+def _solve(matrix: Any, b: Array, before: float, residual: float) -> Array:
+    """Solve by multigrid where it is installed and pays, to an error of the flow, else by elimination.
+
+    `before` is the power that the flow takes before the correction by the solution.
+    """
+    from scipy.sparse.linalg import splu
 
     if b.size > DIRECT:
         try:
-            import pyamg
+            preconditioner = _multigrid(matrix)
         except ImportError:
             pass
         else:
-            # aggregates must not reach from a wide channel into a narrow one beside it; local weights need
-            # no estimate of the largest eigenvalue, which took longer than all the rest of the set-up
-            levels = pyamg.smoothed_aggregation_solver(
-                matrix, strength=("classical", {"theta": 0.1}), smooth=("jacobi", {"weighting": "local"})
-            )
-            p, failed = cg(matrix, b, rtol=0.0, atol=residual, maxiter=200, M=levels.aspreconditioner())
-            if not failed:
-                return np.asarray(p)
+            p = _conjugate_gradients(matrix, b, preconditioner, before, residual)
+            if p is not None:
+                return p
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     try:
         factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options=options)
     except MemoryError as error:
         raise MissingExtra(f"the flow through {b.size} open cells", "pyamg", "flow") from error
     return np.asarray(factors.solve(b))
+
+
+def _multigrid(matrix: Any) -> Any:
+    """Return one V-cycle over smoothed aggregates of cells as an operator.
+
+    Aggregates must not reach from a wide channel into a narrow one beside it. Prolongation is smoothed by
+    local weights, which need no estimate of an eigenvalue.
+    """
+    from pyamg.aggregation.aggregate import standard_aggregation
+    from pyamg.multilevel import MultilevelSolver
+    from pyamg.relaxation.smoothing import change_smoothers
+    from pyamg.strength import classical_strength_of_connection
+    from scipy.sparse import diags_array
+
+    levels: list[Any] = []
+    size = 0
+    while matrix.shape[0] != size:
+        levels.append(MultilevelSolver.Level())
+        levels[-1].A, size = matrix, matrix.shape[0]
+        if size > COARSEST:
+            strong = classical_strength_of_connection(matrix, theta=0.1)
+            joined = standard_aggregation(strong)[0].astype(np.float64)
+            weights = diags_array(4.0 / 3.0 / abs(matrix).sum(axis=1))
+            levels[-1].P = (joined - weights @ (matrix @ joined)).tocsr()
+            levels[-1].R = levels[-1].P.T.tocsr()
+            matrix = (levels[-1].R @ matrix @ levels[-1].P).tocsr()
+    cycle = MultilevelSolver(levels, coarse_solver="splu")
+    sweeps = ("gauss_seidel", {"sweep": "symmetric"})
+    change_smoothers(cycle, sweeps, sweeps)
+    return cycle.aspreconditioner()
+
+
+def _conjugate_gradients(
+    matrix: Any, b: Array, preconditioner: Any, before: float, residual: float
+) -> Array | None:
+    """Return the solution once the flow and the residual are good enough; None where they never are.
+
+    The power that the flow takes is `before` - b p at the solution, and above it by what is left, e A e,
+    which r M r measures.
+    """
+    p, rest = np.zeros(b.size), b.copy()
+    step, last = np.zeros(b.size), 1.0
+    for _ in range(MOST):
+        moved = preconditioner @ rest
+        left = float(rest @ moved)
+        if left <= FLOW_ERROR * (before - float(b @ p)) and np.linalg.norm(rest) <= residual:
+            return p
+        step = moved + (left / last) * step
+        pull = matrix @ step
+        length = left / float(step @ pull)
+        p += length * step
+        rest -= length * pull
+        last = left
+    return None
 
 
 def _dissipation(network: Network, pressure: Array, crossing: Array) -> float:

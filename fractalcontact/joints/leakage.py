@@ -59,7 +59,8 @@ def transmissivity(
     Dataset over (..., axis)
         transmissivity (m3, hydraulic aperture cubed over 12), hydraulic_aperture (m), percolates (an open
         path of cells that share edges crosses, on a periodic axis to its own image; without one both are
-        zero), residual (of the linear system, relative); over (...): aperture (mechanical: mean opening, m),
+        zero), residual (of the linear system, relative; the flow itself is of second order in it, and solved
+        to about 1e-8); over (...): aperture (mechanical: mean opening, m),
         open_fraction, overlap_fraction. With a viscosity also flow_conductance (m3 Pa-1 s-1), flow per width
         and pressure gradient. run_time (s).
 

@@ -276,13 +276,25 @@ def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
     monkeypatch.setattr(_flow, "DIRECT", 10)
     pytest.importorskip("pyamg")
     multigrid = flow(make_face, gap)
-    np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-10)
-    assert (multigrid.residual <= 1e-8).all()
+    np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=2e-8)
+    assert (multigrid.residual <= 1e-6).all()
     periodic = flow(make_face, gap, periodic=True)
     monkeypatch.setitem(sys.modules, "pyamg", None)
     np.testing.assert_allclose(
-        periodic.transmissivity, flow(make_face, gap, periodic=True).transmissivity, rtol=1e-10
+        periodic.transmissivity, flow(make_face, gap, periodic=True).transmissivity, rtol=2e-8
     )
+
+
+@pytest.mark.parametrize("contrast", [10.0, 1e9])
+def test_multigrid_knows_the_error_of_the_flow_for_narrow_beside_wide(make_face, monkeypatch, contrast):
+    from fractalcontact.joints import _flow
+
+    pytest.importorskip("pyamg")
+    gap = np.cbrt(np.where(np.random.default_rng(5).random((120, 120)) < 0.45, 1.0, contrast))
+    direct = flow(make_face, gap)
+    monkeypatch.setattr(_flow, "DIRECT", 10)
+    multigrid = flow(make_face, gap)
+    np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-7)
 
 
 def test_messages(make_face):
@@ -299,9 +311,9 @@ def test_a_million_cells_in_ten_seconds(make_face, rough):
     heights = rough((1024, 1024), 0)
     for closed in (0.0, 0.2, 0.35):
         gap = heights - np.quantile(heights, closed) if closed else heights - heights.min() + 0.1
-        result = flow(make_face, gap, axis="x")
+        result = flow(make_face, gap)
         assert result.run_time < 10
-        assert result.residual <= 1e-8
+        assert (result.residual <= 1e-6).all()
 
 
 def test_overlaps_are_contact_and_counted_but_not_everywhere(make_face):
