@@ -74,7 +74,7 @@ def dilatancy(
         Maps over (direction, shear, step, y, x) to keep: "state", "pressure", "gap", "displacement",
         "residual_height".
     influence, disc_radius, hardness, tolerance, method
-        As for `fractalcontact.contact.press`.
+        As for `fractalcontact.contact.press`; like `bulk` and `keep` refused where there is no force.
     progress : bool
         Show a bar over the shears.
 
@@ -116,8 +116,12 @@ def dilatancy(
             if normal_stiffness is not None:
                 problems.number("normal_stiffness", normal_stiffness, above=0)
         else:
-            for name, value in (("keep", keep or None), ("normal_stiffness", normal_stiffness)):
-                problems.require(value is None, name, "nothing without normal_force", value)
+            given = {"keep": tuple(keep or ()), "normal_stiffness": normal_stiffness, "bulk": bulk}
+            given |= {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
+            given |= {"tolerance": tolerance, "method": method}
+            for name, value in given.items():
+                unused = value == dilatancy.__kwdefaults__[name]
+                problems.require(unused, name, "nothing without normal_force", value)
     start = time.perf_counter()
     result = _rigid(crack, shears, towards)
     parameters = {"crack": crack.summary(), "shear": shears, "direction": [d.name for d in towards]}

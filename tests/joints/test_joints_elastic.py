@@ -196,6 +196,9 @@ def test_messages(crack):
     assert len(caught.value.problems) == 4
     with pytest.raises(ValueError, match="keep: expected nothing without normal_force"):
         fc.joints.dilatancy(crack, shear=0.0, keep=("state",))
+    with pytest.raises(ValueError, match=r"(?s)bulk: .*hardness: .*method: expected nothing") as caught:
+        fc.joints.dilatancy(crack, shear=0.0, method="fats", hardness=-1.0, bulk="none")
+    assert len(caught.value.problems) == 3
 
 
 def test_results_survive_a_file(crack, tmp_path):
