@@ -62,7 +62,12 @@ def barton_choubey_strength(
     Raises
     ------
     InvalidInput
-        A number is outside its bounds.
+        A number is outside its bounds, or the angle reaches 90 degrees.
+
+    Notes
+    -----
+    Fitted to tests at sigma / JCS of about 0.01 to 0.3. Far below, the logarithm grows without bound and the
+    strength with it; above JCS it takes the roughness below zero.
 
     References
     ----------
@@ -73,8 +78,14 @@ def barton_choubey_strength(
         problems.number("roughness", roughness, at_least=0, at_most=20)
         problems.number("wall_strength", wall_strength, above=0)
         problems.number("residual_angle", residual_angle, at_least=0, below=90)
-    pressure = np.asarray(nominal_pressure, dtype=np.float64)
-    angle = residual_angle + roughness * np.log10(wall_strength / pressure)
+        if not problems.found:
+            pressure = np.asarray(nominal_pressure, dtype=np.float64)
+            angle = residual_angle + roughness * np.log10(wall_strength / pressure)
+            least = wall_strength / 10 ** ((90.0 - residual_angle) / roughness) if roughness else 0.0
+            expected = f"above {least:.3g} Pa, where the friction angle of the law reaches 90 degrees"
+            problems.require(
+                bool(((angle > -90.0) & (angle < 90.0)).all()), "nominal_pressure", expected, nominal_pressure
+            )
     return np.asarray(pressure * np.tan(np.radians(angle)))
 
 

@@ -15,6 +15,14 @@ def test_barton_choubey():
     np.testing.assert_allclose(several, [[strength, 30e6 * np.tan(np.radians(26))]])
 
 
+def test_barton_choubey_gives_no_negative_strength():
+    given = {"roughness": 20, "wall_strength": 100e6, "residual_angle": 30}
+    # 90 degrees where log10(JCS / sigma) = 60 / 20
+    assert joints.barton_choubey_strength(1.01e5, **given) > 0
+    with pytest.raises(ValueError, match=r"nominal_pressure: expected above 1e\+05 Pa, where"):
+        joints.barton_choubey_strength([1e6, 1e3], **given)
+
+
 def test_scaled_constants_keep_the_sample_and_fall_with_length():
     sample = joints.barton_bandis_scaled(10, 50e6, 0.1)
     assert sample.roughness == pytest.approx(10)
