@@ -234,6 +234,25 @@ def test_without_the_spikes_of_the_scan_the_gneiss_closes_as_its_authors_saw_it(
 
 
 @measured
+def test_a_cliff_in_both_faces_locks_the_gneiss_pair_towards_the_west(gneiss):
+    faces = {side: gneiss[f"side_{side}"].values for side in "ab"}
+    for heights in faces.values():  # 14 mm long, a few millimetres high, steeper than 70 degrees, as scanned
+        falls = -np.diff(heights[50:95, 154:168], axis=1)
+        assert np.nanmedian(np.nanmax(falls, axis=1)) > np.tan(np.radians(70)) * 3e-4
+        assert np.ptp(np.quantile(154 + np.nanargmax(np.nan_to_num(falls), axis=1), [0.1, 0.9])) <= 5
+    lower, upper = (fc.surfaces.fill(fc.surfaces.despike(gneiss[side])) for side in ("side_a", "side_b"))
+    upper = fc.joints.register(lower, upper).height
+    climbs = {}
+    for name, part in (("whole", slice(None)), ("west of it", slice(0, 156))):
+        one = (lower.isel(x=part), upper.isel(x=part))
+        crack = fc.joints.Crack(*one, young=60e9, poisson=0.2, block=(0.045, 0.0384))
+        lifted = fc.joints.dilatancy(crack, shear=6e-4, direction=["E", "W"]).rigid_dilatancy.squeeze()
+        climbs[name] = lifted.values
+    assert climbs["whole"][1] > 1.5e-3 > 5 * climbs["whole"][0]
+    assert climbs["west of it"][1] < 0.2e-3
+
+
+@measured
 def test_gneiss_pair_goes_through_the_whole_study(gneiss):
     lower = fc.surfaces.fill(gneiss["side_a"])
     found = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
