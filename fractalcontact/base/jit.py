@@ -29,6 +29,12 @@ def kernel(function: F) -> F:
     return compiled
 
 
+def inner_loop(function: F) -> F:
+    """Write a loop into the kernels that call it, where it is compiled with them and never by itself."""
+    written_in: F = numba.njit(inline="always")(function)
+    return written_in
+
+
 def sum_kernel(function: F) -> F:
     """Compile a serial loop whose sums over a row may be done in lanes: several times as fast.
 
@@ -38,6 +44,14 @@ def sum_kernel(function: F) -> F:
     compiled: F = numba.njit(
         cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz", "nnan"}
     )(function)
+    return compiled
+
+
+def gap_sum_kernel(function: F) -> F:
+    """Compile a `sum_kernel` whose arrays may hold NaN, which then reaches every sum that meets it."""
+    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})(
+        function
+    )
     return compiled
 
 

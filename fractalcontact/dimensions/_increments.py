@@ -74,14 +74,13 @@ def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: in
     step : int
         Shortest lag in spacings.
     """
-    from fractalcontact.base.jit import use_threads
+    from fractalcontact.base.jit import in_bands
     from fractalcontact.dimensions._kernels import increment_sums
 
-    use_threads()
     rows_of_sums, counts, masks = [], np.zeros(12, dtype=np.int64), []
     for heights, rows in slabs:
         sums = np.zeros((rows, 12))
-        increment_sums(heights, rows, step, sums)
+        in_bands(increment_sums, rows, 12 * rows * heights.shape[1], heights, step, sums)
         number = _complete_counts(heights.shape, rows, step)
         mask = None
         if np.isnan(sums).any():

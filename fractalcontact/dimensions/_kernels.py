@@ -7,79 +7,40 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import parallel_kernel, prange
+from fractalcontact.base.jit import gap_sum_kernel, parallel_kernel, prange
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-@parallel_kernel
-def increment_sums(heights: Array, rows: int, step: int, sums: Array) -> None:
-    """Sum squared increments that start in each of the first `rows` rows; a NaN makes a NaN.
+@gap_sum_kernel
+def increment_sums(start: int, stop: int, heights: Array, step: int, sums: Array) -> None:
+    """Sum squared increments that start in each of the rows from start up to stop; a NaN makes a NaN.
 
     Columns of `sums` (rows, 12): along x the first differences over 1, 2 and 4 `step`, then the second
     differences over 1, 2 and 4 `step`; the same six along y.
     """
     ny, nx = heights.shape
-    p, q, r = step, 2 * step, 4 * step
-    for j in prange(rows):
+    for j in range(start, stop):
         row = heights[j]
-        inner = max(nx - 2 * r, 0)
-        a = b = c = d = e = f = 0.0
-        for i in range(inner):
-            u, v, w = row[i + p] - row[i], row[i + q] - row[i], row[i + r] - row[i]
-            a += u * u
-            b += v * v
-            c += w * w
-            u, v, w = (
-                (row[i + q] - row[i + p]) - u,
-                (row[i + r] - row[i + q]) - v,
-                (row[i + 2 * r] - row[i + r]) - w,
-            )
-            d += u * u
-            e += v * v
-            f += w * w
-        for i in range(inner, nx - p):
-            u = row[i + p] - row[i]
-            a += u * u
-            if i + q < nx:
-                v = row[i + q] - row[i]
-                b += v * v
-                u = (row[i + q] - row[i + p]) - u
-                d += u * u
-                if i + r < nx:
-                    w = row[i + r] - row[i]
-                    c += w * w
-                    v = (row[i + r] - row[i + q]) - v
-                    e += v * v
-        sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3], sums[j, 4], sums[j, 5] = a, b, c, d, e, f
-        a = b = c = d = e = f = 0.0
-        if j + 2 * r < ny:
-            on, up, high, top = heights[j + p], heights[j + q], heights[j + r], heights[j + 2 * r]
-            for i in range(nx):
-                u, v, w = on[i] - row[i], up[i] - row[i], high[i] - row[i]
-                a += u * u
-                b += v * v
-                c += w * w
-                u, v, w = (up[i] - on[i]) - u, (high[i] - up[i]) - v, (top[i] - high[i]) - w
-                d += u * u
-                e += v * v
-                f += w * w
-        elif j + p < ny:
-            on, up, high = heights[j + p], heights[min(j + q, ny - 1)], heights[min(j + r, ny - 1)]
-            for i in range(nx):
-                u = on[i] - row[i]
-                a += u * u
-                if j + q < ny:
-                    v = up[i] - row[i]
-                    b += v * v
-                    u = (up[i] - on[i]) - u
-                    d += u * u
-                    if j + r < ny:
-                        w = high[i] - row[i]
-                        c += w * w
-                        v = (high[i] - up[i]) - v
-                        e += v * v
-        sums[j, 6], sums[j, 7], sums[j, 8], sums[j, 9], sums[j, 10], sums[j, 11] = a, b, c, d, e, f
+        for along_y in range(2):
+            for k in range(3):
+                lag = step << k
+                if along_y:
+                    once, twice = heights[min(j + lag, ny - 1)], heights[min(j + 2 * lag, ny - 1)]
+                    single, double = nx * (j + lag < ny), nx * (j + 2 * lag < ny)
+                else:
+                    once, twice = row[min(lag, nx) :], row[min(2 * lag, nx) :]
+                    single, double = max(nx - lag, 0), max(nx - 2 * lag, 0)
+                first = second = 0.0
+                for i in range(double):
+                    u = once[i] - row[i]
+                    v = (twice[i] - once[i]) - u
+                    first += u * u
+                    second += v * v
+                for i in range(double, single):
+                    u = once[i] - row[i]
+                    first += u * u
+                sums[j, 6 * along_y + k], sums[j, 6 * along_y + 3 + k] = first, second
 
 
 @parallel_kernel
