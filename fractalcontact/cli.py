@@ -140,8 +140,10 @@ def _accuracy(options: argparse.Namespace) -> int:
     from fractalcontact.accuracy.reporting import cases_table, curves_table
 
     if options.extreme:
-        cases = {name: case for name, case in accuracy.cases.items() if options.large or not case.large}
-        findings = {name: accuracy.examine(case) for name, case in cases.items()}
+        from fractalcontact.accuracy.watching import examine_apart
+
+        cases = accuracy.cases.items()
+        findings = examine_apart([name for name, case in cases if options.large or not case.large])
         print(cases_table(findings))
         return 0 if all(one.ok for found in findings.values() for one in found) else 1
     if options.parts == ["estimators"]:

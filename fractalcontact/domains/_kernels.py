@@ -68,7 +68,8 @@ def cover(
     cut in y with those beside it, and nothing.
     """
     positions = met.shape[1]
-    last = last_stop = last_wide = last_wide_stop = np.int64(0)  # not a literal: one `_slide` serves all
+    none: Any = np.int64(0)  # a literal would have `_slide` compiled twice
+    last = last_stop = last_wide = last_wide_stop = none
     here, beside = prefix[0], prefix[1]
     for k in range(rows.shape[0]):
         start, stop, wide, wide_stop, offset = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4]
