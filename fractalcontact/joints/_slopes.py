@@ -48,12 +48,12 @@ def fitted_slopes(x: Array, y: Array, window: float) -> tuple[Array, Array]:
     lengths : ndarray, shape (n,)
         Length between the outermost points of each fit.
     """
-    # a width given as a decimal must not lose a neighbour to rounding
-    reach = 0.5 * window * (1.0 + 1e-9)
+    # a width given as a decimal must not lose a neighbour to rounding, nor one of two equally near ones
+    more = 1.0 + 1e-9
     slopes, lengths = np.empty(y.shape), np.empty(x.shape)
     for index, centre in enumerate(x):
         distance = np.abs(x - centre)
-        inside = distance <= max(reach, np.sort(distance)[1])
+        inside = distance <= more * max(0.5 * window, np.sort(distance)[1])
         offset = x[inside] - x[inside].mean()
         slopes[index] = offset @ (y[inside] - y[index]) / (offset @ offset)
         lengths[index] = np.ptp(x[inside])

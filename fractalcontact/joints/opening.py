@@ -120,7 +120,7 @@ def dilatancy(
             given |= {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
             given |= {"tolerance": tolerance, "method": method}
             for name, value in given.items():
-                unused = value == dilatancy.__kwdefaults__[name]
+                unused = value == (dilatancy.__kwdefaults__ or {})[name]
                 problems.require(unused, name, "nothing without normal_force", value)
     start = time.perf_counter()
     result = _rigid(crack, shears, towards)

@@ -150,6 +150,14 @@ def test_slope_through_the_neighbours_is_exact_for_a_parabola_on_unequal_steps()
     np.testing.assert_allclose(result.smoothing, [1.0, 1.5, 3.0, 2.7, 0.2])
 
 
+def test_smoothing_below_the_spacing_takes_both_neighbours_whatever_the_rounding():
+    shear = np.arange(20) * 1e-4
+    heights = 1e-4 * np.sin(3e3 * shear)
+    fine = fc.joints.friction(curve(shear, heights), smoothing=1e-9, basic_friction_angle=20)
+    plain = fc.joints.friction(curve(shear, heights), basic_friction_angle=20)
+    np.testing.assert_allclose(fine.dilatancy_angle, plain.dilatancy_angle, rtol=1e-9)
+
+
 def test_smoothing_fits_a_line_in_the_window():
     rng = np.random.default_rng(0)
     shear = np.sort(rng.random(30))
