@@ -152,7 +152,10 @@ def _refined(
         step = np.zeros(6)
         step[used] = np.linalg.solve(matrix, system.vectors.sum(axis=0)[used])
         step[:3] *= 1.0 if iteration - before <= WHOLE else 0.25
-        errors = _jackknife(system, used)
+        try:
+            errors = _jackknife(system, used)
+        except np.linalg.LinAlgError:  # one tile alone fixes the position
+            return replace(pose, determined=False)
         settled = np.abs(step[:3]).max() <= max(SMALL, SETTLED * float(np.nanmin(errors)))
         pose = Pose(
             shift=(pose.shift[0] + step[0], pose.shift[1] + step[1]),

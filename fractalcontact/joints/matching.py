@@ -57,7 +57,8 @@ def register(
     ------
     InvalidInput
         The faces are not on grids of equal spacing, have fewer than 16 points along an axis, lie nowhere
-        over each other, or have no relief that could fix their position.
+        over each other, or have no relief that could fix their position; or they are turned too far
+        for the first guess, more than about 5 degrees.
 
     Warns
     -----
@@ -91,7 +92,9 @@ def register(
         )
     pose = mate(low, up, offset, rotation, tilt)
     if not pose.determined:
-        expected = "faces with relief along both axes that lie over each other"
+        expected = (
+            "faces with relief along both axes that lie over each other, turned by a few degrees at most"
+        )
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
     moved = resampled(up, sources(pose, low.shape, offset))
     moved += _tilted(pose, np.isfinite(moved - low))

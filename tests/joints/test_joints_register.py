@@ -49,6 +49,16 @@ def test_a_known_shift_is_found(make_face, rough, shift):
     assert result.correlation > 0.999
 
 
+@pytest.mark.parametrize("angle", [6.0, 20.0])
+def test_a_turn_of_a_few_degrees_is_found_and_a_larger_one_refused(make_face, rough, angle):
+    lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle, size=150))
+    if angle > 10:
+        with pytest.raises(ValueError, match="turned by a few degrees at most"):
+            fc.joints.register(lower, upper)
+    else:
+        assert fc.joints.register(lower, upper).rotation == pytest.approx(angle, abs=0.02)
+
+
 def test_a_whole_shift_moves_heights_and_leaves_out_what_was_not_seen(make_face, rough):
     lower, upper = moved_pair(rough, (4.0, -3.0))
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
