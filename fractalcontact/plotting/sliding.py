@@ -185,8 +185,13 @@ def friction(
         level = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
         axes[0].axhline(level, color=_style.BLACK, lw=0.8, ls=":")
         entries = [*entries, _style.line_entry("basic angle", color=_style.BLACK, lw=0.8, ls=":")]
+    told = []
+    if over == "step" and "direction" in data.coords:
+        told.append(f"block slides {direction_word(words(data['direction'])[0])}")
     if axes[0].get_ylim()[1] > LOCKED:
-        axes[0].set_ylim(top=LOCKED)  # beyond it the faces are locked
+        axes[0].set_ylim(top=LOCKED)
+        told.append(f"locked from {LOCKED:g}° on")
+    axes[0].set_title(", ".join(told))
     _style.beside(axes[-1], entries, title=title)
     return _style.root(sheet)
 
@@ -242,9 +247,8 @@ def direction_look(name: str, number: int) -> dict[str, Any]:
 
 def direction_word(name: str) -> str:
     """Return what a direction is called on paper."""
-    return {"E": "East", "N": "North", "W": "West", "S": "South"}.get(
-        name, f"{name}°" if name.isdigit() else name
-    )
+    winds = {"E": "East", "N": "North", "W": "West", "S": "South"}
+    return winds.get(name, name if not name or name.isalpha() else f"{name}°")
 
 
 def first_part(data: xr.Dataset) -> float:

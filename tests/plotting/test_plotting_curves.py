@@ -109,6 +109,7 @@ def test_locked_faces_end_the_axis_at_a_right_angle(made):
     angle, strength = plotting.friction(rubbed).axes
     assert angle.get_ylim()[1] == 90.0
     assert angle.get_ylim()[0] < 35.0
+    assert angle.get_title(loc="left") == "block slides West, locked from 90° on"
     assert strength.get_yscale() == "linear"
     rubbed["shear_strength"].values[0, 0, 0] *= 1e-3
     assert plotting.friction(rubbed).axes[1].get_yscale() == "log"
