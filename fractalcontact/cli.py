@@ -139,6 +139,10 @@ def _accuracy(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
     from fractalcontact.accuracy.reporting import cases_table, curves_table
 
+    if options.out is not None and not options.extreme:
+        from fractalcontact.scenes.running import writable
+
+        writable(options.out)  # before the measuring, not after it
     if options.extreme:
         from fractalcontact.accuracy.watching import examine_apart
 

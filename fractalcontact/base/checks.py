@@ -119,7 +119,7 @@ class Problems:
         """One of the allowed words; the first of them stands in for a wrong one."""
         words = tuple(allowed)
         if not isinstance(value, str) or value not in words:
-            self.add(argument, f"one of {', '.join(map(repr, words))}", value)
+            self.add(argument, f"one of {', '.join(map(repr, words))}{meant(value, words)}", value)
             return words[0]
         return value
 
@@ -131,7 +131,8 @@ class Problems:
             self.add(argument, f"a sequence out of {', '.join(map(repr, words))}", value)
             return words[:1]
         for word in given:
-            self.require(word in words, argument, f"words out of {', '.join(map(repr, words))}", word)
+            allowed_words = f"words out of {', '.join(map(repr, words))}{meant(word, words)}"
+            self.require(word in words, argument, allowed_words, word)
         return tuple(dict.fromkeys(str(word) for word in given if word in words))
 
     def exactly_one(self, **options: object) -> str:
@@ -148,6 +149,14 @@ class Problems:
         missing = values.size - int(np.count_nonzero(np.isfinite(values)))
         expected = "finite values" + (f" ({remedy})" if remedy else "")
         return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
+
+
+def meant(word: object, words: Iterable[str]) -> str:
+    """Return the one of the words that comes near a wrong one, as a question; nothing if none does."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, tuple(words), n=1) if isinstance(word, str) else []
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def _interval(

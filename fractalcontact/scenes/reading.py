@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.checks import Problems
+from fractalcontact.base.checks import Problems, meant
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes import grammar
@@ -44,7 +43,7 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
     """Read a scene; return it with the list of what is wrong in it."""
     source = _find(Path(path))
     try:
-        tables = tomllib.loads(source.read_text(encoding="utf-8"))
+        tables = tomllib.loads(source.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
     problems = Problems(f"scene {source.stem}")
@@ -110,10 +109,11 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
 def _check(scene: Scene, problems: Problems) -> None:
     _known_keys(scene.tables, grammar.TABLES, "", problems)
     _check_choice(scene, problems)
-    for name in grammar.TABLES[3:]:
-        if not isinstance(scene.tables.get(name, {}), dict):
-            problems.add(name, "a table", scene.tables[name])
-            return
+    no_tables = [name for name in grammar.TABLES[3:] if not isinstance(scene.tables.get(name, {}), dict)]
+    for name in no_tables:
+        problems.add(name, "a table", scene.tables[name])
+    if no_tables:
+        return
     _check_surface(scene.table("surface"), "surface", problems)
     if "upper" in scene.tables:
         _check_surface(scene.table("upper"), "upper", problems)
@@ -224,7 +224,6 @@ def _known_keys(
     words = tuple(known)
     for key in table:
         if key not in words:
-            near = difflib.get_close_matches(key, (*words, *also), n=1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
             place = f"{name}.{key}" if name else key
+            hint = meant(key, (*words, *also))
             problems.add(place, f"one of the keys {', '.join(words) or 'none'}", f"an unknown key{hint}")

@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,9 +66,9 @@ def run(
     """
     scene = scene if isinstance(scene, Scene) else load(scene)
     stages.preflight(scene)
-    folder = None if out is None else _folder(Path(out))
+    folder = None if out is None else writable(out)
     study = _Study(scene, Store(folder), progress, client)
-    with stopping.noted(folder is not None) as stop:
+    with _held(folder), stopping.noted(folder is not None) as stop:
         missing = study.carry_out(stop)
         tree = study.assemble(missing)
         if folder is None:
@@ -260,8 +261,9 @@ class _Study:
         return tree
 
 
-def _folder(out: Path) -> Path:
+def writable(out: str | os.PathLike[str]) -> Path:
     """Return the output folder, made if need be, cleared of what a killed run left."""
+    out = Path(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
         netcdf.clear_partial(out)
@@ -272,6 +274,29 @@ def _folder(out: Path) -> Path:
             "fractalcontact run", [f"out: expected a folder to write in, got {out.name!r}: {error.strerror}"]
         ) from error
     return out
+
+
+@contextmanager
+def _held(folder: Path | None) -> Iterator[None]:
+    """Hold a folder, so that no other run writes in it; the hold ends with the process, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # a system without such locks
+        folder = None
+    if folder is None:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system that knows no locks
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                told = f"out: expected a folder of its own, got {folder.name!r}: another run is writing in it"
+                raise InvalidInput("fractalcontact run", [told]) from None
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> None:

@@ -1,0 +1,69 @@
+"""What a stranger does to a scene and its folder: other editors, slips of the pen, two runs at once."""
+
+import fcntl
+import os
+
+import pytest
+from study import SOUND, command
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+
+
+@pytest.mark.parametrize(
+    ("encoding", "newline"), [("utf-8-sig", "\r\n"), ("utf-8-sig", "\n"), ("utf-8", "\r\n")]
+)
+def test_scenes_of_other_editors_are_read(tmp_path, encoding, newline):
+    (tmp_path / "study.toml").write_text(SOUND, encoding=encoding, newline=newline)
+    (tmp_path / "plain.toml").write_text(SOUND, encoding="utf-8")
+    ours, theirs = (fc.scenes.load(tmp_path / f"{name}.toml") for name in ("plain", "study"))
+    assert ours.tables == theirs.tables
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "meant"),
+    [
+        ("rigid_dilatancy", "rigid_dilatency", "'rigid_dilatancy'"),
+        ('"fbm"', '"fmb"', "'fbm'"),
+        ("young", "yuong", "'young'"),
+        ("[material]", "[materials]", "'material'"),
+    ],
+)
+def test_a_slip_of_the_pen_is_met_with_the_word_that_was_meant(tmp_path, old, new, meant):
+    (tmp_path / "study.toml").write_text(SOUND.replace(old, new), encoding="utf-8")
+    with pytest.raises(InvalidInput) as told:
+        fc.scenes.load(tmp_path / "study.toml")
+    assert f"did you mean {meant}?" in str(told.value)
+
+
+def test_all_that_should_be_tables_are_named_at_once(tmp_path):
+    (tmp_path / "study.toml").write_text("surface = 3\njoint = [1]\nmaterial = 'x'\nwant = 4\n")
+    with pytest.raises(InvalidInput) as told:
+        fc.scenes.load(tmp_path / "study.toml")
+    assert {line.partition(":")[0] for line in told.value.problems} >= {
+        "surface",
+        "joint",
+        "material",
+        "want",
+    }
+
+
+def test_a_folder_in_which_another_run_writes_is_refused(tmp_path):
+    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
+    scene, out = fc.scenes.load(tmp_path / "study.toml"), tmp_path / "out"
+    out.mkdir()
+    other = os.open(out, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    with pytest.raises(InvalidInput, match="another run"):
+        fc.scenes.run(scene, out=out, progress=False)
+    assert not list(out.iterdir())
+    os.close(other)
+    fc.scenes.run(scene, out=out, progress=False)
+    assert [path.name for path in out.iterdir()] == ["result.nc"]
+
+
+def test_what_cannot_be_written_is_told_before_it_is_measured(tmp_path):
+    (tmp_path / "out").write_text("a file")
+    done = command("accuracy", "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert "expected a folder" in done.stderr
