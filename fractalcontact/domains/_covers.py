@@ -145,6 +145,23 @@ def every_position(cells: Array, largest: int, periodic: Sequence[bool]) -> tupl
     return whole, folded
 
 
+def observed_in_boxes(valid: Array, size: int, periodic: Sequence[bool]) -> Array:
+    """Count the positions of the box by the observed cells it holds, (size^2 + 1,).
+
+    On a free axis boxes that hang over opposite edges by the same cut count once, with the cells of both;
+    no axis is shorter than `2 size`.
+    """
+    held = valid.astype(np.int32)
+    for axis, (n, wraps) in enumerate(zip(valid.shape, periodic, strict=True)):
+        total = np.insert(np.cumsum(held, axis), 0, 0, axis)
+        cut = np.arange(1, size)
+        low = np.take(total, cut, axis)
+        high = np.take(total, [n], axis) - np.take(total, cut + n - size if wraps else n - cut, axis)
+        inside = np.take(total, np.arange(size, n + 1), axis) - np.take(total, np.arange(n - size + 1), axis)
+        held = np.concatenate([inside, low + high], axis)
+    return np.bincount(held.ravel(), minlength=size * size + 1)
+
+
 def aligned_cover(planes: Planes, sizes: Array) -> Curve:
     """Boxes of the one grid that starts at the first cell."""
 

@@ -6,7 +6,9 @@ C(A - m, k) / C(A, k). Expected box counts, and their covariance over sizes, fol
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import gammaln
@@ -55,14 +57,22 @@ def _last(cells: float, observed: float) -> float:
     return float(np.exp(gammaln(cells + 1.0) + gammaln(observed - cells + 1.0) - gammaln(observed + 1.0)))
 
 
-def expected(cells: float, observed: float, sizes: Array, region: Array) -> Array:
-    """Boxes of each size that meet the dust: `region` observed cells to a box, observed / size^2 boxes."""
-    boxes = observed / sizes.astype(float) ** 2
-    return np.asarray(boxes * (1.0 - missed(cells, observed, region)))
+# observed cells in a box, the share of boxes that hold so many, and the boxes on one grid that hold any
+Held = tuple[Array, Array, float]
 
 
-def covariance(cells: float, observed: float, sizes: Array) -> Array:
-    """Covariance of the counts at all pairs of sizes, on one grid, each small box inside a large one."""
+def expected(cells: float, observed: float, sizes: Array, held: Sequence[Held]) -> Array:
+    """Boxes of each size that meet the dust, out of observed / size^2 boxes that hold an observed cell."""
+    shares = [share @ (1.0 - missed(cells, observed, region)) for region, share, _ in held]
+    return np.asarray(observed / sizes.astype(float) ** 2 * np.array(shares, float))
+
+
+def covariance(cells: float, observed: float, sizes: Array, held: Sequence[Held]) -> Array:
+    """Covariance of the counts at all pairs of sizes, on one grid, each small box inside a large one.
+
+    Where boxes hold different numbers of cells the variances are theirs, and the correlations of sizes those
+    of whole boxes.
+    """
     area = sizes.astype(float) ** 2
     boxes = observed / area
     alone = missed(cells, observed, area)
@@ -73,17 +83,36 @@ def covariance(cells: float, observed: float, sizes: Array) -> Array:
     nested = many * (missed(cells, observed, large) - product)
     apart = (many * few - many) * (missed(cells, observed, small + large) - product)
     limit = np.sqrt(boxes[:, None] * boxes) * 0.25
-    return np.asarray(np.clip(nested + apart, -limit, limit))
+    whole = np.clip(nested + apart, -limit, limit)
+    if all(share.size == 1 for _, share, _ in held):
+        return np.asarray(whole)
+    variance = np.array([_variance(cells, observed, *one) for one in held]) * boxes**2
+    least = np.diag(whole)
+    ratio = np.sqrt(np.where(least > 0.0, variance / np.where(least > 0.0, least, 1.0), 0.0))
+    return np.asarray(whole * ratio[:, None] * ratio)
 
 
-def spread(cells: float, observed: float, sizes: Array, counts: Array, weights: Array) -> float:
+def _variance(cells: float, observed: float, region: Array, share: Array, boxes: float) -> float:
+    """Variance of the share of boxes that meet the dust, which hold different numbers of cells.
+
+    Two boxes are missed together a little less often than by chance, by about the product of their cells
+    over those left open.
+    """
+    alone = missed(cells, observed, region)
+    away = cells / (observed * max(observed - cells, 1.0))
+    return max(float(share @ (alone * (1.0 - alone)) / boxes - away * (share @ (region * alone)) ** 2), 0.0)
+
+
+def spread(
+    cells: float, observed: float, sizes: Array, held: Sequence[Held], counts: Array, weights: Array
+) -> float:
     """Return the standard deviation of sum(weights * ln N) over dusts."""
     relative = weights / counts
-    variance = float(relative @ covariance(cells, observed, sizes) @ relative)
+    variance = float(relative @ covariance(cells, observed, sizes, held) @ relative)
     return math.sqrt(max(variance, 0.0))
 
 
-def differs(cells: float, observed: float, sizes: Array, mean_counts: Array, region: Array) -> bool:
+def differs(cells: float, observed: float, sizes: Array, mean_counts: Array, held: Sequence[Held]) -> bool:
     """Return whether the mean counts at the smallest sizes are out of reach for a dust.
 
     A departure must exceed 3.3 standard deviations and one box: where hardly two cells of a dust meet,
@@ -92,6 +121,7 @@ def differs(cells: float, observed: float, sizes: Array, mean_counts: Array, reg
     small = np.isin(sizes, LOOK)
     if not small.any():
         return False
-    null = expected(cells, observed, sizes[small], region[small])
-    deviation = np.sqrt(np.maximum(np.diag(covariance(cells, observed, sizes[small])), 0.0))
-    return bool(np.any(np.abs(mean_counts[small] - null) > DEVIATIONS * deviation + 1.0))
+    sizes, mean_counts, held = sizes[small], mean_counts[small], list(itertools.compress(held, small))
+    null = expected(cells, observed, sizes, held)
+    deviation = np.sqrt(np.maximum(np.diag(covariance(cells, observed, sizes, held)), 0.0))
+    return bool(np.any(np.abs(mean_counts - null) > DEVIATIONS * deviation + 1.0))

@@ -202,17 +202,18 @@ def _fit(
 def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
     """Return the dust's counts, dimension and spread, and whether the set differs from it."""
     small = np.array([size for size in _dust.LOOK if 2 * size <= min(planes.grid.shape)], np.int64)
-    region = _region(planes, np.union1d(sizes, small))
+    both = np.union1d(sizes, small)
+    held = [dict(zip(both.tolist(), one, strict=True)) for one in _held(planes, both)]
     mean = _covers.curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
     counts, rows = [], []
     for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
-        areas = region[min(plane, region.shape[0] - 1)]
-        of = dict(zip(np.union1d(sizes, small).tolist(), areas.tolist(), strict=True))
-        null = _dust.expected(cells, observed, sizes, np.array([of[size] for size in sizes.tolist()]))
+        of = held[min(plane, len(held) - 1)]
+        boxes = [of[size] for size in sizes.tolist()]
+        null = _dust.expected(cells, observed, sizes, boxes)
         fit = _covers.regression(sizes, null) if chosen else _covers.steady(sizes, null * sizes**2)
         known = np.isfinite(fit.dimension)
-        deviation = _spread(cells, observed, sizes, null, fit) if known else np.nan
-        looked = np.array([of[size] for size in small.tolist()])
+        deviation = _spread(cells, observed, sizes, boxes, null, fit) if known else np.nan
+        looked = [of[size] for size in small.tolist()]
         other = known and _dust.differs(cells, observed, small, mean[plane], looked)
         counts.append(null)
         rows.append((fit.dimension, deviation, other))
@@ -225,24 +226,40 @@ def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
     }
 
 
-def _spread(cells: int, observed: int, sizes: Array, null: Array, fit: _covers.Fit) -> float:
+def _spread(
+    cells: int, observed: int, sizes: Array, held: list[_dust.Held], null: Array, fit: _covers.Fit
+) -> float:
     """Return the standard deviation of the dust's dimension; of many sizes a few dozen stand for all."""
     if sizes.size > 64:
         places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], 48)))
-        sizes, null = sizes[places], null[places]
+        sizes, null, held = sizes[places], null[places], [held[place] for place in places]
         fit = _covers.regression(sizes, null)
-    return _dust.spread(cells, observed, sizes, null, fit.weights)
+    return _dust.spread(cells, observed, sizes, held, null, fit.weights)
 
 
-def _region(planes: Planes, sizes: Array) -> Array:
-    """Observed cells in a box that has any, on average; shape (1 or planes, sizes)."""
-    area = sizes.astype(float) ** 2
+def _held(planes: Planes, sizes: Array) -> list[list[_dust.Held]]:
+    """Return how many observed cells boxes of each size hold, for one plane or for each; see `_dust.Held`.
+
+    Boxes longer than half the shorter side hold as many times more than the longest others as they are
+    larger.
+    """
     if planes.valid is None:
-        return area[None]
-    everything = Planes(planes.valid, None, planes.grid, (), (), {}, {})
-    usable = np.minimum(sizes, max(1, min(planes.grid.shape) // 2))
-    seen = _covers.mean_cover(everything, usable).measure * (usable / sizes) ** 2
-    return np.where(seen > 0, everything.occupied[:, None] / np.where(seen > 0, seen, 1.0), 0.0)
+        cells = float(np.prod(planes.grid.shape))
+        return [[(np.array([float(size) ** 2]), np.ones(1), cells / float(size) ** 2) for size in sizes]]
+    longest = max(1, min(planes.grid.shape) // 2)
+    found = []
+    for valid in planes.valid:
+        usable = np.unique(np.minimum(sizes, longest)).tolist()
+        counts = {size: _covers.observed_in_boxes(valid, size, planes.grid.periodic) for size in usable}
+        one = []
+        for size in sizes.tolist():
+            used = min(size, longest)
+            some = np.flatnonzero(counts[used][1:]) + 1
+            boxes = counts[used][some]
+            total = float(max(boxes.sum(), 1))
+            one.append((some * (size / used) ** 2, boxes / total, total / float(size) ** 2))
+        found.append(one)
+    return found
 
 
 def _notes(known: Array, sizes: Array, *, chosen: bool) -> dict[str, dict[str, str]]:

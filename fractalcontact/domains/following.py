@@ -119,6 +119,12 @@ def _add_changes(gathered: gathering.Gathered, found: list[_labels.Labels]) -> N
     comment = f"NaN at the first plane along {planes.dims[-1]}, which has none before it"
     gathered.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(NAMES)})
     gathered.notes.update({name: {"comment": comment} for name in NAMES})
+    if np.isnan(rows[np.isfinite(rows[:, 0]), NAMES.index("overlap") :]).any():
+        reasons = {"overlap": "both sets are empty", "hausdorff_distance": "a set is empty"}
+        if not planes.grid.known:
+            reasons["hausdorff_distance"] = "the mask has no coordinates"
+        for name, reason in reasons.items():
+            gathered.notes[name] = {"comment": f"{comment}, and where {reason}"}
     known = [name for name in LOADS if name in planes.coords and planes.dims[-1] in planes.coords[name].dims]
     for name in known[:1]:
         back = _returns(planes, name)

@@ -17,6 +17,7 @@ from domains.sets import (
     random_lattice_set,
     thinned,
 )
+from scipy import ndimage
 
 import fractalcontact as fc
 from fractalcontact.domains import _dust
@@ -379,3 +380,27 @@ def test_wrong_calls_list_everything():
     text = str(caught.value)
     for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "whole numbers"):
         assert word in text
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize("coverage", [0.02, 0.3, 0.7])
+def test_a_dust_seen_through_gaps_is_a_dust(wraps, coverage):
+    rng = np.random.default_rng(12)
+    n, sizes = 60, [1, 2, 3, 4, 6]
+    valid = ndimage.gaussian_filter(rng.random((n, n)), 2, mode="wrap") > 0.49
+    places = np.flatnonzero(valid)
+    planes = np.zeros((150, n * n), bool)
+    for plane in planes:
+        plane[rng.choice(places, int(coverage * places.size), replace=False)] = True
+    masks = as_mask(planes.reshape(-1, n, n), periodic=wraps)
+    seen = as_mask(valid, periodic=wraps)
+    result = fc.domains.box_dimension(masks, scales=sizes, cover="mean", valid=seen)
+    counts, null = result.box_measure.values, result.dust_count.values[0]
+    error = counts.std(0, ddof=1) / np.sqrt(len(counts))
+    assert np.all(np.abs(counts.mean(0) - null) <= 4 * error + 1e-9)
+    assert result.differs_from_dust.values.mean() <= 0.01
+    deviation = result.box_dimension.values.std(ddof=1)
+    assert 0.8 * deviation <= float(result.dust_spread[0]) <= 4 * deviation
+    clustered = ndimage.gaussian_filter(rng.random((n, n)), 1, mode="wrap")
+    clusters = as_mask(clustered > np.quantile(clustered[valid], 1 - coverage), periodic=wraps)
+    assert fc.domains.box_dimension(clusters, valid=seen).differs_from_dust

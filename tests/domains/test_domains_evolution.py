@@ -265,3 +265,14 @@ def test_elastic_contact_forgets_its_path():
     result = fc.domains.evolution(pressed["state"], want=["changes"])
     assert result.return_step.values[3:].tolist() == [1, 0]
     assert result.hysteresis.values[3:].tolist() == [0, 0]
+
+
+def test_empty_planes_say_why_there_is_no_distance():
+    planes = np.zeros((4, 9, 9), bool)
+    planes[2, 3, 4] = True
+    result = fc.domains.evolution(as_mask(planes), want=["changes"])
+    assert np.isnan(result.hausdorff_distance).all()
+    assert result.overlap.values[1:].tolist() == pytest.approx([np.nan, 0, 0], nan_ok=True)
+    assert result.hausdorff_distance.comment.endswith("and where a set is empty")
+    assert result.overlap.comment.endswith("and where both sets are empty")
+    assert "where" not in fc.domains.evolution(as_mask(planes[[2, 2]]), want=["changes"]).overlap.comment
