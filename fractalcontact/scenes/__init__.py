@@ -12,7 +12,8 @@ Nothing is computed, imported, compiled or stored that no wanted result needs. A
 
 ``[surface]``     the face: ``read`` a file (with spacing, units, channel), ``sample`` a shipped one, or
                   ``generate`` with fbm, spectral, midpoint or weierstrass and its arguments; ``level``,
-                  ``despike`` and ``fill`` prepare it
+                  ``despike`` and ``fill`` prepare it; the spikes of a scan are taken out for the contact
+                  alone, its dimension is that of the face as it was scanned
 ``[upper]``       the facing one, the same way; without it the faces match perfectly
 ``[material]``    young, poisson, basic_friction_angle, hardness
 ``[joint]``       block, direction, shear, normal_force and other arguments of the functions of `joints`;

@@ -363,11 +363,20 @@ def _read_face(table: Table, folder: Path) -> xr.Dataset:
 
 
 def _dimension_work(name: str, scene: Scene, results: Results) -> Work:
+    face = _scanned(scene, results)
     if name:
-        return Work((partial(_call, "dimensions", name, _height(results)),))
+        return Work((partial(_call, "dimensions", name, face),))
     options = dict(scene.table("dimensions"))
     methods = list(scene.wanted("dimensions"))
-    return Work((partial(_call, "dimensions", "estimate", _height(results), methods, **options),))
+    return Work((partial(_call, "dimensions", "estimate", face, methods, **options),))
+
+
+def _scanned(scene: Scene, results: Results) -> xr.DataArray:
+    """Return the face with the points that are spikes to a contact: they are part of how rough a scan is."""
+    table = scene.table("surface")
+    if not table.get("despike"):
+        return _height(results)
+    return read_surface({**table, "despike": False}, scene.folder)
 
 
 def contact_options(scene: Scene) -> dict[str, Any]:
