@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 WHERE = "fractalcontact.joints.register"
 SMALLEST = 16  # points along an axis
+UNCERTAIN = 1.0  # cells of standard error beyond which a position is hardly one
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -63,7 +64,8 @@ def register(
     Warns
     -----
     ConvergenceWarning
-        The position was still moving after the last step.
+        The position was still moving after the last step, or its standard error exceeds one point: the faces
+        may not belong together.
 
     Notes
     -----
@@ -101,6 +103,14 @@ def register(
     if not pose.converged:
         warnings.warn(
             f"{WHERE}: not converged after {pose.iterations} steps", ConvergenceWarning, stacklevel=2
+        )
+    error = max(pose.errors[:2])
+    if error > UNCERTAIN:
+        warnings.warn(
+            f"{WHERE}: position not determined, only to {error:.2g} points: do the faces belong together, "
+            "turned by a few degrees at most?",
+            ConvergenceWarning,
+            stacklevel=2,
         )
     result = _dataset(lower, low, moved, pose, grid).assign(run_time=time.perf_counter() - begun)
     parameters = {"lower": lower, "upper": upper, "rotation": rotation, "tilt": tilt}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.errors import ConvergenceWarning
 
 S = 3e-4
 
@@ -53,7 +54,8 @@ def test_a_known_shift_is_found(make_face, rough, shift):
 def test_a_turn_of_a_few_degrees_is_found_and_a_larger_one_refused(make_face, rough, angle):
     lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle, size=150))
     if angle > 10:
-        with pytest.raises(ValueError, match="turned by a few degrees at most"):
+        # too far for the first guess: no position, or one that is told to be none
+        with pytest.raises((ValueError, ConvergenceWarning), match="turned by a few degrees at most"):
             fc.joints.register(lower, upper)
     else:
         assert fc.joints.register(lower, upper).rotation == pytest.approx(angle, abs=0.02)
