@@ -240,9 +240,12 @@ def one_direction(data: Any, direction: str | None) -> xr.Dataset:
 
 
 def direction_look(name: str, number: int) -> dict[str, Any]:
-    """Return colour and line of a direction: the four winds always look the same."""
-    colour = _style.DIRECTION_COLOURS.get(name, _style.CYCLE[number % len(_style.CYCLE)])
-    return {"color": colour, "ls": _style.DIRECTION_LINES.get(name, "-")}
+    """Return colour and line of a direction: the four winds always look the same, others unlike them."""
+    if name in _style.DIRECTION_COLOURS:
+        return {"color": _style.DIRECTION_COLOURS[name], "ls": _style.DIRECTION_LINES[name]}
+    spare = [colour for colour in _style.CYCLE if colour not in _style.DIRECTION_COLOURS.values()]
+    again, place = divmod(number, len(spare))
+    return {"color": spare[place], "ls": ("-", "--", "-.", ":")[again % 4]}
 
 
 def direction_word(name: str) -> str:

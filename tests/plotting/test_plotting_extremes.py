@@ -128,6 +128,8 @@ def test_directions_of_any_azimuth(made):
     ax = plotting.rigid_dilatancy(opening).axes[0]
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert named[:3] == ["East", "NE", "30°"]
+    looks = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:6:2]]
+    assert len(set(looks)) == 3
     assert plotting.sliding.direction_word("33.5") == "33.5°"
     render(ax.figure)
 
