@@ -40,16 +40,16 @@ def offsets(
     """Count the observed cells by how many rows and columns the nearest cell of the set is away.
 
     Looks `reach` (rows, columns) far; `steps` are the spacings. Cells without an observed mirror image about
-    their nearest cell of the set count twice.
+    a nearest cell of the set count twice.
     """
     from fractalcontact.domains._near_kernels import above_and_below, count_offsets
 
-    down = np.empty(cells.shape, np.int16 if max(reach) < NARROW else np.int32)
-    above_and_below(cells, reach[0], periodic[0], down)
+    above, below = np.empty((2, *cells.shape), np.int16 if max(reach) < NARROW else np.int32)
+    above_and_below(cells, reach[0], periodic[0], above, below)
     observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
-    above, right = ((np.arange(n + 1) * step) ** 2 for n, step in zip(reach, steps, strict=True))
+    high, wide = ((np.arange(n + 1) * step) ** 2 for n, step in zip(reach, steps, strict=True))
     counts = np.zeros((reach[0] + 1, reach[1] + 1), np.int64)
-    count_offsets(down, observed, above, right, periodic[0], periodic[1], counts)
+    count_offsets(above, below, observed, high, wide, periodic[0], periodic[1], counts)
     return counts
 
 

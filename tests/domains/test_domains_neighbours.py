@@ -59,6 +59,22 @@ def test_offsets_agree_with_the_distance_transform(reach):
     assert np.sort(found) == pytest.approx(np.sort(distance.ravel()), rel=1e-14)
 
 
+def test_grown_area_is_the_same_however_the_plane_is_turned():
+    rng = np.random.default_rng(5)
+    radii = np.array([0.5, 1.0, 2.5, 4.0, 7.0])
+    for spacing in ((1.0, 1.0), (1.5, 1.0)):
+        cells, valid = ((rng.random((31, 40)) < share).astype(np.uint8) for share in (0.03, 0.9))
+        cells &= valid
+        want = _neighbours.grown_area(cells, valid, Grid((31, 40), spacing, (False, True)), radii)
+        for step in ((-1, 1), (1, -1), (-1, -1)):
+            turned = [np.ascontiguousarray(plane[:: step[0], :: step[1]]) for plane in (cells, valid)]
+            found = _neighbours.grown_area(*turned, Grid((31, 40), spacing, (False, True)), radii)
+            assert np.array_equal(found, want)
+        tipped = [np.ascontiguousarray(plane.T) for plane in (cells, valid)]
+        found = _neighbours.grown_area(*tipped, Grid((40, 31), spacing[::-1], (True, False)), radii)
+        assert found == pytest.approx(want, rel=1e-14)
+
+
 def test_area_beyond_a_free_edge_is_the_mirror_image():
     whole = np.zeros((41, 41), np.uint8)
     whole[20] = whole[:, 20] = 1
