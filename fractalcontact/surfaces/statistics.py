@@ -75,7 +75,11 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     lengths = surface.shape[: len(leading)]
     values = {name: np.array([one[name] for one in found]).reshape(lengths) for name in found[0]}
     values["missing_points"] = values["missing_points"].astype(np.int64)
-    coords = {name: c for name, c in surface.coords.items() if set(c.dims) <= set(leading)}
+    coords = {
+        name: c
+        for name, c in surface.coords.items()
+        if name in schema.QUANTITIES and set(c.dims) <= set(leading)
+    }
     result = xr.Dataset({name: (leading, value) for name, value in values.items()}, coords=coords)
     result["run_time"] = elapsed
     result = schema.label(result)

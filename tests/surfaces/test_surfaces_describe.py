@@ -175,3 +175,11 @@ def test_what_is_no_surface_is_refused():
     bad = fc.surfaces.from_array(np.zeros((4, 4)), 1.0).copy(data=np.full((4, 4), np.inf))
     with pytest.raises(InvalidInput, match="infinite"):
         fc.surfaces.describe(bad)
+
+
+def test_a_stack_with_names_of_the_user():
+    stack = fc.surfaces.fbm((8, 9), 1.0, hurst=0.5, rms_increment=1.0, rng=1, members=2)
+    named = stack.drop_vars("member").rename(member="specimen").assign_coords(specimen=["p", "q"])
+    found = fc.surfaces.describe(named)
+    assert found.rms_height.dims == ("specimen",)
+    np.testing.assert_array_equal(found.rms_height, fc.surfaces.describe(stack).rms_height)
