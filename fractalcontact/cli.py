@@ -105,9 +105,21 @@ def _run(options: argparse.Namespace) -> int:
     tree = run(scene, out=options.out, progress=not options.quiet)
     if not options.quiet:
         print(summary(tree))
-        figures = sorted(path.name for path in Path(options.out).glob("*.png"))
-        print(f"\nwritten to {options.out}: {RESULT}" + (f" and {len(figures)} figures" if figures else ""))
+        figures = len(list(Path(options.out).glob("*.png")))
+        size = (Path(options.out) / RESULT).stat().st_size
+        drawn = f" and {figures} figures" if figures else ""
+        print(f"\nwritten to {options.out}: {RESULT} ({size / 1e6:.2g} MB){drawn}{_most_memory()}")
     return 0
+
+
+def _most_memory() -> str:
+    """Return the most memory that this process has held, where the system tells."""
+    try:
+        import resource
+    except ImportError:
+        return ""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return f"; at most {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6:.0f} MB of memory"
 
 
 def _checked_scene(path: str) -> Any:

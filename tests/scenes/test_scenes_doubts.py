@@ -53,9 +53,15 @@ def test_sound_scenes_are_not_doubted(name):
     ],
 )
 def test_the_plan_finds_what_is_wrong_with_a_face(tmp_path, old, new, word):
-    done = command("run", "--plan", written(tmp_path, SOUND.replace(old, new)))
+    with pytest.raises(InvalidInput, match=word):
+        stages.preflight(fc.scenes.load(written(tmp_path, SOUND.replace(old, new))))
+
+
+def test_the_command_says_so_and_plans_nothing(tmp_path):
+    done = command("run", "--plan", written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0")))
     assert done.returncode == 2
-    assert word in done.stderr
+    assert "block" in done.stderr
+    assert not done.stdout
 
 
 def test_a_large_face_is_not_made_to_be_checked(tmp_path, monkeypatch):

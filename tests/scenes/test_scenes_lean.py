@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import tracemalloc
+from functools import cache
 
 import pytest
 from study import SOUND
@@ -78,26 +79,36 @@ DIMENSION = FACE + '[want]\ndimensions = ["default"]\n'
 PRESSED = FACE + '[contact]\ncontact_modulus = 1e9\nnominal_pressure = 1e5\n[want]\ncontact = ["press"]\n'
 
 
-@pytest.mark.parametrize(
-    ("text", "rooms"),
-    [
-        (SOUND.replace('"closure", ', ""), {"surfaces", "joints"}),
-        (DIMENSION, {"surfaces", "dimensions"}),
-        (PRESSED, {"surfaces", "contact"}),
-        (SOUND, {"surfaces", "joints", "contact"}),
-    ],
-    ids=["rigid", "dimension", "pressed", "closure"],
-)
-def test_only_the_rooms_that_are_needed_are_entered(tmp_path, text, rooms):
-    found = footprint("run", scene(tmp_path, text), "-o", tmp_path / "out", "--quiet")
-    assert set(found["rooms"]) & set(ROOMS) == rooms
+WANTED = {
+    "rigid": (SOUND.replace('"closure", ', ""), {"surfaces", "joints"}),
+    "dimension": (DIMENSION, {"surfaces", "dimensions"}),
+    "pressed": (PRESSED, {"surfaces", "contact"}),
+    "closure": (SOUND, {"surfaces", "joints", "contact"}),
+}
+
+
+@pytest.fixture(scope="module")
+def footprints(tmp_path_factory):
+    """Return what each study loaded, each run once for all tests."""
+
+    @cache
+    def of(name, number=0):
+        folder = tmp_path_factory.mktemp(f"{name}_{number}")
+        return footprint("run", scene(folder, WANTED[name][0]), "-o", folder / "out", "--quiet")
+
+    return of
+
+
+@pytest.mark.parametrize("name", list(WANTED))
+def test_only_the_rooms_that_are_needed_are_entered(footprints, name):
+    found = footprints(name)
+    assert set(found["rooms"]) & set(ROOMS) == WANTED[name][1]
     assert not {"matplotlib", "skimage", "dask.distributed", "tqdm"} & set(found["modules"])
 
 
-def test_a_second_run_compiles_nothing(tmp_path):
-    path = scene(tmp_path, SOUND)
-    footprint("run", path, "-o", tmp_path / "first", "--quiet")
-    assert footprint("run", path, "-o", tmp_path / "second", "--quiet")["kernels"] == 0
+def test_a_second_run_compiles_nothing(footprints):
+    footprints("closure")
+    assert footprints("closure", 1)["kernels"] == 0
 
 
 def test_the_file_holds_what_was_wanted_and_no_map(tmp_path):

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 
 import pytest
 from study import SOUND, command
@@ -67,3 +68,13 @@ def test_what_cannot_be_written_is_told_before_it_is_measured(tmp_path):
     done = command("accuracy", "-o", tmp_path / "out")
     assert done.returncode == 2
     assert "expected a folder" in done.stderr
+
+
+def test_the_command_tells_what_it_wrote_and_held(tmp_path):
+    (tmp_path / "study.toml").write_text(SOUND.replace('"closure", ', ""), encoding="utf-8")
+    last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-1]
+    size = (tmp_path / "out" / "result.nc").stat().st_size
+    told = re.search(r"result\.nc \((\S+) MB\); at most (\d+) MB of memory", last)
+    assert told, last
+    assert float(told[1]) == pytest.approx(size / 1e6, rel=0.1)
+    assert 50 < int(told[2]) < 1000
