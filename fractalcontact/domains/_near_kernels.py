@@ -84,8 +84,8 @@ def count_offsets(
                         continue
                     up, down = i - 2 * height, i + 2 * height
                     if above[i, other] == height and (wrap_y or up >= 0):
-                        there = there or valid[up % ny, x % nx] != 0
+                        there |= valid[up % ny, x % nx] != 0
                     if below[i, other] == height and (wrap_y or down < ny):
-                        there = there or valid[down % ny, x % nx] != 0
+                        there |= valid[down % ny, x % nx] != 0
             if best < np.inf:
                 counts[rows, columns] += 1 if there else 2
