@@ -24,7 +24,7 @@ a solution to 1e-13, was
     closure under an imposed force, relative           0.0     0.2         0.8
     energy of the error over the energy               1e-7    9e-4        4e-3
 
-and from a residual of 1e-5 down the set of contact was that of the solution.
+and from a residual of 1e-5 down the area of contact was that of the solution.
 """
 
 from __future__ import annotations
