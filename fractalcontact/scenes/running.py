@@ -64,6 +64,9 @@ def run(
         then is written to `partial.nc`, which says so, and the same call goes on from it. A second signal,
         half a second later or more, stops at once.
     """
+    if client is not None and not callable(getattr(client, "submit", None)):
+        told = f"client: expected a distributed.Client or None, got {type(client).__name__}"
+        raise InvalidInput("fractalcontact.scenes.run", [told])
     scene = scene if isinstance(scene, Scene) else load(scene)
     stages.preflight(scene)
     folder = None if out is None else writable(out)

@@ -63,6 +63,11 @@ def test_a_folder_in_which_another_run_writes_is_refused(tmp_path):
     assert [path.name for path in out.iterdir()] == ["result.nc"]
 
 
+def test_what_is_no_client_is_refused():
+    with pytest.raises(InvalidInput, match="client: expected a distributed.Client"):
+        fc.scenes.run("pressed_face", progress=False, client="tcp://there")
+
+
 def test_what_cannot_be_written_is_told_before_it_is_measured(tmp_path):
     (tmp_path / "out").write_text("a file")
     done = command("accuracy", "-o", tmp_path / "out")
