@@ -113,6 +113,8 @@ class Fast:
 
     def on_nodes(self, control: Control) -> Solution | None:
         """Solve by sums over pairs; None where there are too many candidates."""
+        if np.count_nonzero(self.problem.gap <= self.least_closure(control)) > FEW_NODES:
+            return None
         count = self.first_count(control)
         start = self.guess(control)
         while 0 < count <= FEW_NODES:
@@ -127,6 +129,14 @@ class Fast:
                 return self.everywhere(replace(solution, pressure=self.embedded_pressure(solution, chosen)))
             count = min(needed, 4 * chosen.size)
         return None
+
+    def least_closure(self, control: Control) -> float:
+        """Closure given, or that of a flat plate around the whole extent, which no contact undercuts."""
+        if control.total is None:
+            return float(control.value)
+        body = self.problem.body
+        across = np.hypot(body.shape[0] * body.spacing[0], body.shape[1] * body.spacing[1])
+        return control.value * body.cell_area / float(across)
 
     def bears(self, nodes: int, control: Control) -> bool:
         """Whether so many nodes can carry the force under the cap, with some to spare."""
@@ -173,7 +183,7 @@ class Fast:
         """Solve on the window that holds every candidate."""
         start, closure = self.guess(control), self.expected_closure(control)
         if start is None:
-            start, expected = cold_start(self.problem, control, np.float64)
+            start, expected = cold_start(self.problem, control, first_precision(self.problem, control))
             closure = expected if closure is None else closure
         window = self.window(ROOM * float(closure or 0.0))
         if not self.bears(self.problem.gap[window].size, control):

@@ -166,3 +166,15 @@ def test_a_periodic_body_looks_for_no_window_and_a_full_contact_takes_the_plane(
     monkeypatch.setattr(_fast.Fast, "window", never)
     monkeypatch.setattr(_fast.Fast, "ordered", property(never))
     press(rough(64), nominal_pressure=[MODULUS * 1e-4, MODULUS])
+
+
+@pytest.mark.parametrize("influence", ["disc", "square"])
+def test_a_wide_free_contact_does_not_try_few_nodes_first(grids, influence):
+    surface = rough(96, periodic=False)
+    found = press(surface, nominal_pressure=MODULUS, influence=influence)
+    assert min(shape[0] for shape in grids) > 1
+    least = float(found["normal_force"][0]) / (MODULUS * np.hypot(*(n * 1e-4 for n in surface.shape)))
+    assert float(found["closure"][0]) > least  # a round flat punch of that diameter settles by that much
+    light = press(surface, nominal_pressure=MODULUS * 1e-7, influence=influence)
+    assert grids[-1][0] == 1
+    assert bool(light["converged"].all())
