@@ -65,7 +65,8 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
         return _nothing(grid)
     heights = np.asarray(call["surface"].values, dtype=np.float64)
     gap = heights.max() - heights
-    if control == "nominal_pressure":
+    per_area = control == "nominal_pressure"
+    if per_area:
         with np.errstate(over="ignore"):
             control, values = "normal_force", values * grid.nominal_area
     length = length_unit((grid.spacing[0], grid.spacing[1]))
@@ -75,12 +76,14 @@ def make_plan(call: dict[str, Any], problems: Problems) -> Plan:
     units = Units(length, power_of_two(height), modulus, body.cell_area)
     gap /= units.height
     path = Path(body, units, gap, control, tuple(float(v) for v in values), hardness, tolerance, method)
-    _range(path, problems)
+    name, share = ("nominal_pressure", grid.nominal_area) if per_area else (control, 1.0)
+    _range(path, name, share, problems)
     if path.control == "normal_force":
-        greatest = path.hardness * grid.nominal_area
-        expected = f"a force of at most hardness times area, {greatest:.6g} N"
-        most = max(path.values)
-        problems.require(most <= greatest * (1 + ROUNDING), "normal_force", expected, most)
+        carried, most = path.hardness * grid.nominal_area, max(path.values)
+        expected = f"a force of at most hardness times area, {carried:.6g} N"
+        if per_area:
+            expected = f"a pressure of at most the hardness, {hardness:.6g} Pa"
+        problems.require(most <= carried * (1 + ROUNDING), name, expected, most / share)
     return Plan(grid, path, tuple(keep), heights)
 
 
@@ -93,15 +96,18 @@ def _boundary(given: Any, grid: Grid, problems: Problems) -> bool:
             not mixed, "boundary", "'free' where one axis is periodic and the other is not", given
         )
         return all(wraps)
-    word = problems.choice("boundary", given, ("periodic", "free"))
+    word = problems.choice("boundary", given, ("free", "periodic"))
     if word == "periodic":
         expected = "periodic axes (attribute `period` of x and y equal to n * spacing), or 'free'"
         problems.require(all(wraps), "boundary", expected, given)
     return bool(word == "periodic")
 
 
-def _range(path: Path, problems: Problems) -> None:
-    """Refuse loads out of all proportion to the surface, and units out of a computer's range."""
+def _range(path: Path, name: str, share: float, problems: Problems) -> None:
+    """Refuse loads out of all proportion to the surface, and units out of a computer's range.
+
+    `name` is the control as it was given, in units of the solver's over `share`.
+    """
     units = path.units
     sizes = (units.length, units.height, units.modulus, units.pressure, units.force, units.energy)
     expected = "spacing, heights and modulus whose products a double can hold"
@@ -117,10 +123,11 @@ def _range(path: Path, problems: Problems) -> None:
     )
     cap = path.hardness / units.pressure
     problems.require(1 / REACH < cap < REACH or cap == np.inf, "hardness", expected, path.hardness)
-    name, unit = ("closure", units.height) if path.control == "closure" else ("normal_force", units.force)
-    expected = f"0 or between {unit / REACH:.3g} and {unit * REACH:.3g} for this surface and modulus"
+    unit = units.height if path.control == "closure" else units.force
+    scale = unit / share
+    expected = f"0 or between {scale / REACH:.3g} and {scale * REACH:.3g} for this surface and modulus"
     for value in path.values:
-        problems.require(value == 0 or unit / REACH < value < unit * REACH, name, expected, value)
+        problems.require(value == 0 or unit / REACH < value < unit * REACH, name, expected, value / share)
 
 
 def _nothing(grid: Grid) -> Plan:

@@ -186,6 +186,12 @@ def test_bad_input_is_listed(options, words):
         assert word in str(caught.value)
 
 
+def test_a_word_that_is_no_boundary_is_one_problem():
+    with pytest.raises(InvalidInput, match="1 problem\n") as caught:
+        fc.contact.press(free(), contact_modulus=MODULUS, closure=1e-6, boundary="Free")
+    assert "'free', 'periodic'" in str(caught.value)
+
+
 def test_a_free_face_is_never_called_periodic():
     with pytest.raises(InvalidInput, match="periodic"):
         fc.contact.press(free(), contact_modulus=MODULUS, closure=1e-6, boundary="periodic")
