@@ -28,6 +28,7 @@ free set, precondition its gap, turn the direction, step and cut. What costs tim
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -50,6 +51,7 @@ PATIENCE = 40  # iterations without progress
 FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 HALVINGS = 20
 CAPPINGS = 50
+STRIP = 32  # rows at a time, which stay in the cache
 
 
 @dataclass
@@ -191,8 +193,7 @@ class Run:
     def begin(self) -> None:
         """Give the first pressure the force that is wanted, or the best multiple under the closure."""
         if self.forced:
-            sums = self.run(_kernels.rescale, self.p, self.kind(1), self.cap)
-            self.restore_force(sums[0], sums[1])
+            self.restore_force()
             self.refresh()
             return
         self.refresh()
@@ -208,20 +209,28 @@ class Run:
         self.u = self.operator.apply(self.p)
         self.fresh = True
 
-    def restore_force(self, force: float, capped: float) -> None:
+    def restore_force(self) -> None:
         """Scale the pressures below the cap until their sum is what is wanted."""
         wanted = self.control.value
         for _ in range(CAPPINGS):
+            force = sum_in_double(self.p)
             if abs(force - wanted) <= self.precise * wanted:
                 return
-            if not capped < min(wanted, force):
+            below = self.p < self.cap
+            bearing = sum_in_double(np.where(below, self.p, 0)) if self.cap < np.inf else force
+            if bearing <= 0 or force - bearing >= wanted:
                 break
-            factor = self.kind((wanted - capped) / (force - capped))
-            force, capped = self.run(_kernels.rescale, self.p, factor, self.cap)[:2]
+            factor = self.kind((wanted - (force - bearing)) / bearing)
+            np.multiply(self.p, factor, out=self.p, where=below)
+            np.minimum(self.p, self.cap, out=self.p)
             if self.cap == np.inf:
                 return
+        self.p[...] = self.lowest_nodes()
+
+    def lowest_nodes(self) -> Array:
+        """Even pressure of the wanted force on the lowest nodes."""
         level = self.gap if self.u is self.p else self.u + self.gap
-        self.p[...] = lowest(level, wanted, float(self.cap))
+        return lowest(level, self.control.value, float(self.cap))
 
     def weigh(self) -> Balance:
         """Closure, objective and the scale of the error."""
@@ -264,11 +273,12 @@ class Run:
         closure = self.kind(balance.closure)
         pressed, mean, beta = self.conditioned(closure, admit, count, gap)
         taken = (self.kind(mean), self.kind(beta))
-        relieved = self.run(_kernels.turn, self.pre.mask, pressed, *taken, self.t)[0]
+        state = (self.gap, self.u, closure, self.t)
+        relieved, along = self.run(_kernels.turn, self.pre.mask, pressed, *taken, *state)[:2]
         del pressed
         out = self.release()
         self.spare = self.operator.apply(self.t, out)
-        along, curvature = self.run(_kernels.slope, self.gap, self.u, self.t, self.spare, closure)[:2]
+        curvature = self.run(_kernels.bend, self.t, self.spare)[0]
         self.step = along / curvature if curvature > 0 and along > 0 else np.inf
         if not self.forced and along > 0 and relieved > 0:
             # full contact of a periodic body costs nothing to relieve: no further than to no force at all
@@ -317,24 +327,27 @@ class Run:
     def advance(self) -> None:
         """Take the step: as it is, and the settlement follows; or cut to the bounds."""
         step = self.kind(self.step)
-        clipped, force, capped = self.run(_kernels.survey, self.p, self.t, step, self.cap)[:3]
+        clipped, force = self.run(_kernels.survey, self.p, self.t, step, self.cap)[:2]
         self.clipped = clipped > 0
         if self.clipped:
-            self.cut(force, capped)
+            self.cut(force)
         else:
-            self.run(_kernels.move, self.p, self.t, self.u, self.spare, step)
+            self.run(move, self.p, self.t, step)
+            self.run(move, self.u, self.spare, step)
             self.fresh = False
 
-    def cut(self, force: float, capped: float) -> None:
-        """Take the step, cut to the bounds; the pressure before it stays in `spare`."""
-        shared = self.forced and self.cap < np.inf
-        if shared:
-            self.share(self.control.value)
+    def cut(self, force: float) -> None:
+        """Take the step, cut to the bounds, which leaves `force`; the pressure before it stays in `spare`."""
+        wanted = self.control.value
+        if self.forced and self.cap < np.inf:
+            self.share(wanted)
+        elif self.forced and not force > 0:
+            self.spare[...] = self.lowest_nodes()
         else:
-            self.run(_kernels.cut, self.p, self.t, self.kind(self.step), self.cap, self.spare)
+            missed = self.forced and abs(force - wanted) > self.precise * wanted
+            factor = self.kind(wanted / force if missed else 1.0)
+            self.run(cut, self.p, self.t, self.kind(self.step), factor, self.cap, self.spare)
         self.p, self.spare = self.spare, self.p
-        if self.forced and not shared:
-            self.restore_force(force, capped)
         self.refresh()
 
     def share(self, wanted: float) -> None:
@@ -342,7 +355,7 @@ class Run:
         free = self.pre.mask[: self.gap.shape[0], : self.gap.shape[1]]
         np.copyto(self.spare, self.p)
         values = self.p[free] - self.step * self.t[free].astype(np.float64)
-        rest = float(np.sum(np.sum(np.where(free, 0, self.p), axis=1, dtype=np.float64)))
+        rest = sum_in_double(np.where(free, 0, self.p))
         self.spare[free] = shifted(values, wanted - rest, float(self.cap))
 
     def halve(self) -> None:
@@ -351,4 +364,47 @@ class Run:
         self.step /= 2
         self.product = 0.0
         self.p, self.spare = self.spare, self.p
-        self.cut(*self.run(_kernels.survey, self.p, self.t, self.kind(self.step), self.cap)[1:3])
+        self.cut(self.run(_kernels.survey, self.p, self.t, self.kind(self.step), self.cap)[1])
+
+
+def sum_in_double(plane: Array) -> float:
+    """Sum by rows, then over the rows, whatever the precision of the plane."""
+    return float(np.sum(np.sum(plane, axis=1, dtype=np.float64)))
+
+
+def move(start: int, stop: int, rows: int, x: Array, t: Array, step: Any, out: Array) -> None:  # noqa: ARG001
+    """Step along -t, over bands of rows that fit the caches."""
+    with np.errstate(all="ignore"):  # as the compiled loops
+        for part in strips(start * rows, min(stop * rows, x.shape[0])):
+            x[part] -= step * t[part]
+
+
+def cut(
+    start: int,
+    stop: int,
+    rows: int,
+    p: Array,
+    t: Array,
+    step: Any,
+    factor: Any,
+    cap: Any,
+    new: Array,
+    out: Array,  # noqa: ARG001
+) -> None:
+    """Step along -t, cut to 0, times `factor`, cut to the cap."""
+    with np.errstate(all="ignore"):  # as the compiled loops
+        for part in strips(start * rows, min(stop * rows, p.shape[0])):
+            band = new[part]
+            np.multiply(t[part], step, out=band)
+            np.subtract(p[part], band, out=band)
+            np.maximum(band, 0, out=band)
+            if factor != 1:
+                band *= factor
+            if cap < np.inf:
+                np.minimum(band, cap, out=band)
+
+
+def strips(first: int, stop: int) -> Iterator[slice]:
+    """Rows, a few at a time."""
+    for row in range(first, stop, STRIP):
+        yield slice(row, min(row + STRIP, stop))

@@ -49,26 +49,26 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
 
 
 @kernel
-def scale_modes(start, stop, modes, qy2, qx2, factor, invert, mean):  # type: ignore[no-untyped-def]
-    """Multiply modes by factor * |q|, or by factor / |q|; by `mean` where q = 0."""
+def scale_modes(start, stop, parts, qy2, qx2, factor, invert, mean):  # type: ignore[no-untyped-def]
+    """Multiply modes by factor * |q|, or by factor / |q|; by `mean` where q = 0.
+
+    `parts` (my, mx, 2) are real and imaginary parts.
+    """
     for i in range(start, stop):
-        first = 1 if qy2[i] == 0 else 0
-        if first:
-            modes[i, 0] *= mean
-        if invert:
-            for j in range(first, modes.shape[1]):
-                modes[i, j] *= factor / np.sqrt(qy2[i] + qx2[j])
-        else:
-            for j in range(first, modes.shape[1]):
-                modes[i, j] *= factor * np.sqrt(qy2[i] + qx2[j])
+        for j in range(parts.shape[1]):
+            q = np.sqrt(qy2[i] + qx2[j])
+            weight = (factor / q if q > 0 else mean) if invert else (factor * q if q > 0 else mean)
+            parts[i, j, 0] *= weight
+            parts[i, j, 1] *= weight
 
 
 @kernel
-def multiply(start, stop, modes, symbol):  # type: ignore[no-untyped-def]
-    """Multiply modes by a real symbol."""
+def multiply(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
+    """Multiply modes, as real and imaginary parts (my, mx, 2), by a real symbol."""
     for i in range(start, stop):
-        for j in range(modes.shape[1]):
-            modes[i, j] *= symbol[i, j]
+        for j in range(parts.shape[1]):
+            parts[i, j, 0] *= symbol[i, j]
+            parts[i, j, 1] *= symbol[i, j]
 
 
 @sum_kernel
@@ -101,7 +101,8 @@ def inspect(start, stop, rows, gap, u, p, cap, closure, out):  # type: ignore[no
     low = np.empty(nx, p.dtype)
     for k in range(start, stop):
         opened, n_in, s_in, q_in, n_out, s_out, q_out = 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0
-        low[:] = 0
+        for j in range(nx):
+            low[j] = 0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):  # on its own: a greatest value among the sums would stop the lanes
                 g = u[i, j] + gap[i, j] - closure
@@ -137,7 +138,9 @@ def select(start, stop, rows, columns, gap, u, p, cap, closure, admit, shift, ma
     nothing = 0 * shift
     wide, many = np.empty(nx, x.dtype), np.empty(nx, x.dtype)
     for k in range(start, stop):
-        wide[:], many[:], changes = 0, 0, 0
+        changes = 0
+        for j in range(nx):
+            wide[j], many[j] = 0, 0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 g = u[i, j] + gap[i, j] - closure
@@ -150,7 +153,8 @@ def select(start, stop, rows, columns, gap, u, p, cap, closure, admit, shift, ma
                 mask[i, j] = free
             for j in range(nx):
                 wide[j] += x[i, j]
-        bins[k, :], counts[k, :] = 0, 0
+        for j in range(bins.shape[1]):
+            bins[k, j], counts[k, j] = 0, 0
         for j in range(nx):
             bins[k, j // columns] += wide[j]
             counts[k, j // columns] += many[j]
@@ -176,11 +180,13 @@ def collect(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-untyp
     my, mx = mask.shape
     wide = np.empty(mx, x.dtype)
     for k in range(start, stop):
-        wide[:] = 0
+        for j in range(mx):
+            wide[j] = 0
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
                 wide[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
-        bins[k, :] = 0
+        for j in range(bins.shape[1]):
+            bins[k, j] = 0
         for j in range(mx):
             bins[k, j // columns] += wide[j]
 
@@ -206,107 +212,46 @@ def correct(start, stop, rows, columns, mask, bins, gap, u, t, closure, x, out):
 
 
 @sum_kernel
-def turn(start, stop, rows, mask, x, mean, beta, t, out):  # type: ignore[no-untyped-def]
-    """Direction t = x - mean + beta t on the free set, zero outside; its sum."""
+def turn(start, stop, rows, mask, x, mean, beta, gap, u, closure, t, out):  # type: ignore[no-untyped-def]
+    """Direction t = x - mean + beta t on the free set, zero outside; sum t and t g."""
     ny, nx = t.shape
     nothing = 0 * mean
     for k in range(start, stop):
-        total = 0.0
+        total, along = 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = x[i, j] - mean + beta * t[i, j] if mask[i, j] else nothing
                 t[i, j] = value
                 total += value
+                along += np.float64(value) * (u[i, j] + gap[i, j] - closure)
+        out[k, 0], out[k, 1] = total, along
+
+
+@sum_kernel
+def bend(start, stop, rows, t, r, out):  # type: ignore[no-untyped-def]
+    """Sum t r."""
+    for k in range(start, stop):
+        total = 0.0
+        for i in range(k * rows, min(k * rows + rows, t.shape[0])):
+            for j in range(t.shape[1]):
+                total += np.float64(t[i, j]) * r[i, j]
         out[k, 0] = total
 
 
 @sum_kernel
-def slope(start, stop, rows, gap, u, t, r, closure, out):  # type: ignore[no-untyped-def]
-    """Sum g t and t r."""
-    ny, nx = t.shape
-    for k in range(start, stop):
-        gt, tr = 0.0, 0.0
-        for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):
-                along = np.float64(t[i, j])
-                gt += along * (u[i, j] + gap[i, j] - closure)
-                tr += along * r[i, j]
-        out[k, 0], out[k, 1] = gt, tr
-
-
-@sum_kernel
 def survey(start, stop, rows, p, t, step, cap, out):  # type: ignore[no-untyped-def]
-    """Count what a step along -t would push over the bounds; sum what it leaves (all, and at the cap)."""
+    """Count what a step along -t would push over the bounds; sum what it leaves, cut to them."""
     ny, nx = t.shape
     nothing = 0 * step
     for k in range(start, stop):
-        clipped, force, capped = 0, 0.0, 0.0
+        clipped, force = 0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = p[i, j] - step * t[i, j]
                 clipped += (value < 0) | (value > cap)
                 value = value if value > 0 else nothing
-                over = value >= cap
-                value = cap if over else value
-                force += value
-                capped += value if over else nothing
-        out[k, 0], out[k, 1], out[k, 2] = clipped, force, capped
-
-
-@sum_kernel
-def move(start, stop, rows, p, t, u, r, step, out):  # type: ignore[no-untyped-def]
-    """Step along -t, and the settlement with it."""
-    ny, nx = t.shape
-    for k in range(start, stop):
-        for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):
-                p[i, j] -= step * t[i, j]
-            for j in range(nx):
-                u[i, j] -= step * r[i, j]
-        out[k, 0] = 0.0
-
-
-@sum_kernel
-def cut(start, stop, rows, p, t, step, cap, new, out):  # type: ignore[no-untyped-def]
-    """Step along -t, cut to 0 .. cap."""
-    ny, nx = t.shape
-    nothing = 0 * step
-    for k in range(start, stop):
-        for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):
-                value = p[i, j] - step * t[i, j]
-                value = value if value > 0 else nothing
-                new[i, j] = value if value < cap else cap
-        out[k, 0] = 0.0
-
-
-@sum_kernel
-def rescale(start, stop, rows, p, factor, cap, out):  # type: ignore[no-untyped-def]
-    """Scale what is below the cap; sum all, and what is at the cap."""
-    ny, nx = p.shape
-    nothing = 0 * factor
-    for k in range(start, stop):
-        force, capped = 0.0, 0.0
-        for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):
-                value = p[i, j]
-                value = value * factor if value < cap else value
-                value = value if value < cap else cap
-                p[i, j] = value
-                force += value
-                capped += value if value >= cap else nothing
-        out[k, 0], out[k, 1] = force, capped
-
-
-@sum_kernel
-def open_gap(start, stop, gap, u, p, closure, out):  # type: ignore[no-untyped-def]
-    """Sum the gap of every row: zero under pressure, never negative."""
-    for i in range(start, stop):
-        total = 0.0
-        for j in range(gap.shape[1]):
-            g = gap[i, j] + u[i, j] - closure
-            total += g if (g > 0) & (p[i, j] <= 0) else 0.0
-        out[i] = total
+                force += value if value < cap else cap
+        out[k, 0], out[k, 1] = clipped, force
 
 
 @kernel

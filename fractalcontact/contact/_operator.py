@@ -43,7 +43,8 @@ class Wavenumbers:
         kind = plane.dtype.type
         modes = fft.rfft2(plane, self.modes)
         qy2, qx2 = self.qy2.astype(kind), self.qx2.astype(kind)
-        in_bands(scale_modes, modes.shape[0], modes.size, modes, qy2, qx2, kind(factor), invert, kind(mean))
+        weights = (qy2, qx2, kind(factor), invert, kind(mean))
+        in_bands(scale_modes, modes.shape[0], modes.size, real_parts(modes), *weights)
         if not fft.writes_in_place():
             return fft.irfft2(modes, self.shape, overwrite=True)
         self.modes = modes
@@ -80,8 +81,13 @@ class FreeOperator:
         self.transforms += 1
         modes = fft.rfft2_padded(pressure, self.padded, self.modes)
         self.modes = modes if fft.writes_in_place() else None
-        in_bands(multiply, modes.shape[0], modes.size, modes, self.symbol)
+        in_bands(multiply, modes.shape[0], modes.size, real_parts(modes), self.symbol)
         return fft.irfft2_cropped(modes, self.padded, (pressure.shape[0], pressure.shape[1]))
+
+
+def real_parts(modes: Array) -> Array:
+    """View complex modes (my, mx) as their real and imaginary parts (my, mx, 2)."""
+    return modes.view(modes.real.dtype).reshape(*modes.shape, 2)
 
 
 def padded_length(n: int) -> int:

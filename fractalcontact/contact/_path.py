@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from fractalcontact.base.jit import in_bands
 from fractalcontact.contact._flat import flat_block
 from fractalcontact.contact._problem import Body, Control, Problem, Solution, serial_mean, serial_sum
 from fractalcontact.contact._setup import Units
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+ROWS = 64  # of a plane, at a time
 BALANCE = 1e-9  # greatest share of a given force that the pressures may miss
 
 
@@ -128,13 +128,12 @@ class Step:
     @property
     def mean_gap(self) -> float:
         """Mean gap in m."""
-        from fractalcontact.contact._kernels import open_gap
-
-        solution, gap = self.solution, self.problem.gap
-        rows = np.empty(gap.shape[0])
-        closure = np.float64(solution.closure)
-        in_bands(open_gap, rows.size, gap.size, gap, solution.settlement, solution.pressure, closure, rows)
-        return float(np.sum(rows)) / gap.size * self.path.units.height
+        found, gap, total = self.solution, self.problem.gap, []
+        for first in range(0, gap.shape[0], ROWS):  # a whole plane of it would be one more array
+            part = slice(first, first + ROWS)
+            apart = gap[part] + found.settlement[part] - found.closure
+            total.append(np.sum(np.maximum(apart, 0.0), axis=1, where=found.pressure[part] <= 0))
+        return float(np.sum(np.concatenate(total))) / gap.size * self.path.units.height
 
     @property
     def elastic_energy(self) -> float:
