@@ -16,8 +16,10 @@ from fractalcontact.base.spectra import periodogram, radial_wavenumber
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_CLIFF = 1e-3  # a fall of the mean power by this factor between neighbouring rings is a cut-off
-_PENALTY = 6.0  # fall of the deviance that a plateau must bring
+_CLIFF = 1e-3  # a fall of the mean power by this factor from one ring to all the next is a cut-off
+_NEXT = 4  # rings that must all have fallen: one mode alone may be that weak by chance
+_PENALTY = 6.0  # fall of the deviance that a plateau of a surface must bring
+_EVERY, _CORNERS = 64, 50  # corners tried: all of the first, then so many, ever farther apart
 LEAST_MODES = 12
 
 
@@ -55,8 +57,9 @@ def modes(heights: Array, steps: tuple[float, ...]) -> Modes:
 def band(modes: Modes) -> tuple[float, float]:
     """Return the lowest and the highest wavenumber of the power law.
 
-    Cut-offs are cliffs between rings, and the ring beside a cliff is left out. A plateau is what the
-    likelihood of power law with plateau finds, if it is much better than that of the power law alone.
+    Cut-offs are cliffs between a ring and the few beyond it, and the ring beside a cliff is left out. A
+    plateau is what the likelihood of power law with plateau finds; on a surface only if that is much better
+    than the power law alone.
     """
     ring = np.rint(modes.wavenumber).astype(int)
     counts = np.bincount(ring, modes.weights)
@@ -79,17 +82,29 @@ def power_law(modes: Modes, hurst: float) -> Array:
 def _cliffs(mean: Array) -> tuple[int, int]:
     """Return the first and the last ring of the band around the strongest one."""
     top = int(np.argmax(mean))
-    above = np.flatnonzero(mean[top + 1 :] < _CLIFF * mean[top:-1])
-    below = np.flatnonzero(mean[:top] < _CLIFF * mean[top])
-    return (int(below[-1]) + 1 if below.size else 0), (top + int(above[0]) if above.size else mean.size - 1)
+    return top - _fall(mean[top::-1]), top + _fall(mean[top:])
+
+
+def _fall(mean: Array) -> int:
+    """Return the last ring before a cliff, or the last of all."""
+    following = np.concatenate([mean[1:], np.zeros(_NEXT - 1)])
+    strongest = np.max([following[k : k + mean.size - 1] for k in range(_NEXT)], axis=0)
+    falls = np.flatnonzero(strongest < _CLIFF * mean[:-1])
+    return int(falls[0]) if falls.size else mean.size - 1
 
 
 def _plateau(q: Array, mean: Array, counts: Array, axes: int) -> float:
     """Return the wavenumber above which the power law holds; -inf if it holds from the first ring."""
     best, corner = np.inf, -np.inf
-    for i in range(max(1, int(0.6 * q.size))):
+    # a short plateau in the few modes of a profile brings less than the penalty, and bends the line
+    penalty = _PENALTY if axes == 2 else 0.0
+    last = max(1, int(0.6 * q.size))
+    corners = np.arange(min(last, _EVERY))
+    if last > _EVERY:
+        corners = np.unique(np.append(corners, np.geomspace(_EVERY, last - 1, _CORNERS).astype(int)))
+    for i in corners.tolist():
         deviance = _deviance(np.maximum(q, q[i]) / q[i], mean, counts, axes)
-        if deviance < best - (_PENALTY if i <= 1 or corner == -np.inf else 0.0):
+        if deviance < best - (penalty if i <= 1 or corner == -np.inf else 0.0):
             best, corner = deviance, (-np.inf if i == 0 else q[i] + 0.5)
     return corner
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.fft
 
+import fractalcontact as fc
 from fractalcontact.base import threads
 from fractalcontact.dimensions import _exact, _gaps, _modes, _periodic, _whittle
 
@@ -199,3 +200,22 @@ def test_band_of_a_periodic_spectrum():
     assert 38.0 < high <= 40.0
     whole = np.fft.ifft2(np.fft.fft2(heights) * np.where(q > 0, np.maximum(q, 1) ** -1.7, 0)).real
     assert _periodic.band(_periodic.modes(whole, (1.0, 1.0))) == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize("shape", [1024, (4, 700)])
+def test_one_weak_mode_is_no_cut_off(shape):
+    faces = fc.surfaces.spectral(shape, 1.0, hurst=0.5, rms_height=1.0, rng=4, members=5)
+    steps = (1.0,) * (faces.ndim - 1)
+    highest = [_periodic.band(_periodic.modes(face.values, steps))[1] for face in faces]
+    longest = max(faces.shape[1:])
+    assert min(highest) >= 0.5 * longest - 4
+
+
+def test_a_short_plateau_of_a_profile_is_seen():
+    faces = fc.surfaces.spectral(
+        512, 1.0, hurst=0.5, rms_height=1.0, rolloff=64.0, short_cutoff=4.0, rng=5, members=30
+    )
+    found = fc.dimensions.estimate(faces)
+    held = (found["ci_low"] <= 0.5) & (found["ci_high"] >= 0.5)
+    assert float(held.mean()) > 0.85
+    assert abs(float(found["hurst"].mean()) - 0.5) < 0.04
