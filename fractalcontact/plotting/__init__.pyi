@@ -6,6 +6,8 @@ from .domain_maps import contact_domains as contact_domains
 from .domain_maps import island_map as island_map
 from .domain_maps import islands as islands
 from .drawing import draw as draw
+from .forgetting import correlation as correlation
+from .forgetting import delta_dimension as delta_dimension
 from .lacunar import box_dimension as box_dimension
 from .lacunar import lacunarity as lacunarity
 from .lacunar import local_slopes as local_slopes
@@ -25,6 +27,8 @@ __all__ = [
     "closure_laws",
     "contact_area",
     "contact_domains",
+    "correlation",
+    "delta_dimension",
     "dimension_curves",
     "dimensions",
     "draw",

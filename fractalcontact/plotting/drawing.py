@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.netcdf import PARTIAL
 from fractalcontact.base.progress import track
-from fractalcontact.plotting import closing, domain_maps, lacunar, leakage, roughness, sliding
+from fractalcontact.plotting import closing, domain_maps, forgetting, lacunar, leakage, roughness, sliding
 from fractalcontact.plotting._reading import words
 from fractalcontact.plotting.paper import group, has_figure, paper_figure, shown_shear
 
@@ -65,6 +65,7 @@ def drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
         ("domains/correlation_dimension", "correlation_dimension", lacunar.box_dimension),
         ("domains/lacunarity", "lacunarity", _lacunarity),
         ("domains/islands", "islands", domain_maps.islands),
+        ("joints/decorrelation_length", "correlation", forgetting.correlation),
         ("joints/transmissivity", "hydraulic_aperture", leakage.hydraulic_aperture),
         ("contact", "closure_law", closing.closure_laws),
         ("contact", "contact_area", closing.contact_area),
