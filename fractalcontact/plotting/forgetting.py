@@ -53,9 +53,9 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
         ax.plot(along(data["shear"].values), values[i], **look)
         low, length, high = (float(end[i]) for end in ends)
         if np.isfinite(length):
-            ax.axvline(along(length), color=look["color"], lw=0.7, ls=":")
+            ax.axvline(float(along(length)), color=look["color"], lw=0.7, ls=":")
         if np.isfinite(low) and np.isfinite(high):
-            ax.axvspan(along(low), along(high), color=look["color"], alpha=0.12, lw=0)
+            ax.axvspan(float(along(low)), float(along(high)), color=look["color"], alpha=0.12, lw=0)
         entries.append(_style.line_entry(direction_word(name), **look))
     ax.axhline(0.0, color="0.6", lw=0.6)
     ax.set_xlabel(axis_label(data["shear"], along))
