@@ -114,12 +114,18 @@ def _run(options: argparse.Namespace) -> int:
 
 def _most_memory() -> str:
     """Return the most memory that this process has held, where the system tells."""
-    try:
-        import resource
-    except ImportError:
-        return ""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return f"; at most {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6:.0f} MB of memory"
+    status = Path("/proc/self/status")
+    if status.is_file():
+        # the kernel's usage of resources would begin with what the parent held when it started this process
+        lines = dict(line.split(":", 1) for line in status.read_text(encoding="utf-8").splitlines())
+        most = int(lines.get("VmHWM", "0 kB").split()[0]) * 1024
+    else:
+        try:
+            import resource
+        except ImportError:
+            return ""
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return f"; at most {most / 1e6:.0f} MB of memory" if most else ""
 
 
 def _checked_scene(path: str) -> Any:
