@@ -191,7 +191,7 @@ def _accuracy(options: argparse.Namespace) -> int:
 
 def _estimators(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
-    from fractalcontact.accuracy.bench_table import estimators_table
+    from fractalcontact.accuracy.reporting import estimators_table
 
     asked = {name: getattr(options, name) for name in ("hurst", "sizes", "families", "methods", "members")}
     given = {name: values for name, values in asked.items() if values is not None}

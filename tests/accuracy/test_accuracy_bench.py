@@ -5,7 +5,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.accuracy import _bounds, bench
-from fractalcontact.accuracy.bench_table import estimators_table
+from fractalcontact.accuracy.reporting import estimators_table
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.cli import main
 
