@@ -91,8 +91,8 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     scene = _checked_scene(options.scene)
     if options.plan:
+        from fractalcontact.scenes.checking import preflight
         from fractalcontact.scenes.planning import plan
-        from fractalcontact.scenes.stages import preflight
 
         preflight(scene)
         print(plan(scene))
@@ -130,8 +130,8 @@ def _most_memory() -> str:
 
 def _checked_scene(path: str) -> Any:
     """Return the scene, or raise everything that is wrong with it and with its faces at once."""
+    from fractalcontact.scenes.checking import preflight
     from fractalcontact.scenes.reading import parse
-    from fractalcontact.scenes.stages import preflight
 
     scene, problems = parse(path)
     if problems:

@@ -1,11 +1,14 @@
 """A study declared in one file: what is given, and which results are wanted.
 
-grammar    what a scene may say
-reading    the scene file, parsed and checked
-planning   the stages that the wanted results need, and why
-stages     what each stage computes, by calling the rooms
-running    the plan carried out: kept stages, resuming, one NetCDF, the figures
-reporting  the summary on the screen
+grammar     what a scene may say
+reading     the scene file, parsed and checked
+given       faces, and the arguments that the tables stand for
+checking    what is wrong with them; `doubting`: what is hardly meant
+choosing    methods and tolerances, for an error or a time
+planning    the stages that the wanted results need, and why
+stages      what each stage computes, by calling the rooms
+running     the plan carried out, one NetCDF, the figures; `keeping`: finished parts, to go on from
+reporting   the summary on the screen
 statements  what the founding paper says beside what a study finds
 
 Nothing is computed, imported, compiled or stored that no wanted result needs. A scene is TOML:

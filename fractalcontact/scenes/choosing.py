@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import FractalContactWarning
+from fractalcontact.scenes.given import face_grid
 from fractalcontact.scenes.scene import Scene
 
 MARGIN = 3.0  # asked of the curve, because no two faces are alike
@@ -174,8 +175,6 @@ def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[tuple[str, str, f
 
 
 def _block_nodes(scene: Scene, shape: tuple[int, int]) -> float:
-    from fractalcontact.scenes.stages import face_grid
-
     block = scene.table("joint").get("block")
     if block is None:
         return float(np.prod(shape))
@@ -183,6 +182,4 @@ def _block_nodes(scene: Scene, shape: tuple[int, int]) -> float:
 
 
 def _shape(scene: Scene) -> tuple[int, int]:
-    from fractalcontact.scenes.stages import face_grid
-
     return face_grid(scene)[0]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.errors import ScaleWarning
+from fractalcontact.scenes.given import contact_options
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ def of_the_given(scene: Scene, face: xr.DataArray) -> Iterator[str]:
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
     edges = [size * step for size, step in zip(face.shape, steps, strict=True)]
     if scene.wanted("contact"):
-        from fractalcontact.scenes.stages import contact_options
-
         options = contact_options(scene)
         yield from _pressures("contact", options, float(np.prod(edges)), float(options["contact_modulus"]))
     material = scene.table("material")

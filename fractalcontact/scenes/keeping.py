@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base import netcdf, provenance
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.scenes import stages
+from fractalcontact.scenes.given import contact_options, locate
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
         table = scene.table("upper" if name == "faces" else "surface")
         tables["surface"] = table
         if "read" in table:
-            file = stages.locate(table["read"], scene.folder)
+            file = locate(table["read"], scene.folder)
             tables["file"] = hashlib.sha256(file.read_bytes()).hexdigest()
     if room == "joints":
         tables["material"] = scene.table("material")
@@ -77,7 +77,7 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
     if room == "dimensions":
         tables["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
     if room == "contact":
-        tables["contact"] = stages.contact_options(scene)
+        tables["contact"] = contact_options(scene)
     if room == "domains":
         tables["domains"] = scene.table("domains").get(name, {})
     tables["needs"] = [digests[need] for need in stage.needs]

@@ -16,6 +16,7 @@ from fractalcontact.base import netcdf, provenance, schema, stopping
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
 from fractalcontact.scenes import doubting, stages
+from fractalcontact.scenes.checking import preflight
 from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.keeping import Store, digest
 from fractalcontact.scenes.planning import FIGURES, Stage, stages_of
@@ -68,7 +69,7 @@ def run(
         told = f"client: expected a distributed.Client or None, got {type(client).__name__}"
         raise InvalidInput("fractalcontact.scenes.run", [told])
     scene = scene if isinstance(scene, Scene) else load(scene)
-    stages.preflight(scene)
+    preflight(scene)
     folder = None if out is None else writable(out)
     study = _Study(scene, Store(folder), progress, client)
     with _held(folder), stopping.noted(folder is not None) as stop:

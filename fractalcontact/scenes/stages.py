@@ -6,8 +6,6 @@ dilatancy) whose results are joined. Parts may run anywhere and in any order; th
 
 from __future__ import annotations
 
-import os
-import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.checks import Problems
-from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.schema import encoded, label
-from fractalcontact.base.shipped import datasets_folder
-from fractalcontact.scenes import doubting
+from fractalcontact.scenes.given import contact_options, crack_options, read_surface
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
-from fractalcontact.scenes.planning import loads_of, stages_of
+from fractalcontact.scenes.planning import loads_of
 from fractalcontact.scenes.scene import Scene, Table
 
 if TYPE_CHECKING:
@@ -35,8 +30,6 @@ if TYPE_CHECKING:
 
     Results = Mapping[str, xr.Dataset]
 
-VARIABLE = re.compile(r"\$\{?(\w+)\}?")
-LARGE = 1 << 18  # nodes of a face that is not made twice
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 MEMBER = "member"
 WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
@@ -215,143 +208,6 @@ def measure(stage: Stage, scene: Scene) -> Measure:
     return Measure(room, name, map_read(stage), scene.options(table, name, stage_keys(room, name)))
 
 
-def preflight(scene: Scene) -> None:
-    """Find all that is wrong with a scene before anything is computed or written.
-
-    Of an ensemble one face is made for that; of a large one none: a flat one of its size stands for it.
-
-    Warns
-    -----
-    ScaleWarning
-        A slope or a pressure is hardly meant.
-
-    Raises
-    ------
-    InvalidInput
-        Lists the problems of the faces, the block, the material and the loads together.
-    """
-    with Problems(f"scene {scene.name}") as problems:
-        faces = {}
-        for name in ("surface", "upper"):
-            if name in scene.tables and (name == "surface" or scene.wanted("joints")):
-                with _gather(problems, name):
-                    table = {key: value for key, value in scene.table(name).items() if key != "members"}
-                    stand_in = _stand_in(table)
-                    faces[name] = read_surface(table, scene.folder) if stand_in is None else stand_in
-        if (
-            not problems.found
-            and (scene.wanted("joints") or scene.wanted("domains"))
-            and not scene.wanted("contact")
-        ):
-            _preflight_joint(scene, faces, problems)
-    doubting.warn(doubting.of_the_given(scene, faces["surface"]))
-
-
-def _stand_in(table: Table) -> xr.DataArray | None:
-    """Return a flat face in place of a large one that is generated."""
-    if "generate" not in table or np.prod(np.broadcast_to(table["shape"], 2), dtype=float) < LARGE:
-        return None
-    from fractalcontact import surfaces
-
-    shape = tuple(int(n) for n in np.broadcast_to(table["shape"], 2))
-    return surfaces.from_array(np.zeros(shape), table["spacing"])
-
-
-def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:
-    from fractalcontact import joints
-
-    crack = None
-    with _gather(problems, "joint"):
-        crack = joints.Crack(faces["surface"], faces.get("upper"), **_crack_options(scene))
-    if crack is None:
-        return
-    for stage in stages_of(scene):
-        given = scene.options("joint", stage.name.removeprefix("joints/"), ("shear", "direction"))
-        if stage.name.startswith("joints/") and "shear" in given:
-            _check_travel(crack, given, stage.name, problems)
-
-
-def _check_travel(crack: Crack, given: dict[str, Any], place: str, problems: Problems) -> None:
-    """Note the shears that would push the block off its face."""
-    directions = given.get("direction", ("E", "N", "W", "S") if place.endswith("dilatancy") else "E")
-    longest = max(given["shear"]) if isinstance(given["shear"], list) else given["shear"]
-    for word in directions if isinstance(directions, (list, tuple)) else [directions]:
-        travel = crack.travel(word)
-        if longest > travel * (1.0 + 1e-6):
-            problems.add(f"{place}: shear", f"at most {travel:g} m towards {word}", longest)
-
-
-class _gather:
-    """Note the problems of an `InvalidInput` raised in the block, and go on."""
-
-    def __init__(self, problems: Problems, place: str) -> None:
-        self.problems, self.place = problems, place
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, value: Any, trace: Any) -> bool:
-        if not isinstance(value, InvalidInput):
-            return False
-        lines = [f"{self.place}: {line}" for line in value.problems]
-        self.problems.found.extend(line for line in lines if line not in self.problems.found)
-        return True
-
-
-def read_surface(table: Table, folder: Path) -> xr.DataArray:
-    """Return the face that a table of the scene describes."""
-    from fractalcontact import surfaces
-
-    options = {key: value for key, value in table.items() if key not in ("level", "despike", "fill")}
-    if "generate" in options:
-        generate: Callable[..., xr.DataArray] = getattr(surfaces, options.pop("generate"))
-        face = generate(**options)
-    elif "sample" in options:
-        face = surfaces.sample(options.pop("sample"))
-    else:
-        face = surfaces.read(locate(options.pop("read"), folder), **options)
-    if table.get("despike"):
-        face = surfaces.despike(face)
-    if table.get("fill"):
-        face = surfaces.fill(face)
-    if "level" in table:
-        face = surfaces.level(face, table["level"])
-    return face
-
-
-def face_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Return shape and spacings (y, x; m) of the face; one that is generated is not made for that."""
-    table = scene.table("surface")
-    if "generate" in table:
-        shape, spacing = np.broadcast_to(table["shape"], 2), np.broadcast_to(table["spacing"], 2)
-        return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
-    face = read_surface(table, scene.folder)
-    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
-    return (face.sizes["y"], face.sizes["x"]), (steps[0], steps[1])
-
-
-def locate(path: str, folder: Path) -> Path:
-    """Return the file that a scene names.
-
-    Variables of the environment are expanded; a relative path starts at the scene or at the shipped data.
-
-    Raises
-    ------
-    InvalidInput
-        A variable is not set, or there is no such file.
-    """
-    expanded = os.path.expandvars(path)
-    if "$" in expanded:
-        unset = " and ".join(word for word in VARIABLE.findall(expanded))
-        raise InvalidInput(
-            "surface", [f"read: expected {unset} to name a folder, got a variable that is not set"]
-        )
-    for candidate in (folder / expanded, datasets_folder() / expanded):
-        if candidate.is_file():
-            return candidate
-    raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
-
-
 def _surface_work(name: str, scene: Scene, results: Results) -> Work:
     if name == "description":
         return Work((partial(_call, "surfaces", "describe", _height(results)),))
@@ -377,18 +233,6 @@ def _scanned(scene: Scene, results: Results) -> xr.DataArray:
     if not table.get("despike"):
         return _height(results)
     return read_surface({**table, "despike": False}, scene.folder)
-
-
-def contact_options(scene: Scene) -> dict[str, Any]:
-    """Return the arguments of `press`: those of `[contact]`, and what the material says of the rest."""
-    from fractalcontact.contact import effective_modulus
-
-    options, material = dict(scene.table("contact")), scene.table("material")
-    if "contact_modulus" not in options:
-        options["contact_modulus"] = effective_modulus(material["young"], material["poisson"])
-    if "hardness" in material:
-        options.setdefault("hardness", material["hardness"])
-    return options
 
 
 def _contact_work(stage: Stage, scene: Scene, results: Results) -> Work:
@@ -469,13 +313,7 @@ def _crack(scene: Scene, results: Results) -> Crack:
     from fractalcontact import joints
 
     upper = results["joints/faces"]["height"] if "joints/faces" in results else None
-    return joints.Crack(results["surfaces"]["height"], upper, **_crack_options(scene))
-
-
-def _crack_options(scene: Scene) -> dict[str, Any]:
-    material, joint = scene.table("material"), scene.table("joint")
-    options = {key: material[key] for key in ("young", "poisson", "basic_friction_angle") if key in material}
-    return options | ({"block": joint["block"]} if "block" in joint else {})
+    return joints.Crack(results["surfaces"]["height"], upper, **crack_options(scene))
 
 
 def _height(results: Results) -> xr.DataArray:

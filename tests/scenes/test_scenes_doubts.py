@@ -7,7 +7,8 @@ from study import SOUND, command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, ScaleWarning
-from fractalcontact.scenes import stages
+from fractalcontact.scenes import checking, given
+from fractalcontact.scenes.checking import preflight
 
 CHANGES = {
     "mean pressure": ("young = 30e9", "young = 30e3"),  # MPa taken for Pa
@@ -26,7 +27,7 @@ def test_units_that_are_hardly_meant_are_told_before_anything_runs(tmp_path, wor
         written(tmp_path, SOUND.replace(*CHANGES[word]).replace("[1.0, 10.0]", "[1.0, 1e3]"))
     )
     with pytest.warns(ScaleWarning, match=word):
-        stages.preflight(scene)
+        preflight(scene)
 
 
 def test_a_closure_deeper_than_the_block_is_told(tmp_path):
@@ -40,7 +41,7 @@ def test_a_closure_deeper_than_the_block_is_told(tmp_path):
 def test_sound_scenes_are_not_doubted(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        stages.preflight(fc.scenes.load(name))
+        preflight(fc.scenes.load(name))
 
 
 @pytest.mark.parametrize(
@@ -54,7 +55,7 @@ def test_sound_scenes_are_not_doubted(name):
 )
 def test_the_plan_finds_what_is_wrong_with_a_face(tmp_path, old, new, word):
     with pytest.raises(InvalidInput, match=word):
-        stages.preflight(fc.scenes.load(written(tmp_path, SOUND.replace(old, new))))
+        preflight(fc.scenes.load(written(tmp_path, SOUND.replace(old, new))))
 
 
 def test_the_command_says_so_and_plans_nothing(tmp_path):
@@ -65,8 +66,8 @@ def test_the_command_says_so_and_plans_nothing(tmp_path):
 
 
 def test_a_large_face_is_not_made_to_be_checked(tmp_path, monkeypatch):
-    monkeypatch.setattr(stages, "LARGE", 1000)
-    monkeypatch.setattr(stages, "read_surface", None)
-    stages.preflight(fc.scenes.load(written(tmp_path, SOUND)))
+    monkeypatch.setattr(given, "LARGE", 1000)
+    monkeypatch.setattr(checking, "read_surface", None)
+    preflight(fc.scenes.load(written(tmp_path, SOUND)))
     with pytest.raises(InvalidInput, match="block"):
-        stages.preflight(fc.scenes.load(written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0"))))
+        preflight(fc.scenes.load(written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0"))))

@@ -1,0 +1,104 @@
+"""What a scene is given, as the rooms take it: faces, and the arguments that its tables stand for."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.scenes.scene import Scene, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+VARIABLE = re.compile(r"\$\{?(\w+)\}?")
+LARGE = 1 << 18  # nodes of a face that is not made twice
+
+
+def read_surface(table: Table, folder: Path) -> xr.DataArray:
+    """Return the face that a table of the scene describes."""
+    from fractalcontact import surfaces
+
+    options = {key: value for key, value in table.items() if key not in ("level", "despike", "fill")}
+    if "generate" in options:
+        generate: Callable[..., xr.DataArray] = getattr(surfaces, options.pop("generate"))
+        face = generate(**options)
+    elif "sample" in options:
+        face = surfaces.sample(options.pop("sample"))
+    else:
+        face = surfaces.read(locate(options.pop("read"), folder), **options)
+    if table.get("despike"):
+        face = surfaces.despike(face)
+    if table.get("fill"):
+        face = surfaces.fill(face)
+    if "level" in table:
+        face = surfaces.level(face, table["level"])
+    return face
+
+
+def face_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return shape and spacings (y, x; m) of the face; one that is generated is not made for that."""
+    table = scene.table("surface")
+    if "generate" in table:
+        shape, spacing = np.broadcast_to(table["shape"], 2), np.broadcast_to(table["spacing"], 2)
+        return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
+    face = read_surface(table, scene.folder)
+    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
+    return (face.sizes["y"], face.sizes["x"]), (steps[0], steps[1])
+
+
+def locate(path: str, folder: Path) -> Path:
+    """Return the file that a scene names.
+
+    Variables of the environment are expanded; a relative path starts at the scene or at the shipped data.
+
+    Raises
+    ------
+    InvalidInput
+        A variable is not set, or there is no such file.
+    """
+    expanded = os.path.expandvars(path)
+    if "$" in expanded:
+        unset = " and ".join(word for word in VARIABLE.findall(expanded))
+        raise InvalidInput(
+            "surface", [f"read: expected {unset} to name a folder, got a variable that is not set"]
+        )
+    for candidate in (folder / expanded, datasets_folder() / expanded):
+        if candidate.is_file():
+            return candidate
+    raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
+
+
+def stand_in(table: Table) -> xr.DataArray | None:
+    """Return a flat face in place of a large one that is generated."""
+    if "generate" not in table or np.prod(np.broadcast_to(table["shape"], 2), dtype=float) < LARGE:
+        return None
+    from fractalcontact import surfaces
+
+    shape = tuple(int(n) for n in np.broadcast_to(table["shape"], 2))
+    return surfaces.from_array(np.zeros(shape), table["spacing"])
+
+
+def contact_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `press`: those of `[contact]`, and what the material says of the rest."""
+    from fractalcontact.contact import effective_modulus
+
+    options, material = dict(scene.table("contact")), scene.table("material")
+    if "contact_modulus" not in options:
+        options["contact_modulus"] = effective_modulus(material["young"], material["poisson"])
+    if "hardness" in material:
+        options.setdefault("hardness", material["hardness"])
+    return options
+
+
+def crack_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `Crack` but for the faces."""
+    material, joint = scene.table("material"), scene.table("joint")
+    options = {key: material[key] for key in ("young", "poisson", "basic_friction_angle") if key in material}
+    return options | ({"block": joint["block"]} if "block" in joint else {})
