@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fractalcontact.base.checks import Problems
 
 UNIFORM = 1e-6  # largest departure of a centre from its place, in spacings
+DECADES = 100  # lengths between 1e-100 and 1e100 m have squares and cubes that are numbers
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -89,6 +90,9 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
     spacing = float(centres[-1] - centres[0]) / (n - 1)
     if not np.isfinite(spacing) or spacing <= 0:
         problems.add(name, "finite, ascending cell centres", f"{centres[0]:g} ... {centres[-1]:g}")
+        return 1.0, False
+    if not _within(spacing, DECADES):
+        problems.add(name, f"a spacing of {_decades(DECADES)}", f"{spacing:g}")
         return 1.0, False
     departure = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
     allowed = UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max())
@@ -182,6 +186,7 @@ def check_surface(
     smallest: int = 3,
     leading: bool = False,
     profile: bool = False,
+    decades: int = DECADES,
 ) -> Grid:
     """Check heights in metres on a uniform plane and return their grid.
 
@@ -197,6 +202,8 @@ def check_surface(
         Allow dims before (y, x).
     profile : bool
         Allow a profile, dims (..., x) without y.
+    decades : int
+        Powers of ten of a metre, up and down, that heights and their range may have.
     """
     import xarray as xr
 
@@ -212,8 +219,34 @@ def check_surface(
     problems.require(units in METRES, f"{argument}.units", "'m'", units)
     if not np.issubdtype(surface.dtype, np.number) or np.issubdtype(surface.dtype, np.complexfloating):
         problems.add(argument, "real numbers", f"type {surface.dtype}")
-    elif finite:
-        problems.finite(argument, surface.values, remedy="see fractalcontact.surfaces.fill")
+    else:
+        if finite:
+            problems.finite(argument, surface.values, remedy="see fractalcontact.surfaces.fill")
+        if surface.chunks is None:
+            _check_size(surface.values, problems, argument, decades)
     for dim, n in zip(dims, grid.shape, strict=True):
         problems.require(n >= smallest, f"{argument}.{dim}", f"at least {smallest} points", n)
     return grid
+
+
+def _check_size(heights: Array, problems: Problems, argument: str, decades: int) -> None:
+    """Note heights, or a range of them, whose powers no double can hold; what is not finite is left out."""
+    if heights.size == 0:
+        return
+    low, high = float(heights.min()), float(heights.max())
+    if not (np.isfinite(low) and np.isfinite(high)):
+        there = heights[np.isfinite(heights)]
+        low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
+    largest = max(abs(low), abs(high))
+    for size, what in ((largest, "heights"), (high / 2.0 - low / 2.0, "a range of heights")):
+        if size and not _within(size, decades):
+            problems.add(argument, f"{what} of 0 or of {_decades(decades)}", f"{size:g} m")
+            return
+
+
+def _within(length: float, decades: int) -> bool:
+    return 10.0**-decades <= length <= 10.0**decades
+
+
+def _decades(decades: int) -> str:
+    return f"1e-{decades} to 1e{decades} m"

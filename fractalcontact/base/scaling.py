@@ -43,8 +43,7 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
     """
     scale, value = np.asarray(scale, float), np.asarray(value, float)
     weights = np.ones(scale.shape) if weights is None else np.asarray(weights, float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x, y = np.log(scale), np.log(value)
+    (x, x_unit), (y, y_unit) = logarithm(scale), logarithm(value)
     good = np.isfinite(x) & np.isfinite(y) & (weights > 0)
     x, y, w = x[good], y[good], weights[good]
     if x.size < 2 or np.ptp(x) == 0:
@@ -55,7 +54,8 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
     slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
     residual = y - y_mean - slope * (x - x_mean)
     error = np.sqrt(float(w @ residual**2) / spread / (x.size - 2)) if x.size > 2 else np.nan
-    return Line(slope, y_mean - slope * x_mean, float(error), int(x.size))
+    intercept = y_mean - slope * x_mean + (y_unit - slope * x_unit) * np.log(2.0)
+    return Line(slope, float(intercept), float(error), int(x.size))
 
 
 def local_slope(scale: Array, value: Array) -> Array:
@@ -66,6 +66,13 @@ def local_slope(scale: Array, value: Array) -> Array:
     scale, value = np.asarray(scale, float), np.asarray(value, float)
     if scale.size < 2:
         return np.full(value.shape, np.nan)
+    y = logarithm(value)[0]
+    return np.asarray(np.gradient(np.where(np.isfinite(y), y, np.nan), logarithm(scale)[0], axis=-1))
+
+
+def logarithm(values: Array) -> tuple[Array, int]:
+    """Return ln (values / 2^k) and k, which takes the unit out: so no unit changes a bit of a slope."""
+    there = values[np.isfinite(values) & (values > 0)]
+    unit = int(np.frexp(there.min())[1]) if there.size else 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        y = np.where(value > 0, np.log(value), np.nan)
-    return np.asarray(np.gradient(y, np.log(scale), axis=-1))
+        return np.log(np.ldexp(values, -unit)), unit

@@ -76,9 +76,11 @@ class Estimate:
         """Return the lag at which the rms increment equals the lag, in m; NaN at H = 1."""
         if not (self.increment > 0 and self.hurst < 1.0):
             return float("nan")
-        # in logarithms: close to H = 1 the power is huge or tiny
-        length = np.log(spacing) + np.log(self.increment / spacing) / (1.0 - self.hurst)
-        return float(np.exp(length)) if abs(length) < 690.0 else float("nan")
+        # in logarithms: close to H = 1 the power is huge or tiny; a power of two takes the unit out
+        part, unit = np.frexp(spacing)
+        length = np.log(part) + np.log(self.increment / spacing) / (1.0 - self.hurst)
+        within = abs(length) < 690.0 and abs(length + unit * np.log(2.0)) < 690.0
+        return float(np.ldexp(np.exp(length), unit)) if within else float("nan")
 
 
 def normal_interval(hurst: float, error: float) -> tuple[float, float]:

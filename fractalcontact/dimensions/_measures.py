@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import spectra
+from fractalcontact.base.scaling import logarithm
 from fractalcontact.dimensions import _covers, _lags
 from fractalcontact.dimensions._faces import Face
 
@@ -86,8 +87,7 @@ def without_trend(heights: Array, *, plane: bool) -> Array:
 
 def wide_slope(scale: Array, value: Array, count: Array) -> Array:
     """Return the local slope of a line through the points within a factor of sqrt 2, weighted by counts."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x, y = np.log(scale), np.log(value)
+    (x, _), (y, _) = logarithm(scale), logarithm(value)
     good = np.isfinite(y)
     weights = np.where(good, count, 0.0)
     y = np.where(good, y, 0.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import fractalcontact as fc
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import check_surface, contact_edges, grid_of, plane_coords, resolve_periodic
@@ -82,3 +83,34 @@ def test_edges_of_a_mask_counted_by_hand():
     np.testing.assert_array_equal(contact_edges(mask, (True, True)), [4, 4])
     stack = np.stack([mask, ~mask, np.zeros((3, 3), bool)])
     np.testing.assert_array_equal(contact_edges(stack), [[3, 2], [3, 2], [0, 0]])
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-310, 1e-150, 1e150, 1e300])
+@pytest.mark.parametrize(
+    "use",
+    [
+        fc.surfaces.describe,
+        fc.surfaces.level,
+        fc.surfaces.despike,
+        fc.joints.roughness_coefficient,
+        lambda face: fc.contact.press(face, contact_modulus=1e9, closure=1e-6),
+        lambda face: fc.joints.Crack(face, young=1e9, poisson=0.2),
+        lambda face: fc.joints.register(face, face),
+        fc.joints.transmissivity,
+    ],
+)
+def test_sizes_whose_squares_are_no_numbers_are_refused_in_words(use, size):
+    heights = np.random.default_rng(1).random((24, 24))
+    with pytest.raises(InvalidInput, match="expected heights of 0 or of 1e-100 to 1e100 m"):
+        use(fc.surfaces.from_array(size * heights, 1.0))
+    if 1e-300 < size < 1e200:
+        with pytest.raises(InvalidInput, match="expected a spacing of 1e-100 to 1e100 m"):
+            use(fc.surfaces.from_array(heights, size))
+
+
+def test_a_range_that_is_below_all_squares_is_refused_and_a_flat_is_not():
+    heights = np.where(np.eye(8) > 0, 1e-120, 0.0)
+    with pytest.raises(InvalidInput, match="heights of 0 or"):
+        fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
+    assert fc.surfaces.describe(fc.surfaces.from_array(0.0 * heights, 1.0)).rms_height == 0.0
+    assert np.isnan(fc.surfaces.describe(fc.surfaces.from_array(heights + np.nan, 1.0)).rms_height)

@@ -82,6 +82,19 @@ def test_a_power_law_has_one_local_slope():
     assert np.isnan(scaling.fit_line(scale[:1], scale[:1]).slope)
 
 
+@pytest.mark.parametrize("powers", [(-20, 0), (13, -7), (-300, 200)])
+def test_no_unit_changes_a_bit_of_a_slope(powers):
+    stream = np.random.default_rng(6)
+    scale, value = np.sort(stream.random(9)), stream.random((3, 9))
+    theirs = [np.ldexp(part, power) for part, power in zip((scale, value), powers, strict=True)]
+    np.testing.assert_array_equal(scaling.local_slope(scale, value), scaling.local_slope(*theirs))
+    ours, other = scaling.fit_line(scale, value[0]), scaling.fit_line(theirs[0], theirs[1][0])
+    assert (ours.slope, ours.standard_error) == (other.slope, other.standard_error)
+    assert other.intercept == pytest.approx(
+        ours.intercept + (powers[1] - other.slope * powers[0]) * np.log(2.0), rel=1e-9
+    )
+
+
 def test_importing_the_package_loads_nothing_heavy():
     code = f"import sys, fractalcontact; print([m for m in {HEAVY!r} if m in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
