@@ -40,7 +40,8 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     Raises
     ------
     InvalidInput
-        `result` is not labelled data, the name does not end in `.nc`, or the folder cannot be written.
+        `result` is not labelled data or holds what no NetCDF file can (an attribute that is a dict, for
+        one), the name does not end in `.nc`, or the folder cannot be written.
     """
     import xarray as xr
 
@@ -57,6 +58,9 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
         clear_partial(target.parent)
         _as_file(result).to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
         temporary.replace(target)
+    except (TypeError, ValueError) as error:
+        expected = "names, values and attributes that a NetCDF file can hold"
+        raise InvalidInput(where, [f"result: expected {expected}, got: {error}"]) from error
     except (OSError, RuntimeError) as error:  # the library tells a full disk as a RuntimeError
         reason = _why_not(target.parent, error)
         raise InvalidInput(where, [f"path: {target.name!r} cannot be written here: {reason}"]) from error

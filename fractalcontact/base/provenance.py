@@ -84,7 +84,7 @@ def plain(value: Any) -> Any:
     if hasattr(value, "dims") and hasattr(value, "attrs"):
         summary: dict[str, Any] = {"dims": {str(k): int(v) for k, v in value.sizes.items()}}
         if "provenance" in value.attrs:
-            summary["provenance"] = json.loads(value.attrs["provenance"])
+            summary["provenance"] = _read(value.attrs["provenance"])
         return summary
     if isinstance(value, np.ndarray):
         return value.tolist() if value.size <= 64 else {"shape": list(value.shape), "dtype": str(value.dtype)}
@@ -99,6 +99,14 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
+
+
+def _read(provenance: Any) -> Any:
+    """Return the provenance of an input; what others wrote under that name stays as it is."""
+    try:
+        return json.loads(provenance)
+    except (TypeError, ValueError):
+        return plain(provenance)
 
 
 def _version() -> str:

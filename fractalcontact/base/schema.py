@@ -354,7 +354,8 @@ def label(data: T) -> T:
     Parameters
     ----------
     data : Dataset or DataArray
-        Every variable and coordinate is known to the table; a DataArray by its `name`.
+        Every variable and coordinate is known to the table; a DataArray by its `name`. The coordinate of a
+        dim may have a name of the user's own: it keeps its own units and meaning.
 
     Returns
     -------
@@ -368,7 +369,10 @@ def label(data: T) -> T:
     """
     data = data.copy(deep=False)
     for name, coordinate in data.coords.items():
-        _label_variable(str(name), coordinate.variable, is_coordinate=True)
+        if name not in QUANTITIES and coordinate.dims == (name,):
+            _label_own(str(name), coordinate.variable)
+        else:
+            _label_variable(str(name), coordinate.variable, is_coordinate=True)
     if hasattr(data, "data_vars"):
         for name, variable in data.data_vars.items():
             _label_variable(str(name), variable.variable, is_coordinate=False)
@@ -398,6 +402,15 @@ def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) ->
         attributes["period"] = float(variable.attrs["period"])
     variable.attrs = attributes
     variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
+
+
+def _label_own(name: str, variable: xr.Variable) -> None:
+    """Label the coordinate of a dim that the table does not know."""
+    attributes = {"long_name": str(variable.attrs.get("long_name", name))}
+    if variable.dtype.kind in "biuf":
+        attributes["units"] = str(variable.attrs.get("units", "1"))
+    variable.attrs = attributes
+    variable.encoding = _encoding(variable, is_coordinate=True)
 
 
 def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:

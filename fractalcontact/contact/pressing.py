@@ -220,7 +220,7 @@ def _dataset(
     if plan.path.body.influence == "disc":
         variables["disc_radius"] = plan.path.body.radius * plan.path.units.length
     if maps:
-        coords |= {dim: surface.coords[dim] for dim in ("y", "x")}
+        coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
         variables |= {name: (("step", "y", "x"), np.stack(planes)) for name, planes in maps.items()}
     return xr.Dataset(variables, coords)
 

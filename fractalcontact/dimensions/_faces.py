@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fractalcontact.base.grid import Grid, check_surface
+from fractalcontact.base.inheritance import check_leading
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[Any]]
 ROUNDING = 1e-12  # of the range of heights
+DECADES = 250  # powers of ten of a metre: heights are scaled before anything is done with them
 LEAST, MOST = 2.0**-450, 2.0**450  # m: ranges of heights whose squares and fourth powers are numbers
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
 
@@ -172,8 +174,11 @@ def read_faces(
     gaps: bool = True,
     leading: bool = True,
     squares: bool = False,
+    taken: Collection[str] = (),
 ) -> list[Face]:
-    """Check a surface and split it along its leading dims; `squares` of its heights in m must be numbers.
+    """Check a surface and split it along its leading dims.
+
+    `squares` of its heights in m must be numbers; `taken` are names of the result, which no dim may bear.
 
     Returns
     -------
@@ -181,7 +186,10 @@ def read_faces(
         In the order of the leading dims flattened; empty if something is wrong.
     """
     before = len(problems.found)
-    grid = check_surface(surface, problems, finite=False, smallest=smallest, leading=leading, profile=True)
+    grid = check_surface(
+        surface, problems, finite=False, smallest=smallest, leading=leading, profile=True, decades=DECADES
+    )
+    check_leading(surface, taken, problems)
     if len(problems.found) > before:
         return []
     if not is_lazy(surface):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fractalcontact.base import schema
+from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.provenance import PAPER, stamp
 from fractalcontact.dimensions._faces import Face
 from fractalcontact.dimensions._measures import Curve
@@ -41,16 +42,8 @@ def stack(
         data[name] = ((*outer, dim), stacked.reshape(*sizes, -1))
     if np.isfinite(curves[0].factor):
         data["vertical_scale"] = (outer, np.reshape([curve.factor for curve in curves], sizes))
-    return xr.Dataset(data, coords={**outer_coords(surface, outer), dim: curves[0].scale})
-
-
-def outer_coords(surface: xr.DataArray, outer: Sequence[Hashable]) -> dict[Any, Any]:
-    """Return the coordinates along the leading dims whose names the house knows."""
-    return {
-        name: c.variable
-        for name, c in surface.coords.items()
-        if name in schema.QUANTITIES and set(c.dims) <= set(outer)
-    }
+    taken = (*data, dim, "wavelength", "local_slope", "run_time")
+    return xr.Dataset(data, coords={**leading_coords(surface, outer, taken), dim: curves[0].scale})
 
 
 def finish(

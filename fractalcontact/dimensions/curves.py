@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = np.ndarray[Any, np.dtype[Any]]
+SPECTRA = ("power_spectral_density", "profile_power_spectral_density")
+ALL = ("local_slope", "run_time")  # what every curve has
 
 
 def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
@@ -58,7 +60,8 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
     """
     with Problems("fractalcontact.dimensions.spectrum") as problems:
-        faces = read_faces(surface, problems, smallest=4, gaps=False, squares=True)
+        taken = (*SPECTRA, "wavenumber", "wavelength", "mode_count", *ALL)
+        faces = read_faces(surface, problems, smallest=4, gaps=False, squares=True, taken=taken)
         given = problems.choice("window", "none" if window is None else window, ("auto", "hann", "none"))
         edge = None if tile is None else problems.integer("tile", tile, at_least=8)
         if faces and edge is not None:
@@ -67,7 +70,7 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
             )
     started = time.perf_counter()
     curves = [_measures.spectrum(face, given, edge) for face in faces]
-    name = "power_spectral_density" if faces[0].axes == 2 else "profile_power_spectral_density"
+    name = SPECTRA[2 - faces[0].axes]
     result = stack(surface, faces, "wavenumber", curves, {name: "value"}, {"mode_count": "count"})
     result = result.assign_coords(wavelength=2.0 * np.pi / result["wavenumber"])
     slopes = [_measures.wide_slope(c.scale, c.value, c.count) for c in curves]
@@ -264,7 +267,7 @@ def _lag_curve(
     name: str, surface: Any, max_lag: float | None, measure: Callable[..., Any], value: dict[str, str]
 ) -> xr.Dataset:
     with Problems(f"fractalcontact.dimensions.{name}") as problems:
-        faces = read_faces(surface, problems, squares=True)
+        faces = read_faces(surface, problems, squares=True, taken=(*value, "lag", "pair_count", *ALL))
         longest = None if max_lag is None else problems.number("max_lag", max_lag, above=0)
         if faces and longest is not None:
             least = min(faces[0].grid.spacing)
@@ -296,7 +299,8 @@ def _window_curve(
     name: str, surface: Any, dim: str, value: dict[str, str], options: dict[str, Any], title: str
 ) -> xr.Dataset:
     with Problems(f"fractalcontact.dimensions.{name}") as problems:
-        faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name], squares=True)
+        taken = (*value, dim, "pair_count", "vertical_scale", *ALL)
+        faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name], squares=True, taken=taken)
         scale = options.get("vertical_scale")
         if scale is not None and not (name == "cube_counts" and scale == "range"):
             problems.number("vertical_scale", scale, above=0)

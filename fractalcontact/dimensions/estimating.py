@@ -12,9 +12,9 @@ import numpy as np
 
 from fractalcontact.base import schema
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.dimensions._faces import Face, read_faces, read_scales
-from fractalcontact.dimensions._tables import outer_coords
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +35,7 @@ _VALUES = {
     "noise_height": "noise",
     "misfit": "misfit",
 }
+_RESULTS = (*_VALUES, "fractal_dimension", "topothesy", "run_time", "method", "increment_lag")
 
 
 def estimate(
@@ -110,6 +111,7 @@ def estimate(
             problems,
             smallest=max((METHODS[name].smallest for name in real), default=4),
             gaps=all(METHODS[name].gaps for name in real),
+            taken=_RESULTS,
         )
         window = read_scales(problems, scales, faces)
         _enough_points(problems, faces)
@@ -189,7 +191,8 @@ def _dataset(
     data["fractal_dimension"] = dims, 1.0 + faces[0].axes - hurst
     data["topothesy"] = stacked([[one.topothesy(spacing) for one in line] for line in found])
     data["run_time"] = stacked(times)
-    coords = outer_coords(surface, outer) | {"method": np.array(names, dtype=str), "increment_lag": spacing}
+    coords: dict[str, Any] = dict(leading_coords(surface, outer, taken=data))
+    coords |= {"method": np.array(names, dtype=str), "increment_lag": spacing}
     first = ["hurst", "fractal_dimension"]
     return xr.Dataset(
         {name: data[name] for name in [*first, *(k for k in data if k not in first)]}, coords=coords

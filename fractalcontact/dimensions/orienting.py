@@ -11,12 +11,12 @@ import numpy as np
 
 from fractalcontact.base import schema
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.dimensions import _periodic, _rays, _sectors
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
 from fractalcontact.dimensions._faces import Face, read_faces, read_scales
 from fractalcontact.dimensions._fitting import LEAST_MODES, PeriodicModes, fitted
-from fractalcontact.dimensions._tables import outer_coords
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +115,7 @@ def directions(
 
     with Problems("fractalcontact.dimensions.directions") as problems:
         asked = None if azimuth is None else np.unique(np.mod(problems.numbers("azimuth", azimuth), 180.0))
-        faces = read_faces(surface, problems, smallest=SMALLEST)
+        faces = read_faces(surface, problems, smallest=SMALLEST, taken=_RESULTS)
         window = read_scales(problems, scales, faces)
         problems.require("y" in getattr(surface, "dims", ("y",)), "surface", "dims (..., y, x)", surface)
     started = time.perf_counter()
@@ -142,8 +142,10 @@ def directions(
     for name, key in _OVERALL.items():
         values = [np.nan if one.isotropy is None else getattr(one.isotropy, key) for one in found]
         data[name] = (outer, np.reshape(values, shape))
-    coords = outer_coords(surface, outer) | {"azimuth": at, "increment_lag": spacing}
-    result = schema.label(xr.Dataset({**data, "run_time": time.perf_counter() - started}, coords=coords))
+    data["run_time"] = time.perf_counter() - started
+    coords: dict[str, Any] = dict(leading_coords(surface, outer, taken=data))
+    coords |= {"azimuth": at, "increment_lag": spacing}
+    result = schema.label(xr.Dataset(data, coords=coords))
     _explain(result, found)
     return stamp(
         result,
@@ -163,6 +165,7 @@ _OVERALL = {
     "stretch_azimuth": "azimuth",
     "stretch_p_value": "stretched_p_value",
 }
+_RESULTS = (*_ALONG, *_OVERALL, "topothesy", "run_time", "azimuth", "increment_lag")
 
 
 def _unique(rays: Sequence[_rays.Ray]) -> list[_rays.Ray]:

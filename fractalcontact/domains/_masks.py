@@ -16,6 +16,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import Grid, grid_of, resolve_periodic
+from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, label
 from fractalcontact.base.threads import thread_count
 
@@ -43,8 +44,8 @@ class Planes:
     grid: Grid
     dims: tuple[str, ...]
     shape: tuple[int, ...]
-    coords: dict[str, xr.DataArray]
-    plane_coords: dict[str, xr.DataArray]
+    coords: dict[str, xr.Variable]
+    plane_coords: dict[str, xr.Variable]
 
     @property
     def count(self) -> int:
@@ -126,8 +127,8 @@ def read_mask(
         grid,
         tuple(str(dim) for dim in mask.dims[:-2]),
         tuple(mask.shape[:-2]),
-        _leading_coords(mask),
-        {dim: mask.coords[dim] for dim in CORE_DIMS} if grid.known else {},
+        leading_coords(mask, mask.dims[:-2], TAKEN),
+        {dim: mask.coords[dim].variable for dim in CORE_DIMS} if grid.known else {},
     )
 
 
@@ -184,16 +185,6 @@ def _same_places(here: Array, there: Array) -> bool:
     return bool(np.all(np.abs(here - there) <= 1e-6 * step))
 
 
-def _leading_coords(mask: xr.DataArray) -> dict[str, xr.DataArray]:
-    """Return the coordinates of the leading dims, and the known ones that live on these alone."""
-    leading = set(mask.dims[:-2])
-    return {
-        str(name): coordinate.reset_coords(drop=True)
-        for name, coordinate in mask.coords.items()
-        if (name in QUANTITIES and set(coordinate.dims) <= leading) or name in leading
-    }
-
-
 def assemble(
     planes: Planes,
     variables: dict[str, Any],
@@ -211,30 +202,20 @@ def assemble(
     import xarray as xr
 
     known, unknown = _row_coords(planes, *rows) if rows else ({}, {})
-    told = {name: values for name, values in planes.coords.items() if name in QUANTITIES}
+    used = {dim for dims, _ in variables.values() for dim in dims}
+    told = {
+        name: values
+        for name, values in planes.coords.items()
+        if name not in variables and (name in QUANTITIES or name in used)
+    }
     there = {**told, **(planes.plane_coords if on_plane else {}), **known, **(coords or {})}
     dataset = label(xr.Dataset(variables, coords=there))
-    for dim in set(planes.dims) & (set(planes.coords) - set(told)) & set(dataset.dims):
-        dataset.coords[dim] = _own(planes.coords[dim])
     for name, values in unknown.items():
         dataset.coords[name] = values
         dataset.coords[name].encoding["_FillValue"] = None
     for name, attributes in (notes or {}).items():
         dataset[name].attrs.update(attributes)
     return dataset
-
-
-def _own(coordinate: xr.DataArray) -> xr.Variable:
-    """Return the coordinate of a leading dim that the schema does not know, in its own units."""
-    import xarray as xr
-
-    name = str(coordinate.name)
-    attributes = {"long_name": str(coordinate.attrs.get("long_name", f"{name} of the mask"))}
-    if coordinate.dtype.kind in "biuf":
-        attributes["units"] = str(coordinate.attrs.get("units", "1"))
-    own = xr.Variable(coordinate.dims, coordinate.values, attributes)
-    own.encoding["_FillValue"] = None
-    return own
 
 
 def _row_coords(planes: Planes, row: str, plane: Array) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -143,8 +143,9 @@ def _compare(planes: Planes, found: list[_labels.Labels], plane: int) -> Array:
 def _returns(planes: Planes, name: str) -> Array:
     """Compare each plane with that at the same load on the way before, (planes, 3)."""
     load = planes.coords[name]
-    missing = {dim: n for dim, n in zip(planes.dims, planes.shape, strict=True) if dim not in load.dims}
-    values = load.expand_dims(missing).transpose(*planes.dims).values
+    places = [planes.shape[k] if dim in load.dims else 1 for k, dim in enumerate(planes.dims)]
+    own = load.transpose(*(dim for dim in planes.dims if dim in load.dims)).values.reshape(places)
+    values = np.broadcast_to(own, planes.shape)
     rows = np.full((planes.count, len(RETURNS)), np.nan)
     length = planes.shape[-1]
     for start in range(0, planes.count, length):

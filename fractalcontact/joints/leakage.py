@@ -10,6 +10,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface, resolve_periodic
+from fractalcontact.base.inheritance import check_leading, leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._flow import Flow, plane_flow
@@ -24,6 +25,8 @@ REFERENCES = (
     "on Applied Mathematics 61 (2001)"
 )
 ROUNDING = 1e-9  # relative to the largest opening
+RESULTS = ("axis", "transmissivity", "hydraulic_aperture", "percolates", "residual", "aperture",
+           "open_fraction", "overlap_fraction", "flow_conductance", "run_time")  # fmt: skip
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -85,6 +88,7 @@ def transmissivity(
 
     with Problems(WHERE) as problems:
         grid = check_surface(gap, problems, "gap", leading=True, smallest=1)
+        check_leading(gap, RESULTS, problems, "gap")
         axes = problems.choices("axis", axis, ("x", "y"))
         problems.require(len(axes) > 0, "axis", "at least one of 'x', 'y'", axis)
         wraps = resolve_periodic(periodic, grid, problems, "periodic")
@@ -113,7 +117,7 @@ def transmissivity(
             "open_fraction": (leading, (values > 0).mean(axis=(-2, -1))),
             "overlap_fraction": (leading, (values < slight).mean(axis=(-2, -1))),
         },
-        coords={name: coord for name, coord in gap.coords.items() if not {"y", "x"} & set(coord.dims)},
+        coords=leading_coords(gap, leading, taken=RESULTS),
     ).assign_coords(axis=np.array(axes))
     if viscosity is not None:
         result["flow_conductance"] = result["transmissivity"] / viscosity

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints import _laws
@@ -74,9 +75,7 @@ def closure_laws(closure: xr.Dataset) -> xr.Dataset:
     columns = np.reshape(fits, (*shape, len(FITS)))
     found: dict[str, Any] = {name: (inner.dims[:-1], columns[..., i]) for i, name in enumerate(FITS)}
     found["stiffness"] = inner.dims, np.reshape(stiffness, inner.shape)
-    result = xr.Dataset(
-        found, {name: c for name, c in closure.coords.items() if not {"y", "x"} & set(c.dims)}
-    )
+    result = xr.Dataset(found, leading_coords(closure, inner.dims, taken=found))
     parameters = {"closure": closure}
     result = stamp(label(result), WHERE, parameters, title="laws of closure", references=REFERENCES)
     for name, variable in result.data_vars.items():

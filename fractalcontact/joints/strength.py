@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.inheritance import familiar
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._slopes import fitted_slopes, neighbour_slopes
@@ -78,7 +79,7 @@ def friction(
         name, shears = check_dilatancy(dilatancy, problems)
         basic = 0.0 if problems.found else basic_angle(dilatancy, basic_friction_angle, problems)
         values = check_options(name, smoothing, nominal_pressure, problems)
-    heights = dilatancy[name].transpose("shear", ...)
+    heights = familiar(dilatancy[name]).transpose("shear", ...)
     curves = heights.values.reshape(shears.size, -1)
     slopes, lengths = (
         neighbour_slopes(shears, curves)
@@ -89,7 +90,7 @@ def friction(
     angle = angle.transpose(*dilatancy[name].dims)
     total = angle + basic
     result = xr.Dataset({"dilatancy_angle": angle, "friction_angle": total})
-    pressure = dilatancy["nominal_pressure"] if name == "dilatancy" else None
+    pressure = familiar(dilatancy["nominal_pressure"]) if name == "dilatancy" else None
     if values is not None:
         pressure = xr.DataArray(values, dims="step", coords={"step": np.arange(values.size)})
         result = result.assign_coords(nominal_pressure=pressure)

@@ -13,6 +13,8 @@ from fractalcontact.base.polynomial import shifted, slopes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+_OF_HEIGHTS = ("mean_height", "rms_height", "peak_to_valley", "skewness", "kurtosis")
+
 
 def statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> dict[str, float]:
     """Return the statistics of a plane (ny, nx) or a profile (nx,); NaN where there is nothing to say.
@@ -44,6 +46,11 @@ def statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[bool
     return result
 
 
+def names(axes: int) -> list[str]:
+    """Return the names of all statistics of a plane (2 axes) or a profile."""
+    return [*_OF_HEIGHTS, "missing_points", *_gradient_names(axes)]
+
+
 def _gradient_names(axes: int) -> list[str]:
     names = ["rms_slope", "rms_curvature", "nayak_parameter", "developed_area_ratio"]
     return names + [f"{kind}_slope_{dim}" for dim in ("y", "x")[2 - axes :] for kind in ("rms", "mean")]
@@ -52,8 +59,7 @@ def _gradient_names(axes: int) -> list[str]:
 def _heights(heights: Array) -> dict[str, float]:
     """Return what the heights alone tell."""
     observed = heights[~np.isnan(heights)]
-    names = ("mean_height", "rms_height", "peak_to_valley", "skewness", "kurtosis")
-    result = dict.fromkeys(names, math.nan) | {"missing_points": float(heights.size - observed.size)}
+    result = dict.fromkeys(_OF_HEIGHTS, math.nan) | {"missing_points": float(heights.size - observed.size)}
     if observed.size == 0:
         return result
     values, reference, scale = shifted(observed)

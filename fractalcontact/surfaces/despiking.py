@@ -9,6 +9,7 @@ import numpy as np
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface
+from fractalcontact.base.inheritance import familiar
 from fractalcontact.surfaces._spikes import spikes
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -
         problems.require(infinite == 0, "surface", "no infinite heights", f"{infinite}")
         problems.require(bool(np.isfinite(heights).any()), "surface", "heights", "none")
     flagged, usual = spikes(heights, width, least)
-    result = surface.copy(data=np.where(flagged, np.nan, heights)).rename("height")
+    result = familiar(surface.copy(data=np.where(flagged, np.nan, heights)).rename("height"))
     result = schema.label(result.assign_coords(removed_points=int(flagged.sum())))
     parameters = {"surface": surface, "threshold": least, "window": width}
     return provenance.stamp(

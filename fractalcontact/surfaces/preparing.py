@@ -9,6 +9,7 @@ import numpy as np
 from fractalcontact.base import polynomial, provenance, schema
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface
+from fractalcontact.base.inheritance import familiar
 from fractalcontact.surfaces import _gaps
 
 if TYPE_CHECKING:
@@ -154,6 +155,6 @@ def _finished(
     **facts: Any,
 ) -> xr.DataArray:
     """Return the result with its labels and where it comes from."""
-    result = schema.label(result.rename("height"))
+    result = schema.label(familiar(result.rename("height")))
     parameters = {"surface": surface, **parameters}
     return provenance.stamp(result, f"fractalcontact.surfaces.{call}", parameters, title=title, **facts)

@@ -10,6 +10,7 @@ import numpy as np
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface
+from fractalcontact.base.inheritance import check_leading, leading_coords
 from fractalcontact.surfaces import _moments
 
 if TYPE_CHECKING:
@@ -61,6 +62,8 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
 
     with Problems("fractalcontact.surfaces.describe") as problems:
         grid = check_surface(surface, problems, finite=False, leading=True, profile=True)
+        taken = (*_moments.names(len(grid.shape)), "run_time")
+        check_leading(surface, taken, problems)
         if not problems.found:
             infinite = int(np.count_nonzero(np.isinf(surface.values)))
             problems.require(
@@ -75,13 +78,10 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     lengths = surface.shape[: len(leading)]
     values = {name: np.array([one[name] for one in found]).reshape(lengths) for name in found[0]}
     values["missing_points"] = values["missing_points"].astype(np.int64)
-    coords = {
-        name: c
-        for name, c in surface.coords.items()
-        if name in schema.QUANTITIES and set(c.dims) <= set(leading)
-    }
-    result = xr.Dataset({name: (leading, value) for name, value in values.items()}, coords=coords)
-    result["run_time"] = elapsed
+    result = xr.Dataset(
+        {name: (leading, value) for name, value in values.items()} | {"run_time": elapsed},
+        coords=leading_coords(surface, leading, taken),
+    )
     result = schema.label(result)
     _explain(result, planes)
     method = "modes" if all(grid.periodic) and not np.isnan(planes).any() else "differences"

@@ -176,7 +176,7 @@ def test_the_coordinate_of_any_leading_dim_is_kept(mask, tmp_path):
     hours = mask.rename(step="time").drop_vars("closure").assign_coords(time=[0.5, 2.0])
     hours["time"].attrs.update(units="h", history="somewhere")
     result = fc.domains.describe(hours)
-    assert result.time.attrs == {"units": "h", "long_name": "time of the mask"}
+    assert result.time.attrs == {"units": "h", "long_name": "time"}
     fc.save(result, tmp_path / "hours.nc")
     assert fc.open(tmp_path / "hours.nc").coverage.sel(time=2.0) == result.coverage[1]
 
