@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.memory import leave_dask
 from fractalcontact.base.stopping import Stopped, leaving
 
 WRONG_INPUT, STOPPED = 2, 128
@@ -23,6 +24,8 @@ WRONG_INPUT, STOPPED = 2, 128
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    if arguments is None:
+        leave_dask()
     options = _parser().parse_args(arguments)
     warnings.showwarning = _say_warning
     try:
@@ -108,23 +111,15 @@ def _run(options: argparse.Namespace) -> int:
         figures = len(list(Path(options.out).glob("*.png")))
         size = (Path(options.out) / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""
-        print(f"\nwritten to {options.out}: {RESULT} ({size / 1e6:.2g} MB){drawn}{_most_memory()}")
+        print(f"\nwritten to {options.out}: {RESULT} ({size / 1e6:.2g} MB){drawn}{_memory()}")
     return 0
 
 
-def _most_memory() -> str:
+def _memory() -> str:
     """Return the most memory that this process has held, where the system tells."""
-    status = Path("/proc/self/status")
-    if status.is_file():
-        # the kernel's usage of resources would begin with what the parent held when it started this process
-        lines = dict(line.split(":", 1) for line in status.read_text(encoding="utf-8").splitlines())
-        most = int(lines.get("VmHWM", "0 kB").split()[0]) * 1024
-    else:
-        try:
-            import resource
-        except ImportError:
-            return ""
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    from fractalcontact.base.memory import most_memory
+
+    most = most_memory()
     return f"; at most {most / 1e6:.0f} MB of memory" if most else ""
 
 

@@ -31,6 +31,8 @@ def writes_in_place() -> bool:
 
 def fast_length(n: int, *, real: bool = True) -> int:
     """Return the smallest length >= n that transforms fast."""
+    if library() == "ducc0":
+        return int(_ducc0().good_size(int(n), real))
     return int(_scipy().next_fast_len(int(n), real=real))
 
 

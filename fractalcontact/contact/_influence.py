@@ -16,6 +16,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 DISC_RADII = ("second_order", "inscribed", "equal_area")
 GREATEST_RATIO = 2.0  # of the spacings, for which the second-order radius exists
+SQUARE_RADIUS = 0.4365941077293225  # the second-order radius on a square grid
 NEAR = 12  # cells summed one by one before the tail of a lattice sum
 
 
@@ -82,8 +83,10 @@ def second_order_radius(ratio: float) -> float:
     """Radius, over the square root of the cell area, that makes the plates second-order accurate.
 
     It is the smaller root of the lattice sum that states: under uniform pressure the plates settle as much
-    as the half-space does. 0.4365941 for equal spacings.
+    as the half-space does. For equal spacings it is known beforehand.
     """
+    if ratio == 1.0:
+        return SQUARE_RADIUS
     from scipy.optimize import brentq
 
     smallest = 1.0 / np.sqrt(ratio)

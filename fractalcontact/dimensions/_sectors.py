@@ -187,9 +187,9 @@ def _excess(power: Array, radius: Array, angle: Array, weights: Array, hurst: fl
 
 def _chance(score: Array, spread: Array, free: int) -> float:
     """Return how likely scores as large are by chance; the first `free` of them were made zero by a fit."""
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     if free:
         rest = spread[free:, :free] @ np.linalg.inv(spread[:free, :free])
         score, spread = score[free:] - rest @ score[:free], spread[free:, free:] - rest @ spread[:free, free:]
-    return float(chi2.sf(score @ np.linalg.pinv(spread) @ score, score.size))
+    return float(chdtrc(score.size, score @ np.linalg.pinv(spread) @ score))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from fractalcontact.base.grid import Grid
 from fractalcontact.domains._masks import Array
@@ -74,4 +74,4 @@ def dimension(pairs: Array, differing: Array) -> tuple[float, float]:
     error = np.sqrt((left.size - 1) / left.size * total) * (1.0 + WIDER * max(0.0, SMOOTH - (2.0 - raw)))
     freedom = max(total**2 / float((departure**2).sum()), 1.0)
     bend = raw - 0.5 * float(exponent(1.0 - np.cos(np.pi * np.minimum(share, 0.5))))
-    return 2.0 - raw, float(np.hypot(stats.t.ppf(0.975, freedom) * error, 1.5 * bend))
+    return 2.0 - raw, float(np.hypot(stdtrit(freedom, 0.975) * error, 1.5 * bend))

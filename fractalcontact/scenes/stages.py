@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 MEMBER = "member"
-WHOLE = ("islands", "evolution")  # what follows the set from step to step reads all its maps at once
+WHOLE = ("islands", "lineage", "evolution")  # what follows the set along a path reads all maps at once
 Part = Callable[[], "xr.Dataset"]
 
 

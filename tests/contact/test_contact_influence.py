@@ -47,6 +47,8 @@ def test_love_rectangle_against_quadrature_far_away():
 
 def test_the_second_order_radius_of_a_square_grid():
     assert influence.second_order_radius(1.0) == pytest.approx(0.4365941, abs=5e-8)
+    nearly = influence.second_order_radius(np.nextafter(1.0, 2.0))  # the root of the lattice sum
+    assert influence.second_order_radius(1.0) == pytest.approx(nearly, rel=1e-14)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.3, 2.0])

@@ -108,3 +108,10 @@ def test_workers_give_the_same_bytes(ensemble):
         for name, variable in node.to_dataset(inherit=False).variables.items():
             if not str(name).endswith("run_time"):
                 assert variable.values.tobytes() == there[node.path][name].values.tobytes(), (node.path, name)
+
+
+def test_the_lineage_of_several_shears_is_joined(tmp_path):
+    text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["lineage"]')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    found = fc.scenes.run(tmp_path / "study.toml", progress=False)["domains/lineage"]
+    np.testing.assert_array_equal(np.unique(found["link_shear"]), [1e-4, 4e-4])
