@@ -224,8 +224,9 @@ def check_surface(
             problems.finite(argument, surface.values, remedy="see fractalcontact.surfaces.fill")
         if surface.chunks is None:
             _check_size(surface.values, problems, argument, decades)
-    for dim, n in zip(dims, grid.shape, strict=True):
-        problems.require(n >= smallest, f"{argument}.{dim}", f"at least {smallest} points", n)
+    if surface.dims[-len(dims) :] == dims:
+        for dim, n in zip(dims, grid.shape, strict=True):
+            problems.require(n >= smallest, f"{argument}.{dim}", f"at least {smallest} points", n)
     return grid
 
 

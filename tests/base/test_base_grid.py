@@ -67,6 +67,15 @@ def test_every_fault_of_a_surface_is_named(spoil, word):
         check_surface(spoil(plane()), problems)
 
 
+@pytest.mark.parametrize("dims", [("x", "y"), ("row", "column")])
+def test_wrong_dims_are_one_fault(dims):
+    """The sizes of other axes are not held against the face."""
+    face = xr.DataArray(np.zeros((6, 5)), dims=dims)
+    with pytest.raises(InvalidInput) as caught, Problems("test") as problems:
+        check_surface(face, problems, smallest=4)
+    assert len(caught.value.problems) == 1
+
+
 def test_periodic_may_be_called_free_but_never_the_reverse():
     face = plane()
     with Problems("test") as problems:
