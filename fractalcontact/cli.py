@@ -72,6 +72,12 @@ def _parser() -> argparse.ArgumentParser:
     accuracy.add_argument(
         "--large", action="store_true", help="with --extreme: those of minutes and gigabytes too"
     )
+    accuracy.add_argument(
+        "--lean",
+        nargs="+",
+        metavar="SCENE",
+        help="tell what scenes load, compile, allocate and write, beside the least they need",
+    )
     accuracy.add_argument("--curves", metavar="FILE", help="write the curves that scenes choose from")
     bench = accuracy.add_argument_group("of estimators")
     bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
@@ -163,6 +169,8 @@ def _accuracy(options: argparse.Namespace) -> int:
         findings = examine_apart([name for name, case in cases if options.large or not case.large])
         print(cases_table(findings))
         return 0 if all(one.ok for found in findings.values() for one in found) else 1
+    if options.lean:
+        return _lean(options)
     if options.parts == ["estimators"]:
         return _estimators(options)
     result = accuracy.measure(options.parts or None, budget=options.budget)
@@ -181,6 +189,23 @@ def _accuracy(options: argparse.Namespace) -> int:
             written.append(f"{name}.png")
             error_against_time(part.to_dataset()).savefig(folder / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
+    return 0
+
+
+def _lean(options: argparse.Namespace) -> int:
+    from fractalcontact.scenes.weighing import footprint, lean_table
+
+    scenes = [_checked_scene(path) for path in options.lean]
+    found = {scene.name: footprint(scene) for scene in scenes}
+    print(lean_table(found))
+    if options.out is not None:
+        import xarray as xr
+
+        from fractalcontact.base.netcdf import save
+
+        tree = xr.DataTree.from_dict({f"/{name}": one for name, one in found.items()})
+        written = save(tree, Path(options.out) / "lean.nc").name
+        print(f"\nwritten to {options.out}: {written}")
     return 0
 
 

@@ -30,6 +30,7 @@ class Quantity:
 
 
 OPEN, CONTACT, YIELDED = 0, 1, 2
+SMALL = 4096  # bytes of what is no map, up to which compressing takes more room than it saves
 _STATE = {
     "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
     "flag_meanings": "open contact yielded",
@@ -322,6 +323,29 @@ QUANTITIES: dict[str, Quantity] = {
     "error": Quantity("1", "true error"),
     "memory": Quantity("byte", "peak memory"),
     "first_run_time": Quantity("s", "run time of the first call, with compilation"),
+    "library": Quantity(None, "library loaded, with its part"),
+    "library_needed": Quantity("1", "the wanted results need the library"),
+    "library_count": Quantity("1", "number of libraries loaded"),
+    "least_library_count": Quantity("1", "number of libraries that the wanted results need"),
+    "kernel": Quantity(None, "compiled kernel"),
+    "kernel_needed": Quantity("1", "the kernel is one of a stage that the wanted results need"),
+    "kernel_forms": Quantity("1", "number of argument types a kernel was compiled for"),
+    "kernel_count": Quantity("1", "number of compiled forms of kernels"),
+    "least_kernel_count": Quantity("1", "number of kernels that the wanted results need"),
+    "warm_kernel_count": Quantity("1", "number of kernels compiled by a second run"),
+    "compile_time": Quantity("s", "processor time that a second run does not take"),
+    "stage": Quantity(None, "stage of a scene"),
+    "stage_needed": Quantity("1", "the wanted results need the stage"),
+    "stage_count": Quantity("1", "number of stages run"),
+    "least_stage_count": Quantity("1", "number of stages that the wanted results need"),
+    "least_memory": Quantity("byte", "peak memory of loading the libraries that are needed"),
+    "array_memory": Quantity("byte", "peak memory of arrays and Python objects"),
+    "least_array_memory": Quantity("byte", "memory of the face and of the wanted results"),
+    "face_memory": Quantity("byte", "memory of the heights of the face"),
+    "written_size": Quantity("byte", "bytes written, to files that were removed too"),
+    "file_size": Quantity("byte", "size of the files"),
+    "result_size": Quantity("byte", "size of the wanted numbers"),
+    "repeated_size": Quantity("byte", "size of the coordinates that stand in several groups"),
     "knob": Quantity("1", "setting that trades error for time"),
     "setting": Quantity("1", "number of the setting, in the order of growing cost"),
     "contest": Quantity(None, "methods that are after the same truth"),
@@ -419,8 +443,11 @@ def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:
     encoding: dict[str, Any] = {}
     if is_coordinate or variable.dtype.kind != "f":
         encoding["_FillValue"] = None
-    if variable.ndim and not is_coordinate:
+    if is_coordinate or not variable.ndim:
+        return encoding
+    is_map = variable.dims[-2:] == CORE_DIMS
+    if is_map or variable.nbytes > SMALL:
         encoding.update(zlib=True, complevel=4, shuffle=True)
-        if variable.dims[-2:] == CORE_DIMS:
+        if is_map:
             encoding["chunksizes"] = (1,) * (variable.ndim - 2) + variable.shape[-2:]
     return encoding

@@ -9,6 +9,7 @@ planning    the stages that the wanted results need, and why
 stages      what each stage computes, by calling the rooms
 running     the plan carried out, one NetCDF, the figures; `keeping`: finished parts, to go on from
 reporting   the summary on the screen
+weighing   what a scene takes, beside the least of `needing`; `probing`: the process it runs in
 statements  what the founding paper says beside what a study finds
 
 Nothing is computed, imported, compiled or stored that no wanted result needs. A scene is TOML:
