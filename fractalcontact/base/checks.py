@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+LARGEST_WHOLE = 1 << 53  # beyond it a double knows no neighbours
+
+
 class Problems:
     """Collects what is wrong with a call; raises it all on leaving the `with` block."""
 
@@ -86,7 +89,7 @@ class Problems:
             if isinstance(value, (bool, str, bytes)) or np.iscomplexobj(value):
                 raise TypeError
             values = np.atleast_1d(np.asarray(value, dtype=np.float64))
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             self.add(argument, expected, value)
             return np.ones(1)
         if values.ndim > 1:
@@ -102,7 +105,7 @@ class Problems:
         good &= True if at_most is None else values <= at_most
         if not good.all():
             self.add(argument, expected, values[~good][0] if values.size > 1 else values[0])
-        return values
+        return np.where(good, values, _stand_in(above, at_least, below, at_most))
 
     def integer(
         self, argument: str, value: Any, *, at_least: int | None = None, at_most: int | None = None
@@ -110,6 +113,7 @@ class Problems:
         """One whole number inside the given bounds."""
         whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
         inside = whole and (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
+        inside = inside and abs(value) < LARGEST_WHOLE
         if not inside:
             self.add(argument, _interval(None, at_least, None, at_most, what="a whole number"), value)
             return at_least if at_least is not None else 1
@@ -127,7 +131,7 @@ class Problems:
         """One word or a sequence of words, each of them allowed, without repetition."""
         words = tuple(allowed)
         given = (value,) if isinstance(value, str) else value
-        if not isinstance(given, (Sequence, np.ndarray)):
+        if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) == 0:
             self.add(argument, f"a sequence out of {', '.join(map(repr, words))}", value)
             return words[:1]
         for word in given:
@@ -157,6 +161,17 @@ def meant(word: object, words: Iterable[str]) -> str:
 
     near = get_close_matches(word, tuple(words), n=1) if isinstance(word, str) else []
     return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def _stand_in(
+    above: float | None, at_least: float | None, below: float | None, at_most: float | None
+) -> float:
+    """Return a number inside the bounds."""
+    if at_least is not None or at_most is not None:
+        return float(at_most if at_least is None else at_least)  # type: ignore[arg-type]
+    if above is not None and below is not None:
+        return above + 0.5 * (below - above)
+    return 1.0 if above is below is None else above + 1.0 if above is not None else below - 1.0  # type: ignore[operator]
 
 
 def _interval(

@@ -6,12 +6,24 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.errors import InvalidInput
+
 RNGLike = np.random.Generator | np.random.SeedSequence | np.random.BitGenerator | int | None
 
 
 def generator(rng: RNGLike) -> np.random.Generator:
-    """Return a Generator for anything `numpy.random.default_rng` takes."""
-    return np.random.default_rng(rng)
+    """Return a Generator for anything `numpy.random.default_rng` takes.
+
+    Raises
+    ------
+    InvalidInput
+        It takes no such thing.
+    """
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError) as error:
+        expected = "a Generator, a whole number >= 0 or several of them, or None"
+        raise InvalidInput("fractalcontact", [f"rng: expected {expected}, got {rng!r}"]) from error
 
 
 def record(rng: np.random.Generator) -> dict[str, Any]:

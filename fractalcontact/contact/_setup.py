@@ -16,6 +16,7 @@ from fractalcontact.contact._problem import Body, power_of_two
 Array = np.ndarray[Any, np.dtype[Any]]
 
 INFLUENCES = ("disc", "square", "spectral")
+POINT = 1e-9  # of the spacing: a plate that is smaller is a point, which has no stiffness
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ def make_body(
     problems: Problems,
 ) -> Body:
     """Scaled body with its influence chosen; notes what does not go together."""
-    chosen = problems.choice("influence", influence or ("spectral" if periodic else "disc"), INFLUENCES)
+    usual = "spectral" if periodic else "disc"
+    chosen = problems.choice("influence", usual if influence is None else influence, INFLUENCES)
     allowed = ("spectral",) if periodic else ("disc", "square")
     bodies = "periodic" if periodic else "free"
     problems.require(chosen in allowed, "influence", f"{' or '.join(allowed)} for {bodies} bodies", chosen)
@@ -84,7 +86,7 @@ def _checked_radius(
         radius = _influence.disc_radius(word, spacing)
     else:
         known = len(problems.found)
-        radius = problems.number("disc_radius", choice, above=0) / unit
+        radius = problems.number("disc_radius", choice, above=0, at_least=POINT * min(spacing) * unit) / unit
         if len(problems.found) > known:
             return 1.0
     least = _symbol(radius / float(np.sqrt(spacing[0] * spacing[1])), ratio)

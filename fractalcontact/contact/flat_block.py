@@ -63,7 +63,7 @@ def flat_stiffness(
         if problems.require(np.shape(shape) == (2,), "shape", "(ny, nx)", shape):
             for n in shape:
                 problems.integer("shape", n, at_least=3)
-        steps = problems.numbers("spacing", spacing, above=0)
+        steps = problems.numbers("spacing", spacing, above=0, at_most=1e100)
         problems.require(steps.size in (1, 2), "spacing", "one length or (dy, dx)", spacing)
         pair = (float(steps[0]), float(steps[-1]))
         if not problems.found:

@@ -145,6 +145,7 @@ def _along_axes(face: Face, longest: float | None, kind: int, factor: float, sha
     if longest is None:
         least = max(face.grid.spacing)
         longest = 4.0 * least if face.is_lazy else max(share * min(face.grid.extent), least)
+    longest = min(longest, max(face.grid.extent))
     largest = [
         min(int(longest / s * (1 + 1e-9)), (n - 1) // reach)
         for n, s in zip(face.shape, face.spacing, strict=True)

@@ -302,8 +302,8 @@ def _window_curve(
         taken = (*value, dim, "pair_count", "vertical_scale", *ALL)
         faces = read_faces(surface, problems, smallest=_measures.SMALLEST[name], squares=True, taken=taken)
         scale = options.get("vertical_scale")
-        if scale is not None and not (name == "cube_counts" and scale == "range"):
-            problems.number("vertical_scale", scale, above=0)
+        if scale is not None and not (name == "cube_counts" and isinstance(scale, str) and scale == "range"):
+            scale = problems.number("vertical_scale", scale, above=0, at_least=1e-50, at_most=1e50)
     started = time.perf_counter()
     arguments = () if scale is None else (scale,)
     curves = [_measures.MEASURES[name](face, *arguments) for face in faces]

@@ -88,7 +88,7 @@ def box_dimension(
     """
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.box_dimension") as problems:
-        problems.choice("cover", cover, _covers.COVERS)
+        cover = problems.choice("cover", cover, _covers.COVERS)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
         sizes = _sizes(scales, planes, cover, problems)
     found = _covers.curve(planes, sizes, cover)
@@ -148,7 +148,7 @@ def box_counts(
     """
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.box_counts") as problems:
-        problems.choice("cover", cover, _covers.COVERS)
+        cover = problems.choice("cover", cover, _covers.COVERS)
         planes = read_mask(mask, problems, valid=valid, periodic=periodic)
         every = np.arange(1, max(1, min(planes.grid.shape) // 2) + 1)
         chosen = _sizes(every if sizes is None else sizes, planes, cover, problems, "sizes")

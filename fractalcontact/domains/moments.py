@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)
+LARGEST = 1e4  # order of a moment: beyond it only the largest box counts
 ROUNDING = 1e-14  # no interval is narrower
 SOURCE = (
     "Hentschel and Procaccia, Physica D 8:435 (1983); Halsey et al., Phys. Rev. A 33:1141 (1986); "
@@ -68,7 +69,7 @@ def generalised_dimensions(
     """
     begin = time.perf_counter()
     with Problems("fractalcontact.domains.generalised_dimensions") as problems:
-        orders = problems.numbers("q", q)
+        orders = problems.numbers("q", q, at_least=-LARGEST, at_most=LARGEST)
         planes, measure = _read(mask, valid, problems)
         shape = planes.grid.shape
         default = 2 ** np.arange(

@@ -63,6 +63,7 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
     with Problems("fractalcontact.domains.area_dimension") as problems:
         given = list(masks) if isinstance(masks, (list, tuple)) else []
         problems.require(len(given) > 1, "masks", "a list of two masks or more", masks)
+        problems.require(isinstance(corrected, (bool, np.bool_)), "corrected", "True or False", corrected)
         found = [read_mask(mask, problems, argument=f"masks[{k}]") for k, mask in enumerate(given)]
         if not problems.found:
             _go_together(found, problems)

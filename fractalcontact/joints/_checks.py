@@ -26,6 +26,11 @@ def check_crack(crack: Any, problems: Problems) -> None:
         problems.add("crack", "a fractalcontact.joints.Crack", type(crack).__name__)
 
 
+def is_nothing(keep: Any) -> bool:
+    """Say whether no map is to be kept."""
+    return keep is None or (np.ndim(keep) > 0 and len(keep) == 0)
+
+
 def check_shear(shear: Any, crack: Any, directions: Sequence[Direction], problems: Problems) -> Array:
     """Return the shears (m) as an array; each comes once and keeps the block on its face."""
     shears = problems.numbers("shear", shear, at_least=0)

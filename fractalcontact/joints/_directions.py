@@ -30,10 +30,15 @@ def one_direction(value: Any, problems: Problems, argument: str = "direction") -
     if isinstance(value, str):
         if value in AZIMUTHS:
             return _direction(AZIMUTHS[value])
-    elif isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value):
+    elif isinstance(value, (int, float, np.integer, np.floating)) and _is_azimuth(value):
         return _direction(float(value) % 360.0)
     problems.add(argument, EXPECTED, value)
     return _direction(0.0)
+
+
+def _is_azimuth(value: Any) -> bool:
+    """Say whether a number is an angle, and not a truth, NaN or one without any digits below 360."""
+    return not isinstance(value, bool) and bool(abs(value) < 1e9)
 
 
 def several_directions(value: Any, problems: Problems, argument: str = "direction") -> tuple[Direction, ...]:

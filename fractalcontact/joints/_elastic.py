@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
 from fractalcontact.base.grid import grid_of
 from fractalcontact.base.progress import track
 from fractalcontact.base.schema import STOP_REASONS
-from fractalcontact.joints._checks import block_coords
+from fractalcontact.joints._checks import block_coords, is_nothing
 from fractalcontact.joints.crack import Crack
 from fractalcontact.joints.sliding import delta_plane
 
@@ -69,11 +69,6 @@ class Load:
     def parameters(self) -> dict[str, Any]:
         """Return the arguments for the provenance."""
         return {self.control: self.values, "bulk": self.bulk, "keep": self.keep, **self.solver}
-
-
-def is_nothing(keep: Any) -> bool:
-    """Say whether no map is to be kept."""
-    return keep is None or (isinstance(keep, Sized) and len(keep) == 0)
 
 
 def check_load(

@@ -147,9 +147,12 @@ def _layout(block: Any, grid: Grid, problems: Problems) -> Block:
     spacing = (grid.spacing[0], grid.spacing[-1])
     cells = face
     if block is not None:
-        edges = problems.numbers("block", block, above=0)
+        before = len(problems.found)
+        edges = problems.numbers("block", block, above=0, at_most=1e100)
         if edges.size > 2:
             problems.add("block", "one edge length or (y, x), in metres", block)
+        if len(problems.found) > before:
+            return Block(face, face, (0, 0), spacing, (grid.periodic[0], grid.periodic[-1]))
         pair = (float(edges[0]), float(edges[min(1, edges.size - 1)]))
         cells = tuple(math.floor(edge / step + 0.5) for edge, step in zip(pair, spacing, strict=True))  # type: ignore[assignment]
     for name, b, n, step in zip(("y", "x"), cells, face, spacing, strict=True):

@@ -18,6 +18,7 @@ PARK_PAULAY = {"monolithic": 1.4, "against hardened concrete": 1.0}
 """Friction coefficients of concrete on concrete (Park and Paulay 1975, Reinforced Concrete Structures)."""
 
 MPA, MM = 1e6, 1e-3
+GREATEST = 1e100  # of any size: products and powers of such numbers are numbers
 
 
 class JointConstants(NamedTuple):
@@ -74,14 +75,14 @@ def barton_choubey_strength(
     Barton and Choubey (1977), Rock Mechanics 10:1.
     """
     with Problems("fractalcontact.joints.barton_choubey_strength") as problems:
-        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), above=0)
-        problems.number("roughness", roughness, at_least=0, at_most=20)
-        problems.number("wall_strength", wall_strength, above=0)
-        problems.number("residual_angle", residual_angle, at_least=0, below=90)
+        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), above=0, at_most=GREATEST)
+        roughness = problems.number("roughness", roughness, at_least=0, at_most=20)
+        wall_strength = problems.number("wall_strength", wall_strength, above=0, at_most=GREATEST)
+        residual_angle = problems.number("residual_angle", residual_angle, at_least=0, below=90)
         if not problems.found:
             pressure = np.asarray(nominal_pressure, dtype=np.float64)
-            angle = residual_angle + roughness * np.log10(wall_strength / pressure)
-            least = wall_strength / 10 ** ((90.0 - residual_angle) / roughness) if roughness else 0.0
+            angle = residual_angle + roughness * (np.log10(wall_strength) - np.log10(pressure))
+            least = wall_strength * 10.0 ** ((residual_angle - 90.0) / roughness) if roughness else 0.0
             expected = f"above {least:.3g} Pa, where the friction angle of the law reaches 90 degrees"
             problems.require(
                 bool(((angle > -90.0) & (angle < 90.0)).all()), "nominal_pressure", expected, nominal_pressure
@@ -111,9 +112,9 @@ def barton_bandis_scaled(roughness: float, wall_strength: float, length: float) 
     Barton and Bandis (1982), 23rd US Symposium on Rock Mechanics.
     """
     with Problems("fractalcontact.joints.barton_bandis_scaled") as problems:
-        problems.number("roughness", roughness, above=0, at_most=20)
-        problems.number("wall_strength", wall_strength, above=0)
-        problems.number("length", length, above=0)
+        roughness = problems.number("roughness", roughness, above=0, at_most=20)
+        wall_strength = problems.number("wall_strength", wall_strength, above=0, at_most=GREATEST)
+        length = problems.number("length", length, above=0, at_most=GREATEST)
     ratio = length / 0.1
     scaled = roughness * ratio ** (-0.02 * roughness)
     strength = wall_strength * ratio ** (-0.03 * roughness)
@@ -142,13 +143,13 @@ def bandis_constants(roughness: float, wall_strength: float, aperture: float) ->
     Bandis, Lumsden and Barton (1983), Int. J. Rock Mech. Min. Sci. 20:249.
     """
     with Problems("fractalcontact.joints.bandis_constants") as problems:
-        problems.number("roughness", roughness, at_least=0, at_most=20)
-        problems.number("wall_strength", wall_strength, above=0)
-        problems.number("aperture", aperture, above=0)
+        roughness = problems.number("roughness", roughness, at_least=0, at_most=20)
+        wall_strength = problems.number("wall_strength", wall_strength, above=0, at_most=GREATEST)
+        aperture = problems.number("aperture", aperture, above=0, at_most=GREATEST)
         if not problems.found:
             stress = (wall_strength / MPA) / (aperture / MM)
             stiffness = -7.15 + 1.75 * roughness + 0.02 * stress
-            closure = -0.2960 - 0.0056 * roughness + 2.2410 * stress**-0.2450
+            closure = -0.2960 - 0.0056 * roughness + (2.2410 * stress**-0.2450 if stress > 0 else -1.0)
             inside = stiffness > 0 and closure > 0
             got = f"{stiffness:.3g} MPa/mm and {closure:.3g} mm"
             problems.require(
@@ -182,9 +183,9 @@ def bandis_closure(
     Bandis, Lumsden and Barton (1983), Int. J. Rock Mech. Min. Sci. 20:249.
     """
     with Problems("fractalcontact.joints.bandis_closure") as problems:
-        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), at_least=0)
-        problems.number("initial_stiffness", initial_stiffness, above=0)
-        problems.number("greatest_closure", greatest_closure, above=0)
+        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), at_least=0, at_most=GREATEST)
+        initial_stiffness = problems.number("initial_stiffness", initial_stiffness, above=0, at_most=GREATEST)
+        greatest_closure = problems.number("greatest_closure", greatest_closure, above=0, at_most=GREATEST)
     pressure = np.asarray(nominal_pressure, dtype=np.float64)
     return np.asarray(pressure * greatest_closure / (initial_stiffness * greatest_closure + pressure))
 
@@ -214,9 +215,9 @@ def self_weight_strength(length: float | Array, *, unit_weight: float, friction_
     Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 1.
     """
     with Problems("fractalcontact.joints.self_weight_strength") as problems:
-        problems.numbers("length", np.ravel(length), above=0)
-        problems.number("unit_weight", unit_weight, above=0)
-        problems.number("friction_angle", friction_angle, at_least=0, below=90)
+        problems.numbers("length", np.ravel(length), above=0, at_most=GREATEST)
+        unit_weight = problems.number("unit_weight", unit_weight, above=0, at_most=GREATEST)
+        friction_angle = problems.number("friction_angle", friction_angle, at_least=0, below=90)
     tangent = np.tan(np.radians(friction_angle))
     return np.asarray(unit_weight * np.asarray(length, dtype=np.float64) * tangent)
 
@@ -248,7 +249,7 @@ def size_effect(scale: float, *, contact_dimension: float, roughness_dimension: 
     (1999), Int. J. Fracture 95:221.
     """
     with Problems("fractalcontact.joints.size_effect") as problems:
-        problems.number("scale", scale, above=0)
+        scale = problems.number("scale", scale, above=0, at_least=1 / GREATEST, at_most=GREATEST)
         contact = problems.number("contact_dimension", contact_dimension, at_least=0, at_most=2)
         problems.number("roughness_dimension", roughness_dimension, at_least=contact, at_most=2)
     return SizeEffect(

@@ -16,6 +16,7 @@ from fractalcontact.joints._checks import (
     check_crack,
     check_shear,
     direction_coords,
+    is_nothing,
     missing,
     resampling_errors,
 )
@@ -116,11 +117,16 @@ def dilatancy(
             if normal_stiffness is not None:
                 problems.number("normal_stiffness", normal_stiffness, above=0)
         else:
-            given = {"keep": tuple(keep or ()), "normal_stiffness": normal_stiffness, "bulk": bulk}
+            given = {
+                "keep": () if is_nothing(keep) else keep,
+                "normal_stiffness": normal_stiffness,
+                "bulk": bulk,
+            }
             given |= {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
             given |= {"tolerance": tolerance, "method": method}
             for name, value in given.items():
-                unused = value == (dilatancy.__kwdefaults__ or {})[name]
+                usual = (dilatancy.__kwdefaults__ or {})[name]
+                unused = value is usual or (isinstance(value, type(usual)) and value == usual)
                 problems.require(unused, name, "nothing without normal_force", value)
     start = time.perf_counter()
     result = _rigid(crack, shears, towards)

@@ -73,7 +73,7 @@ def roughness_coefficient(
     with Problems(WHERE) as problems:
         grid = check_surface(face, problems, "face", finite=False)
         towards = several_directions(direction, problems)
-        length = problems.number("lag", lag, above=0)
+        length = problems.number("lag", lag, above=0, at_most=1e100)
         if not problems.found:
             plane = detrended(np.asarray(face.values, dtype=np.float64), 1)[0]
             spacing = (grid.spacing[0], grid.spacing[1])

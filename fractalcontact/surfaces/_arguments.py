@@ -15,6 +15,7 @@ from fractalcontact.base.grid import plane_coords
 if TYPE_CHECKING:
     import xarray as xr
 
+LONGEST = 1e100  # m: squares and cubes of it are numbers
 Array = np.ndarray[Any, np.dtype[Any]]
 Made = tuple[Array, dict[str, Any]]
 
@@ -23,17 +24,27 @@ def plane_shape(
     problems: Problems, shape: Any, *, smallest: int = 3, profile: bool = True
 ) -> tuple[int, ...]:
     """Return (ny, nx), or (nx,) where a profile is allowed."""
-    sizes = (shape,) if isinstance(shape, (int, np.integer)) else shape
+    sizes: Any = (shape,) if isinstance(shape, (int, np.integer)) else shape
     lengths = (1, 2) if profile else (2,)
-    if not isinstance(sizes, (Sequence, np.ndarray)) or isinstance(sizes, str) or len(sizes) not in lengths:
+    if (
+        not isinstance(sizes, (Sequence, np.ndarray))
+        or isinstance(sizes, str)
+        or np.ndim(sizes) != 1
+        or len(sizes) not in lengths
+    ):
         problems.add("shape", "(ny, nx)" + (" or the length of a profile" if profile else ""), shape)
         return (smallest, smallest)
     return tuple(problems.integer("shape", n, at_least=smallest) for n in sizes)
 
 
+def length(problems: Problems, argument: str, value: Any) -> float:
+    """Return a length in metres."""
+    return problems.number(argument, value, above=0, at_most=LONGEST)
+
+
 def plane_spacing(problems: Problems, spacing: Any, axes: int) -> tuple[float, ...]:
     """Return the spacing of each axis, y first, from one length or one for each axis."""
-    steps = problems.numbers("spacing", spacing, above=0)
+    steps = problems.numbers("spacing", spacing, above=0, at_most=LONGEST)
     if steps.size not in (1, axes):
         problems.add("spacing", "one length in metres" + (" or (y, x)" if axes == 2 else ""), spacing)
         return (1.0,) * axes

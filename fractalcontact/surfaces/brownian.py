@@ -80,8 +80,8 @@ def fbm(
         sizes = _arguments.plane_shape(problems, shape)
         steps = _arguments.plane_spacing(problems, spacing, len(sizes))
         exponent = problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
-        increment = problems.number("rms_increment", rms_increment, above=0)
-        distance = steps[-1] if lag is None else problems.number("lag", lag, above=0)
+        increment = _arguments.length(problems, "rms_increment", rms_increment)
+        distance = steps[-1] if lag is None else _arguments.length(problems, "lag", lag)
         count = None if members is None else problems.integer("members", members, at_least=1)
         plane = (1, *sizes)[-2:]
         plane_steps = (1.0, *steps)[-2:]

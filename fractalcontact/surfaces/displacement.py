@@ -86,7 +86,7 @@ def midpoint(
         sizes = _arguments.plane_shape(problems, shape, profile=False)
         steps = _arguments.plane_spacing(problems, spacing, 2)
         exponent = problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
-        increment = problems.number("rms_increment", rms_increment, above=0)
+        increment = _arguments.length(problems, "rms_increment", rms_increment)
         problems.require(isinstance(additions, (bool, np.bool_)), "additions", "True or False", additions)
         count = None if members is None else problems.integer("members", members, at_least=1)
     levels = (max(sizes) - 2).bit_length()

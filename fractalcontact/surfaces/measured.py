@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -175,6 +176,9 @@ def read(
         The range of the heights over the extent lies outside 1e-6 ... 10, or a microscope's file is more
         than 1 m wide: some files, and some readers, are wrong by factors of 1000.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        told = f"path: expected the name of a file, got {type(path).__name__}"
+        raise UnreadableFile("fractalcontact.surfaces.read", [told])
     source = Path(path)
     with Problems("fractalcontact.surfaces.read", UnreadableFile) as problems:
         problems.require(source.is_file(), "path", "an existing file", source.name)

@@ -97,10 +97,10 @@ def spectral(
         exponents = _exponents(problems, hurst, len(sizes))
         target = problems.exactly_one(rms_height=rms_height, rms_slope=rms_slope)
         wanted = {"rms_height": rms_height, "rms_slope": rms_slope}[target]
-        rms = 1.0 if wanted is None else problems.number(target, wanted, above=0)
+        rms = 1.0 if wanted is None else _arguments.length(problems, target, wanted)
         cutoffs = _cutoffs(problems, sizes, steps, long_cutoff, rolloff, short_cutoff)
         problems.choice("normalise", normalise, ("realisation", "expectation"))
-        ratio = problems.number("stretch", stretch, above=0)
+        ratio = problems.number("stretch", stretch, above=0, at_least=1e-6, at_most=1e6)
         azimuth = problems.number("rotation", rotation)
         if ratio != 1.0:
             problems.require(exponents[0] == exponents[1], "stretch", "1 with two Hurst exponents", stretch)
@@ -164,9 +164,9 @@ def _cutoffs(
 ) -> tuple[float, float, float]:
     """Return the three wavelengths in metres; inf and 0 where nothing is cut off."""
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
-    longest = math.inf if long_cutoff is None else problems.number("long_cutoff", long_cutoff, above=0)
-    corner = min(longest, extent) if rolloff is None else problems.number("rolloff", rolloff, above=0)
-    shortest = 0.0 if short_cutoff is None else problems.number("short_cutoff", short_cutoff, above=0)
+    longest = math.inf if long_cutoff is None else _arguments.length(problems, "long_cutoff", long_cutoff)
+    corner = min(longest, extent) if rolloff is None else _arguments.length(problems, "rolloff", rolloff)
+    shortest = 0.0 if short_cutoff is None else _arguments.length(problems, "short_cutoff", short_cutoff)
     if short_cutoff is not None:
         least = 2.0 * min(steps) * (1.0 - 1e-9)
         problems.require(

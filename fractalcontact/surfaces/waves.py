@@ -73,7 +73,7 @@ def weierstrass(
         sizes = _arguments.plane_shape(problems, shape)
         steps = _arguments.plane_spacing(problems, spacing, len(sizes))
         exponent = problems.number("hurst", hurst, above=0, below=1)
-        rms = problems.number("rms_height", rms_height, above=0)
+        rms = _arguments.length(problems, "rms_height", rms_height)
         factor = problems.number("ratio", ratio, above=1)
         directions = problems.integer("ridges", ridges, at_least=1)
         count = None if members is None else problems.integer("members", members, at_least=1)
