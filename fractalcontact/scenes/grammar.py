@@ -73,12 +73,13 @@ def joint_keys() -> tuple[str, ...]:
     return tuple(keys)
 
 
+SOLVED, ISLANDS = ("state", "pressure", "gap"), "label"  # maps of a solver; that of the islands
 WANTED: Mapping[str, tuple[str, ...]] = {
     "surfaces": ("height", "describe"),
     "contact": ("press",),
     "joints": tuple(JOINT_STAGES),
     "domains": tuple(DOMAIN_STAGES),
-    "keep": ("state", "pressure", "gap"),
+    "keep": (*SOLVED, ISLANDS),
 }
 CHOICE = ("error", "budget")
 TABLES = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from fractalcontact.base.text import table
-from fractalcontact.scenes.grammar import LOADS
+from fractalcontact.scenes.grammar import ISLANDS, LOADS, SOLVED
 
 if TYPE_CHECKING:
     from fractalcontact.scenes.choosing import Choice
@@ -180,12 +180,21 @@ def _joint_stages(scene: Scene) -> list[Stage]:
 
 def _domain_stages(scene: Scene) -> list[Stage]:
     source = "contact" if scene.wanted("contact") else "joints/closure"
-    return [Stage(f"domains/{name}", (source,), f"{name} is wanted") for name in scene.wanted("domains")]
+    maps = {"islands": (ISLANDS,)} if ISLANDS in stored_maps(scene) else {}
+    return [
+        Stage(f"domains/{name}", (source,), f"{name} is wanted", keep=maps.get(name, ()))
+        for name in scene.wanted("domains")
+    ]
+
+
+def stored_maps(scene: Scene) -> set[str]:
+    """Return the maps that the result holds: those asked for, and those that its figures show."""
+    return set(scene.wanted("keep")) | ({"state", ISLANDS} if scene.figures else set())
 
 
 def _maps(scene: Scene, *, of_contact: bool) -> tuple[str, ...]:
     """Return the maps that a solver stage has to give: those asked for and those that others read."""
-    maps = list(scene.wanted("keep"))
+    maps = [name for name in scene.wanted("keep") if name in SOLVED]
     domains_of_contact = bool(scene.wanted("contact"))
     reads_state = of_contact == domains_of_contact and bool(scene.wanted("domains"))
     if (reads_state or scene.figures) and "state" not in maps:

@@ -19,7 +19,7 @@ from fractalcontact.scenes import doubting, stages
 from fractalcontact.scenes.checking import preflight
 from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.keeping import Store, digest
-from fractalcontact.scenes.planning import FIGURES, Stage, stages_of
+from fractalcontact.scenes.planning import FIGURES, Stage, stages_of, stored_maps
 from fractalcontact.scenes.reading import load
 from fractalcontact.scenes.reporting import first_member
 from fractalcontact.scenes.scene import Scene
@@ -209,7 +209,7 @@ class _Study:
 
     def _dropped(self, stage: Stage) -> tuple[str, ...]:
         """Return the maps of a stage that nothing needs once its readers are done with each part."""
-        stored = set(self.scene.wanted("keep")) | ({"state"} if self.scene.figures else set())
+        stored = stored_maps(self.scene)
         for other in self.plan:
             if stage.name in other.needs and not stages.reads_part(other):
                 stored |= {stages.map_read(other)}
@@ -234,7 +234,7 @@ class _Study:
         import xarray as xr
 
         groups: dict[str, xr.Dataset] = {"/": xr.Dataset()}
-        kept_maps = set(self.scene.wanted("keep")) | ({"state"} if self.scene.figures else set())
+        kept_maps = stored_maps(self.scene)
         for stage in self.plan:
             if not stage.stored or stage.name not in self.results:
                 continue

@@ -205,7 +205,10 @@ def measure(stage: Stage, scene: Scene) -> Measure:
     """Return the function of a map that a stage stands for."""
     room, _, name = stage.name.partition("/")
     table = "joint" if room == "joints" else room
-    return Measure(room, name, map_read(stage), scene.options(table, name, stage_keys(room, name)))
+    options = scene.options(table, name, stage_keys(room, name))
+    if name == "islands":
+        options["keep"] = stage.keep
+    return Measure(room, name, map_read(stage), options)
 
 
 def _surface_work(name: str, scene: Scene, results: Results) -> Work:

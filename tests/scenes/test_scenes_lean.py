@@ -121,6 +121,17 @@ def test_the_file_holds_what_was_wanted_and_no_map(tmp_path):
     assert (tmp_path / "out" / "result.nc").stat().st_size < 200_000
 
 
+def test_the_map_of_the_islands_is_stored_only_where_it_is_kept(tmp_path):
+    text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["islands"]')
+    plain, kept = (
+        fc.scenes.run(scene(tmp_path, text + more), progress=False)["domains/islands"].to_dataset()
+        for more in ("", 'keep = ["label"]')
+    )
+    assert not {"label", "y", "x"} & set(plain.variables)
+    assert kept["label"].dims == ("shear", "step", "y", "x")
+    assert plain["area"].equals(kept["area"])
+
+
 LONG = """
 [surface]
 generate = "fbm"
