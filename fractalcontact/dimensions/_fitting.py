@@ -15,6 +15,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 LEAST_MODES = 12
 _STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
+_UNEVEN = 4.0  # the same for the scatter of the modes about their expected power
 _FEW_PROBES, _MANY_POINTS = 3, 1 << 18
 _FEW_POINTS = 1 << 14
 _SLIGHT = 0.01  # share of missing points that one probe is enough for
@@ -26,6 +27,13 @@ class Modes(Protocol):
     @property
     def order(self) -> Array:
         """A length for each mode: long waves and short waves are told apart by it."""
+
+    @property
+    def sector(self) -> Array:
+        """A number for each mode: those of neighbouring azimuths have the same."""
+
+    def scatter(self, fit: _whittle.WhittleFit) -> float:
+        """Return how much less flat the modes are than Gaussian ones, in standard deviations."""
 
     def part(self, kept: Array) -> Modes:
         """Keep some of the modes."""
@@ -48,22 +56,29 @@ class FreeModes:
     chosen: Array
     power: Array
     order: Array
+    sector: Array
     gapped: Any = None
 
     @classmethod
     def of(cls, heights: Array, lattice: _modes.Lattice, chosen: Array, reference: float) -> FreeModes:
         """Transform a face; `reference` is a Hurst exponent near its own."""
         observed = np.isfinite(heights)
-        order = _modes.wavelengths(lattice)[chosen]
+        order, sector = _modes.wavelengths(lattice)[chosen], _modes.steepness(lattice)[chosen] > 1.0
         if observed.all():
-            return cls(lattice, chosen, _modes.power(heights)[chosen], order)
+            return cls(lattice, chosen, _modes.power(heights)[chosen], order, sector)
         from fractalcontact.dimensions._gaps import PROBES, GappedModes
 
         probes = _FEW_PROBES if heights.size > _MANY_POINTS else PROBES
         if np.count_nonzero(~observed) < _SLIGHT * heights.size and heights.size > _FEW_POINTS:
             probes = 1
         gapped = GappedModes(lattice, observed, reference, probes)
-        return cls(lattice, chosen, gapped.power(heights)[chosen], order, gapped)
+        return cls(lattice, chosen, gapped.power(heights)[chosen], order, sector, gapped)
+
+    def scatter(self, fit: _whittle.WhittleFit) -> float:
+        """Compare the mean logarithm with that of chi square; not with gaps, whose part is only estimated."""
+        if self.gapped is not None:
+            return 0.0
+        return _flatness(self.power / fit.total, _CHI_SQUARE)
 
     def part(self, kept: Array) -> FreeModes:
         """Keep some of the chosen modes; what slight gaps do to so few is less than their scatter."""
@@ -75,6 +90,7 @@ class FreeModes:
             chosen=chosen,
             power=self.power[kept],
             order=self.order[kept],
+            sector=self.sector[kept],
             gapped=None if slight else self.gapped,
         )
 
@@ -128,14 +144,22 @@ class PeriodicModes:
         """Wavelengths over the largest extent."""
         return np.asarray(1.0 / self.modes.wavenumber)
 
+    @property
+    def sector(self) -> Array:
+        """Eighths of a turn, by the azimuth of the waves."""
+        azimuth = self.modes.azimuth
+        if azimuth is None:
+            return np.zeros(self.modes.power.shape, dtype=int)
+        return np.asarray(np.floor(azimuth * (4.0 / np.pi)).astype(int) % 4)
+
+    def scatter(self, fit: _whittle.WhittleFit) -> float:
+        """Compare the mean logarithm with that of an exponential distribution, over the complex modes."""
+        whole = self.modes.weights == 2.0
+        return _flatness((self.modes.power / fit.total)[whole], _EXPONENTIAL)
+
     def part(self, kept: Array) -> PeriodicModes:
         """Keep some of the modes."""
-        modes = self.modes
-        return PeriodicModes(
-            replace(
-                modes, power=modes.power[kept], wavenumber=modes.wavenumber[kept], weights=modes.weights[kept]
-            )
-        )
+        return PeriodicModes(self.modes.part(kept))
 
     def fit(self, start: float, noise: bool) -> _whittle.WhittleFit:
         """Fit the power law, and white noise under it."""
@@ -153,26 +177,58 @@ class PeriodicModes:
         return fit.standard_error
 
 
+# mean logarithm of a mode over its expected power, and the variance of what is left when its mean is known
+_CHI_SQUARE = (-np.euler_gamma - np.log(2.0), 0.5 * np.pi**2 - 2.0)
+_EXPONENTIAL = (-np.euler_gamma, np.pi**2 / 6.0 - 1.0)
+
+
+def _flatness(ratio: Array, expected: tuple[float, float]) -> float:
+    """Return the mean logarithm over its scatter: negative where a few modes hold more than their share."""
+    if ratio.size < LEAST_MODES:
+        return 0.0
+    logs = np.log(np.maximum(ratio / ratio.mean(), 1e-12))
+    return float((logs.mean() - expected[0]) * np.sqrt(ratio.size / expected[1]))
+
+
 def fitted(modes: Modes, start: float, noise: bool) -> tuple[_whittle.WhittleFit, Estimate]:
     """Fit, and return the estimate with its interval.
 
     Where the exponent changes with scale more than chance allows, the interval also holds the exponents
-    of the longer and of the shorter half of the modes, each fitted alone.
+    of the longer and of the shorter half of the modes, each fitted alone; where the modes scatter more than
+    those of Gaussian heights, those of sectors of azimuth.
     """
     fit = modes.fit(start, noise)
     error = modes.error(fit)
-    low, high = normal_interval(fit.hurst, error)
-    note = "" if fit.converged else "the fit stopped at the limit of its range"
+    interval = normal_interval(fit.hurst, error)
+    notes = [] if fit.converged else ["the fit stopped at the limit of its range"]
     if abs(fit.misfit) > _STRANGE:
         middle = float(np.median(modes.order))
-        for kept in (modes.order > middle, modes.order <= middle):
-            if np.count_nonzero(kept) >= LEAST_MODES:
-                part = modes.part(kept)
-                alone = part.fit(fit.hurst, noise)
-                ends = normal_interval(alone.hurst, part.error(alone))
-                low, high = min(low, ends[0]), max(high, ends[1])
-        note = (
+        interval = _holding(interval, modes, modes.order > middle, fit.hurst, noise)
+        notes.append(
             f"the exponent changes with scale ({fit.misfit:+.1f} standard deviations): "
             "the interval holds that of the longer and of the shorter half of the modes"
         )
-    return fit, Estimate(fit.hurst, error, low, high, misfit=fit.misfit, note=note)
+    scatter = modes.scatter(fit)
+    if scatter < -_UNEVEN:
+        interval = _holding(interval, modes, modes.sector, fit.hurst, noise)
+        notes.append(
+            f"a few waves hold more than their share ({-scatter:.1f} standard deviations): a lay, a step or "
+            "a pattern; the interval holds the exponents of sectors of azimuth, each fitted alone"
+        )
+    low, high = interval
+    return fit, Estimate(fit.hurst, error, low, high, misfit=fit.misfit, note="; ".join(notes))
+
+
+def _holding(
+    interval: tuple[float, float], modes: Modes, groups: Array, start: float, noise: bool
+) -> tuple[float, float]:
+    """Widen an interval until it holds those of groups of modes, each fitted alone."""
+    low, high = interval
+    for group in np.unique(groups):
+        kept = groups == group
+        if np.count_nonzero(kept) >= LEAST_MODES:
+            part = modes.part(kept)
+            alone = part.fit(start, noise)
+            ends = normal_interval(alone.hurst, part.error(alone))
+            low, high = min(low, ends[0]), max(high, ends[1])
+    return low, high

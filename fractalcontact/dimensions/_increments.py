@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from fractalcontact.dimensions._pairs import (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 FIRST_BELOW = 0.45  # first differences where the pilot estimate is below, second differences above
+PARTS, _WIDE, _LONG = 4, 12, 48  # parts along an axis, their least edge; least length of a part of a profile
 REACH = 2 * LAGS[-1]  # rows that a slab borrows from the next, in steps
 _UNLIKELY = (np.inf, 10.83, 13.82, 16.27)  # 99.9 % of chi square with 0 to 3 degrees of freedom
 _NODES = np.linspace(0.02, 0.98, 25)
@@ -37,7 +39,8 @@ _NODES = np.linspace(0.02, 0.98, 25)
 class Moments:
     """Mean squares of the twelve increments of `_kernels.increment_sums`, and how many there were.
 
-    `observed` tells where heights were observed, or is None if everywhere.
+    `observed` tells where heights were observed, or is None if everywhere; `parts` (parts, 12) are the mean
+    squares and the numbers of equal parts of the face, or None if it is too small to be cut.
     """
 
     means: Array
@@ -45,6 +48,7 @@ class Moments:
     shape: tuple[int, ...]
     step: int
     observed: Array | None
+    parts: tuple[Array, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,30 +81,50 @@ def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: in
     from fractalcontact.base.jit import in_bands
     from fractalcontact.dimensions._kernels import increment_sums
 
-    rows_of_sums, counts, masks = [], np.zeros(12, dtype=np.int64), []
+    bands, edges = _cuts(shape, step)
+    rows_of_sums, rows_of_counts, masks = [], [], []
     for heights, rows in slabs:
-        sums = np.zeros((rows, 12))
-        in_bands(increment_sums, rows, 12 * rows * heights.shape[1], heights, step, sums)
-        number = _complete_counts(heights.shape, rows, step)
+        sums = np.zeros((rows, edges.size - 1, 12))
+        in_bands(increment_sums, rows, 12 * rows * heights.shape[1], heights, step, edges, sums)
+        number = _complete_counts(heights.shape, rows, edges, step)
         mask = None
         if np.isnan(sums).any():
             # a row without gaps keeps its sum, so that it does not matter which slab it was read with
-            sparse, number = _gapped_sums(heights, rows, step)
+            sparse, number = _gapped_sums(heights, rows, edges, step)
             sums = np.where(np.isnan(sums), sparse, sums)
             mask = np.isfinite(heights[:rows])
         rows_of_sums.append(sums)
-        counts += number
+        rows_of_counts.append(number)
         masks.append(mask)
+    sums, numbers = np.concatenate(rows_of_sums), np.concatenate(rows_of_counts)
     # added up one row after the other, so that neither slabs nor threads change a bit
-    total = np.cumsum(np.concatenate(rows_of_sums), axis=0)[-1]
-    means = np.divide(total, counts, out=np.full(12, np.nan), where=counts > 0)
+    total, counts = np.cumsum(np.cumsum(sums, axis=0)[-1], axis=0)[-1], numbers.sum(axis=(0, 1))
+    parts = None
+    if (bands.size - 1) * (edges.size - 1) > 1:
+        own = np.add.reduceat(sums, bands[:-1], axis=0).reshape(-1, 12)
+        seen = np.add.reduceat(numbers, bands[:-1], axis=0).reshape(-1, 12)
+        parts = (_ratio(own, seen), seen)
     observed = None
     if any(mask is not None for mask in masks):
         whole = (np.ones((len(sums), shape[-1]), dtype=bool) for sums in rows_of_sums)
         observed = np.concatenate(
             [one if mask is None else mask for mask, one in zip(masks, whole, strict=True)]
         )
-    return Moments(means, counts, shape, step, observed)
+    return Moments(_ratio(total, counts), counts, shape, step, observed, parts)
+
+
+def _cuts(shape: tuple[int, ...], step: int) -> tuple[Array, Array]:
+    """Return the rows and the columns at which a face is cut into equal parts, the last of all included."""
+    ny, nx = (1, *shape)[-2:]
+    if ny == 1:
+        down, across = 1, max(1, min(PARTS**2, nx // (_LONG * step)))
+    else:
+        down, across = (max(1, min(PARTS, n // (_WIDE * step))) for n in (ny, nx))
+    return tuple(np.arange(k + 1) * n // k for n, k in ((ny, down), (nx, across)))  # type: ignore[return-value]
+
+
+def _ratio(sums: Array, counts: Array) -> Array:
+    return np.asarray(np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0))
 
 
 def closed_form(
@@ -149,10 +173,7 @@ def _estimate(
     if not usable.any():
         return np.nan, np.nan, np.nan
     if moments.observed is None or not error:
-        table = _table(moments.shape, steps, order, moments.step)
-        place = np.interp(near, _NODES, np.arange(_NODES.size))
-        low = min(int(place), _NODES.size - 2)
-        covariance = table[low] + (place - low) * (table[low + 1] - table[low])
+        covariance = complete_covariance(near, moments.shape, steps, order, moments.step)
     else:
         overlap = gapped_overlap(moments.observed, order, axes, moments.step)
         covariance = covariance_of_logs(near, steps, order, overlap, moments.step)
@@ -172,6 +193,16 @@ def _slope(design: Array, values: Array, covariance: Array) -> tuple[float, floa
     return float(coefficients[-1]), float(np.sqrt(inverse[-1, -1])), float(strain)
 
 
+def complete_covariance(
+    hurst: float, shape: tuple[int, ...], steps: tuple[float, ...], order: int, step: int
+) -> Array:
+    """Return the covariance of the logarithms for a complete face; kinds are lags along y, then along x."""
+    table = _table(shape, steps, order, step)
+    place = np.interp(hurst, _NODES, np.arange(_NODES.size))
+    low = min(int(place), _NODES.size - 2)
+    return np.asarray(table[low] + (place - low) * (table[low + 1] - table[low]))
+
+
 @lru_cache(maxsize=32)
 def _table(shape: tuple[int, ...], steps: tuple[float, ...], order: int, step: int) -> Array:
     """Tabulate the covariance of the logarithms over `_NODES`: (nodes, kinds, kinds)."""
@@ -179,15 +210,20 @@ def _table(shape: tuple[int, ...], steps: tuple[float, ...], order: int, step: i
     return np.stack([covariance_of_logs(h, steps, order, overlap, step) for h in _NODES])
 
 
-def _complete_counts(shape: tuple[int, ...], rows: int, step: int) -> Array:
+def _complete_counts(shape: tuple[int, ...], rows: int, edges: Array, step: int) -> Array:
+    """Count the increments of every row and part of a complete face: (rows, parts, 12)."""
     ny, nx = shape
-    reach = [step * k for k in (1, 2, 4, 2, 4, 8)]
-    return np.array([rows * max(nx - k, 0) for k in reach] + [max(min(rows, ny - k), 0) * nx for k in reach])
+    counts = np.empty((rows, edges.size - 1, 12), dtype=np.int64)
+    for k, reach in enumerate(step * lag for lag in (1, 2, 4, 2, 4, 8)):
+        counts[..., k] = np.diff(np.minimum(edges, max(nx - reach, 0)))
+        counts[..., 6 + k] = np.diff(edges) * (np.arange(rows) + reach < ny)[:, None]
+    return counts
 
 
-def _gapped_sums(heights: Array, rows: int, step: int) -> tuple[Array, Array]:
+def _gapped_sums(heights: Array, rows: int, edges: Array, step: int) -> tuple[Array, Array]:
     """Do what `increment_sums` does where some heights are NaN."""
-    sums, counts = np.zeros((rows, 12)), np.zeros(12, dtype=np.int64)
+    sums = np.zeros((rows, edges.size - 1, 12))
+    counts = np.zeros(sums.shape, dtype=np.int64)
     column = 0
     for axis in (1, 0):
         for order in (1, 2):
@@ -199,7 +235,9 @@ def _gapped_sums(heights: Array, rows: int, step: int) -> tuple[Array, Array]:
                         n = jump.shape[axis]
                         jump = jump.take(range(reach, n), axis) - jump.take(range(n - reach), axis)
                     jump = jump[:rows]
-                    sums[: len(jump), column] = np.nansum(jump * jump, axis=1)
-                    counts[column] = np.count_nonzero(~np.isnan(jump))
+                    for p, (low, high) in enumerate(pairwise(edges)):
+                        part = jump[:, low:high]
+                        sums[: len(part), p, column] = np.nansum(part * part, axis=1)
+                        counts[: len(part), p, column] = np.count_nonzero(~np.isnan(part), axis=1)
                 column += 1
     return sums, counts

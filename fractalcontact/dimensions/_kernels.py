@@ -13,34 +13,37 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @gap_sum_kernel
-def increment_sums(start: int, stop: int, heights: Array, step: int, sums: Array) -> None:
+def increment_sums(start: int, stop: int, heights: Array, step: int, edges: Array, sums: Array) -> None:
     """Sum squared increments that start in each of the rows from start up to stop; a NaN makes a NaN.
 
-    Columns of `sums` (rows, 12): along x the first differences over 1, 2 and 4 `step`, then the second
-    differences over 1, 2 and 4 `step`; the same six along y.
+    `edges` (parts + 1) cut the columns in which they start into parts. The last axis of `sums` (rows, parts,
+    12): along x the first differences over 1, 2 and 4 `step`, then the second differences over 1, 2 and 4
+    `step`; the same six along y.
     """
     ny, nx = heights.shape
     for j in range(start, stop):
-        row = heights[j]
-        for along_y in range(2):
-            for k in range(3):
-                lag = step << k
-                if along_y:
-                    once, twice = heights[min(j + lag, ny - 1)], heights[min(j + 2 * lag, ny - 1)]
-                    single, double = nx * (j + lag < ny), nx * (j + 2 * lag < ny)
-                else:
-                    once, twice = row[min(lag, nx) :], row[min(2 * lag, nx) :]
-                    single, double = max(nx - lag, 0), max(nx - 2 * lag, 0)
+        for k in range(6):
+            x, y = (0, step << k - 3) if k > 2 else (step << k, 0)
+            once, twice = j + y, j + 2 * y
+            for part in range(edges.size - 1):
+                low, high = edges[part], edges[part + 1]
+                # unsigned: no test for negatives
+                here, there, beyond = np.uint32(low), np.uint32(low + x), np.uint32(low + 2 * x)
+                last = high if high < nx - 2 * x else nx - 2 * x
+                double = last - low if twice < ny and last > low else 0
+                last = high if high < nx - x else nx - x
+                single = last - low if once < ny else 0
                 first = second = 0.0
                 for i in range(double):
-                    u = once[i] - row[i]
-                    v = (twice[i] - once[i]) - u
+                    u = heights[once, i + there] - heights[j, i + here]
+                    v = (heights[twice, i + beyond] - heights[once, i + there]) - u
                     first += u * u
                     second += v * v
                 for i in range(double, single):
-                    u = once[i] - row[i]
+                    u = heights[once, i + there] - heights[j, i + here]
                     first += u * u
-                sums[j, 6 * along_y + k], sums[j, 6 * along_y + 3 + k] = first, second
+                column = k if k < 3 else k + 3
+                sums[j, part, column], sums[j, part, column + 3] = first, second
 
 
 @parallel_kernel

@@ -9,8 +9,10 @@ import numpy as np
 
 from fractalcontact.dimensions import _exact, _increments, _modes, _periodic, _whittle
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, plane, undefined
+from fractalcontact.dimensions._evenness import evenness
 from fractalcontact.dimensions._faces import Face
 from fractalcontact.dimensions._fitting import LEAST_MODES, FreeModes, PeriodicModes, fitted
+from fractalcontact.dimensions._rounding import quantum, told
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Scales = tuple[float, float] | None
@@ -52,16 +54,27 @@ def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
             "exponent is: estimate profiles, or see `directions`"
         )
     fit, estimate = fitted(modes, pilot, noise)
+    every = _stride(scales, max(face.spacing))
+    level = _without_offsets(heights)
+    parts = evenness(_increments.moments([(level, len(level))], level.shape, every), lattice.steps, fit.hurst)
+    low, high = parts.applied(fit.hurst, estimate.low, estimate.high)
+    rounded = "" if noise else _rounded(heights, estimate.standard_error)
+    if rounded:
+        loud = fitted(modes, pilot, True)[1]
+        low, high = float(np.fmin(low, loud.low)), float(np.fmax(high, loud.high))
     as_free = "a periodic face with gaps is taken as free" if all(face.grid.periodic) else ""
     smooth = _SMOOTHED if noise and fit.noise < 0 else ""
     return replace(
         estimate,
+        standard_error=estimate.standard_error * parts.widening,
+        low=low,
+        high=high,
         scale_min=float(lengths[chosen].min()),
         scale_max=float(lengths[chosen].max()),
         increment=_increment(fit) * face.unit,
         noise=float(np.sqrt(max(fit.noise, 0.0))) * face.unit if noise else np.nan,
         window=_FREE if scales is None else _ASKED,
-        note="; ".join(part for part in (as_free, smooth, estimate.note) if part),
+        note="; ".join(part for part in (as_free, smooth, estimate.note, parts.note, rounded) if part),
     )
 
 
@@ -75,6 +88,10 @@ def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
     if modes.weights.sum() < LEAST_MODES:
         return undefined(f"{modes.weights.sum():.0f} modes in the band, at least {LEAST_MODES} are needed")
     fit, estimate = fitted(PeriodicModes(modes), 0.5, noise)
+    rounded = "" if noise else _rounded(face.heights, estimate.standard_error)
+    if rounded:
+        loud = fitted(PeriodicModes(modes), 0.5, True)[1]
+        estimate = replace(estimate, low=min(estimate.low, loud.low), high=max(estimate.high, loud.high))
     step = np.diff(heights, append=heights[..., :1], axis=-1)
     cell = float(np.prod(face.steps))
     return replace(
@@ -85,7 +102,9 @@ def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
         noise=float(np.sqrt(max(fit.noise / cell, 0.0))) * face.unit if noise else np.nan,
         window=_PERIODIC if scales is None else _ASKED,
         note="; ".join(
-            part for part in (_FAMILY, _SMOOTHED if noise and fit.noise < 0 else "", estimate.note) if part
+            part
+            for part in (_FAMILY, _SMOOTHED if noise and fit.noise < 0 else "", estimate.note, rounded)
+            if part
         ),
     )
 
@@ -100,14 +119,40 @@ def _profile(face: Face, scales: Scales, noise: bool) -> Estimate:
     if chunk < _exact.SMALLEST:
         return undefined(f"{chunk} points, at least {_exact.SMALLEST} are needed")
     fit = _exact.fit_profile(heights, noise=noise, chunk=chunk)
+    moments = _increments.moments([(heights[None], 1)], (heights.size,))
+    parts = evenness(moments, (1.0,), fit.hurst)
+    low, high = parts.applied(fit.hurst, fit.low, fit.high)
+    rounded = "" if noise else _rounded(heights[None], fit.standard_error)
+    if rounded:
+        loud = _exact.fit_profile(heights, noise=True, chunk=chunk)
+        low, high = min(low, loud.low), max(high, loud.high)
     return Estimate(
-        fit.hurst, fit.standard_error, fit.low, fit.high,
+        fit.hurst, fit.standard_error * parts.widening, low, high,
         scale_min=every * dx,
         scale_max=(chunk - 1) * every * dx,
         increment=fit.increment * float(every) ** -fit.hurst * face.unit,
         noise=float(np.sqrt(fit.noise)) * face.unit if noise else np.nan,
         window="exact likelihood of all increments" if scales is None else _ASKED,
+        note="; ".join(part for part in (parts.note, rounded) if part),
     )  # fmt: skip
+
+
+def _rounded(heights: Array, error: float) -> str:
+    """Return what to say of heights that were rounded to steps that matter; nothing otherwise."""
+    share = quantum(heights)[1]
+    return told(share, "that of a fit with white noise") if share > 0.5 * error else ""
+
+
+def _without_offsets(heights: Array) -> Array:
+    """Take off what the modes do not see, an offset of each row and each column."""
+    if np.isnan(heights).any():
+        return heights
+    return np.asarray(heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True) + heights.mean())
+
+
+def _stride(scales: Scales, spacing: float) -> int:
+    """Return the step of points whose second differences see the shortest waves that are asked for."""
+    return 1 if scales is None else max(1, round(0.5 * scales[0] / spacing))
 
 
 def _pilot(heights: Array, steps: tuple[float, float]) -> float:

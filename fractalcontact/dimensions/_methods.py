@@ -11,9 +11,11 @@ import numpy as np
 from fractalcontact.base.scaling import fit_line
 from fractalcontact.dimensions import _covers, _increments, _measures
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
+from fractalcontact.dimensions._evenness import Evenness, evenness
 from fractalcontact.dimensions._faces import LEAST, MOST, Face
 from fractalcontact.dimensions._likelihood import Scales, likelihood
 from fractalcontact.dimensions._pairs import LAGS
+from fractalcontact.dimensions._rounding import quantum, told
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -64,17 +66,25 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
         )
     reason = _not_fractional(face, noise)
     error = np.nan if reason else found.standard_error * found.strain
-    low, high = normal_interval(found.hurst, error)
+    parts = Evenness() if reason else evenness(moments, face.steps, found.hurst)
+    low, high = parts.applied(found.hurst, *normal_interval(found.hurst, error))
+    rounded = ""
+    if not reason and not face.is_lazy:
+        quiet, rounded = _without_rounding(face, moments, unit, lags, error)
+        low, high = float(np.fmin(low, quiet[0])), float(np.fmax(high, quiet[1]))
+    strained = (
+        "the lags disagree on the exponent, and the interval is widened by it" if found.strain > 1.0 else ""
+    )
     return Estimate(
         found.hurst,
-        error,
+        error * parts.widening,
         low,
         high,
         increment=found.increment * unit,
         not_given=reason,
-        note="the lags disagree on the exponent, and the interval is widened by it"
-        if found.strain > 1.0
-        else "",
+        note="; ".join(
+            part for part in (strained if found.strain > 1.0 else "", parts.note, rounded) if part
+        ),
         **window,  # type: ignore[arg-type]
     )
 
@@ -87,6 +97,22 @@ def _moments(face: Face, step: int) -> tuple[_increments.Moments, float]:
     if face.is_lazy or LEAST**2 < largest < MOST**2:
         return moments, 1.0
     return _increments.moments(face.slabs(reach, face.unit), face.grid.shape, step), face.unit
+
+
+def _without_rounding(
+    face: Face, moments: _increments.Moments, unit: float, lags: int, error: float
+) -> tuple[tuple[float, float], str]:
+    """Return the interval of the mean squares less those of rounding, and the note, where that matters."""
+    step, share = quantum(face.raw / unit if unit != 1.0 else face.raw)
+    if not share > 0.5 * error:
+        return (np.nan, np.nan), ""
+    square = step**2
+    means = moments.means - np.tile(np.repeat([square / 6.0, square / 2.0], 3), 2)
+    found = _increments.closed_form(replace(moments, means=means), face.steps, lags=lags)
+    interval = normal_interval(found.hurst, found.standard_error * found.strain)
+    if not np.isfinite(found.hurst):
+        interval = (np.nan, 1.0)
+    return interval, told(share, "that of increments without what rounding adds to them")
 
 
 def _not_fractional(face: Face, noise: bool) -> str:

@@ -85,6 +85,12 @@ def wavelengths(lattice: Lattice) -> Array:
     return np.asarray(1.0 / np.hypot(ky[:, None], kx))
 
 
+def steepness(lattice: Lattice) -> Array:
+    """Return the wavenumber along y over that along x of every mode: shape (ny - 1, nx - 1)."""
+    ky, kx = (np.arange(1, n) / (n * step) for n, step in zip(lattice.shape, lattice.steps, strict=True))
+    return np.asarray(ky[:, None] / kx)
+
+
 def _along(covariance: Array, axis: int) -> Array:
     """Sum covariance(i - j) c_k(i) c_k(j) over i, j along one axis, for modes k = 1 to n - 1.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.spectra import periodogram, radial_wavenumber
+from fractalcontact.base.spectra import half_wavenumbers, periodogram, radial_wavenumber
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -25,17 +25,22 @@ LEAST_MODES = 12
 
 @dataclass(frozen=True)
 class Modes:
-    """Power and wavenumber (in steps of the widest axis) of the modes, and how often each counts."""
+    """Power, wavenumber (in steps of the widest axis) and weight of the modes; azimuth (radian)."""
 
     power: Array
     wavenumber: Array
     weights: Array
     axes: int
+    azimuth: Array | None = None
 
     def inside(self, low: float, high: float) -> Modes:
         """Keep the modes with low <= wavenumber <= high."""
-        kept = (self.wavenumber >= low) & (self.wavenumber <= high)
-        return Modes(self.power[kept], self.wavenumber[kept], self.weights[kept], self.axes)
+        return self.part((self.wavenumber >= low) & (self.wavenumber <= high))
+
+    def part(self, kept: Array) -> Modes:
+        """Keep some of the modes."""
+        azimuth = None if self.azimuth is None else self.azimuth[kept]
+        return Modes(self.power[kept], self.wavenumber[kept], self.weights[kept], self.axes, azimuth)
 
 
 def modes(heights: Array, steps: tuple[float, ...]) -> Modes:
@@ -50,8 +55,10 @@ def modes(heights: Array, steps: tuple[float, ...]) -> Modes:
     unit = 2.0 * np.pi / max(n * step for n, step in zip(heights.shape, steps, strict=True))
     radius = (radial_wavenumber(heights.shape, steps) / unit).ravel()
     weights = np.broadcast_to(columns, power.shape).ravel()
+    waves = half_wavenumbers(heights.shape, steps)
+    azimuth = np.arctan2(waves[0][:, None], waves[-1]) if len(steps) == 2 else np.zeros(radius.shape)
     kept = radius > 0
-    return Modes(power.ravel()[kept], radius[kept], weights[kept], len(steps))
+    return Modes(power.ravel()[kept], radius[kept], weights[kept], len(steps), azimuth.ravel()[kept])
 
 
 def band(modes: Modes) -> tuple[float, float]:

@@ -96,6 +96,13 @@ def estimate(
     is that of a power-law spectrum between cut-offs, which is another family. A profile has the exact
     likelihood of its increments. The standard error is that of the model: on fractional Brownian faces its
     interval covers the truth in 95 % of the cases, and is nearly as narrow as any can be (Cramer-Rao).
+
+    A face may belong to neither family. Four things are looked for, each so that chance raises no alarm
+    once in a thousand faces: an exponent that changes with scale; a few waves that hold more than their
+    share (a lay, a step, a pattern); parts of the face that are not equally rough (patches, worn tops,
+    spikes), which count for fewer points; heights that were rounded to steps. The interval is then widened
+    until it holds what the scales, azimuths or parts give alone, or what is left without the rounding, and
+    `note` says so.
     """
     from fractalcontact.dimensions._methods import DEFAULT, METHODS
 
