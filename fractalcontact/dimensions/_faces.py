@@ -173,12 +173,14 @@ def read_faces(
     smallest: int = 3,
     gaps: bool = True,
     leading: bool = True,
+    profile: bool = True,
     squares: bool = False,
     taken: Collection[str] = (),
 ) -> list[Face]:
     """Check a surface and split it along its leading dims.
 
-    `squares` of its heights in m must be numbers; `taken` are names of the result, which no dim may bear.
+    A profile is refused where it is not allowed; `squares` of the heights in m must be numbers; `taken` are
+    names of the result, which no dim may bear.
 
     Returns
     -------
@@ -187,7 +189,7 @@ def read_faces(
     """
     before = len(problems.found)
     grid = check_surface(
-        surface, problems, finite=False, smallest=smallest, leading=leading, profile=True, decades=DECADES
+        surface, problems, finite=False, smallest=smallest, leading=leading, profile=profile, decades=DECADES
     )
     check_leading(surface, taken, problems)
     if len(problems.found) > before:

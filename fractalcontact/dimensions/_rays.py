@@ -2,23 +2,22 @@
 
 For fractional Brownian heights the mean square second difference at the lag vector h is proportional to
 (h' M h)^H, M being the identity for an isotropic surface and a symmetric matrix of determinant one for a
-stretched one. The covariance of these means follows from the spectral density as sampled, aliases included.
-What is left of their logarithms after a smooth curve over the length is set against harmonics of the
-direction, in level and in slope: none may be there if the surface is isotropic.
+stretched one. What is left of the logarithms of these means after a smooth curve over the length is set
+against harmonics of the direction, in level and in slope: none may be there if the surface is isotropic.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.spectra import aliased_power_law
 from fractalcontact.dimensions import _lags
 from fractalcontact.dimensions._estimates import NORMAL
 from fractalcontact.dimensions._faces import Face
+from fractalcontact.dimensions._scatter import Pairs, covariance
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -26,14 +25,17 @@ FROM_ROUND = 2.447746830680816  # root of 95 % of chi square with two degrees of
 MULTIPLES = (1, 2, 4)
 DIRECTIONS = 8
 LEAST_LAGS = 13  # a curve of three numbers, eight harmonics, and two to spare
-COMPARED = 1 / 3  # of the face, that a second difference may span in a test
 _REACH = 8  # components of a direction that was asked for
 _NEAR = 2.5  # degrees within which the shorter of two lattice directions is better
 _LOWEST, _HIGHEST = 0.02, 0.98  # exponents whose covariances are taken
-_ROUNDS, _STEEPEST = 12, 6.0  # of the fit of a stretch; its largest logarithm
+_SAME = 0.01  # change of H and of the logarithm of a stretch that leaves a covariance as it is
+_ROUNDS, STEEPEST = 12, 5.0  # of the fit of a stretch; its largest logarithm
+_WHITE, _SURELY = 0.05, 3.0  # a power above which heights are correlated, also in standard errors
+_STRANGE = 1e-3  # chance below which a face is not isotropic beyond doubt
+UNCORRELATED = "heights without correlation have no stretch"
+RIDGES = "no stretch that is tried is long enough: ridges run on along the azimuth, or spikes stand out"
+SMOOTH = "a face smoother than a fractal one: nothing tells how its second differences scatter"
 _OPEN = 50.0  # logarithm of a stretch beyond which nothing is known
-_GRID = 64
-_BLOCK = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -50,25 +52,21 @@ class Ray:
 class Means:
     """Mean square second differences at lag vectors.
 
-    `vectors` (k, 2) are steps in y and x; `steps` the spacings over that of x; `shares` (2, k, k) tells how
-    many middle points the differences of two lags have in common, over the numbers of both: as observed, and
-    on the complete face. Differences with one middle are paired as often as the first, others as the second
-    (whether one was observed says little about the other).
+    `vectors` (k, 2) are steps in y and x, `numbers` (k,) tells how many differences each mean has, `steps`
+    are the spacings over that of x.
     """
 
     vectors: Array
     means: Array
-    shares: Array
+    numbers: Array
     steps: tuple[float, float]
 
     @classmethod
-    def of(
-        cls, face: Face, rays: Sequence[Ray], scales: tuple[float, float] | None, share: float = 1.0
-    ) -> tuple[Means, Array]:
+    def of(cls, face: Face, rays: Sequence[Ray], scales: tuple[float, float] | None) -> tuple[Means, Array]:
         """Measure the lags of some directions; return them with the place of the direction of each.
 
         Lags are 1, 2 and 4 times the step of the lattice, or of the least multiple of it inside `scales` (m),
-        as far as the two of them that make a difference fit into a `share` of the face.
+        as far as the two of them that make a difference fit into the face.
         """
         low, high = (0.0, np.inf) if scales is None else scales
         found, owners = [], []
@@ -81,20 +79,20 @@ class Means:
                     found.append((lag * ray.dy, lag * ray.dx))
                     owners.append(place)
         vectors = np.array(found, dtype=np.int64).reshape(-1, 2)
-        inside = (2 * np.abs(vectors) < share * np.array(face.shape)).all(axis=1)
+        inside = (2 * np.abs(vectors) < np.array(face.shape)).all(axis=1)
         vectors, owner = vectors[inside], np.array(owners, dtype=np.int64)[inside]
         slabs = iter([(np.ascontiguousarray(face.heights), face.shape[0])])
         means, counts = _lags.direct(slabs, (0, face.shape[1]), vectors, _lags.SECOND)
         kept = counts > 0
-        vectors = vectors[kept]
-        complete = _common_of_all(face.shape, vectors)
-        common = complete if face.complete else _common(np.isfinite(face.heights), vectors)
-        shares = np.stack([one / np.outer(np.diag(one), np.diag(one)) for one in (common, complete)])
-        return cls(vectors, means[kept], shares, face.plane_steps), owner[kept]
+        return cls(vectors[kept], means[kept], counts[kept].astype(float), face.plane_steps), owner[kept]
 
     def part(self, kept: Array) -> Means:
         """Keep some of the lag vectors."""
-        return Means(self.vectors[kept], self.means[kept], self.shares[:, kept][:, :, kept], self.steps)
+        return Means(self.vectors[kept], self.means[kept], self.numbers[kept], self.steps)
+
+    def spread(self, pairs: Pairs, hurst: float, form: Array) -> Array:
+        """Return the covariance of the logarithms of the means, for a surface of matrix `form`."""
+        return covariance(self.vectors, pairs, hurst, form, self.steps)
 
     @property
     def places(self) -> Array:
@@ -118,6 +116,8 @@ class Isotropy:
         One exponent for all directions, of the stretched surface.
     form : ndarray, shape (2, 2)
         The matrix M of that surface, y first.
+    note : str
+        Why there is no stretch; empty if there is one.
     """
 
     p_value: float
@@ -128,13 +128,27 @@ class Isotropy:
     stretched_p_value: float
     hurst: float
     form: Array
+    note: str
 
     @classmethod
     def of(
-        cls, p_value: float, stretched: float, hurst: float, parts: tuple[float, float], errors: Array
+        cls,
+        p_value: float,
+        stretched: float,
+        hurst: float,
+        power: tuple[float, float],
+        parts: tuple[float, float],
+        errors: Array,
     ) -> Isotropy:
-        """Turn the two parts of the logarithm of a stretch, with their covariance, into size and azimuth."""
+        """Turn the two parts of the logarithm of a stretch, with their covariance, into size and azimuth.
+
+        `power` is the exponent of the matrix in the law of the heights, and its variance: where it is next to
+        nothing, any stretch fits.
+        """
+        note = "" if power[0] > max(_WHITE, _SURELY * float(np.sqrt(power[1]))) else UNCORRELATED
         size = float(np.hypot(*parts))
+        if size > 0.99 * STEEPEST and (p_value < _STRANGE or not note):
+            note = RIDGES
         toward = np.array(parts) / size if size > 0 else np.array([1.0, 0.0])
         error = float(np.sqrt(toward @ errors @ toward))
         return cls(
@@ -146,6 +160,7 @@ class Isotropy:
             stretched_p_value=stretched,
             hurst=hurst,
             form=matrix(*parts),
+            note=note,
         )
 
 
@@ -169,103 +184,76 @@ def rays(azimuths: Array | None, steps: tuple[float, float]) -> list[Ray]:
     return found
 
 
-def _common_of_all(shape: tuple[int, int], vectors: Array) -> Array:
-    """Count, on a complete face, the middle points of differences over both of two lag vectors."""
-    farthest = np.maximum(np.abs(vectors)[:, None], np.abs(vectors))
-    return np.asarray(np.prod(np.array(shape) - 2.0 * farthest, axis=-1))
-
-
-def _common(seen: Array, vectors: Array) -> Array:
-    """Count the same where only some points were seen."""
-    ny, nx = seen.shape
-    whole = np.zeros((len(vectors), ny, nx), dtype=bool)
-    for one, (dy, dx) in zip(whole, vectors, strict=True):
-        far = abs(int(dx))
-        one[dy : ny - dy, far : nx - far] = (
-            seen[dy : ny - dy, far : nx - far]
-            & seen[: ny - 2 * dy, far - dx : nx - far - dx]
-            & seen[2 * dy :, far + dx : nx - far + dx]
-        )
-    flat = whole.reshape(len(vectors), -1)
-    total = np.zeros((len(vectors), len(vectors)))
-    for start in range(0, flat.shape[1], _BLOCK):  # counts of a block are exact in single precision
-        part = flat[:, start : start + _BLOCK].astype(np.float32)
-        total += part @ part.T
-    return total
-
-
-def covariance(vectors: Array, shares: Array, hurst: float, form: Array) -> Array:
-    """Return the covariance of the logarithms of mean square second differences: shape (k, k).
-
-    Parameters
-    ----------
-    vectors : ndarray of int, shape (k, 2)
-    shares : ndarray, shape (2, k, k)
-        As of `Means`.
-    hurst : float
-    form : ndarray, shape (2, 2)
-        Matrix by which wavevectors in rad per cell are measured, y first.
-    """
-    points = max(_GRID, 4 * int(np.abs(vectors).max()))
-    wy = (np.arange(points) + 0.5) / points * 2.0 * np.pi - np.pi
-    wx = (np.arange(points // 2) + 0.5) / (points // 2) * np.pi
-    density = aliased_power_law((wy[:, None], wx), hurst, form, images=3)
-    # the response of a second difference about its middle point
-    response = np.stack([(2.0 - 2.0 * np.cos(wy[:, None] * dy + wx * dx)).ravel() for dy, dx in vectors])
-    density = density.ravel()
-    response /= np.sqrt((response**2 @ density) / density.size)[:, None]
-    near = ((response * density) @ response.T / density.size) ** 2
-    powers = response**2 * density
-    whole = powers @ powers.T / density.size
-    return np.asarray(2.0 * (near * shares[0] + (whole - near) * shares[1]))
-
-
-def slope(means: Means, hurst: float, form: Array) -> tuple[float, float, float]:
+def slope(means: Means, pairs: Pairs, hurst: float | None, form: Array) -> tuple[float, float, float]:
     """Return exponent, standard error and the mean square second difference over one x spacing.
 
-    The lag vectors lie along one direction.
+    The lag vectors lie along one direction. The scatter is that of a surface of exponent `hurst`; None takes
+    the one found.
     """
-    lengths = np.hypot(*means.places.T)
-    spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
-    design = np.stack([np.ones(lengths.size), 2.0 * np.log(lengths)], axis=1)
-    (level, exponent), errors = _least_squares(design, np.log(means.means), spread)
+    logs = np.log(np.hypot(*means.places.T))
+    design = np.stack([np.ones(logs.size), 2.0 * logs], axis=1)
+    exponent = 0.5 if hurst is None else hurst
+    for _ in range(1 if hurst is not None else 3):
+        spread = means.spread(pairs, _inside(exponent), form)
+        (level, exponent), errors = _least_squares(design, _logarithms(means, spread), spread)
     return float(exponent), float(np.sqrt(errors[1, 1])), float(np.exp(level))
 
 
-def isotropy(means: Means) -> Isotropy:
+def _logarithms(means: Means, spread: Array) -> Array:
+    """Return the logarithms of the means, and what they fall short of on average for their scatter."""
+    return np.asarray(np.log(means.means) + 0.5 * np.diag(spread))
+
+
+def isotropy(means: Means, pairs: Pairs) -> Isotropy:
     """Fit a stretched fractional Brownian surface, and test it and the isotropic one."""
-    values = np.log(means.means)
-    round_form = np.eye(2)
-    hurst = 0.5
+    spreads = _Spreads(means, pairs)
+    logs = np.log(np.hypot(*means.places.T))
+    design = np.stack([np.ones(logs.size), 2.0 * logs], axis=1)
+    hurst = _inside(np.linalg.lstsq(design, np.log(means.means))[0][1])
     for _ in range(3):
-        spread = covariance(means.vectors, means.shares, hurst, _waves(round_form, means.steps))
-        design, _ = _columns(means.places, round_form)
-        hurst = _inside(_least_squares(design[:, :2], values, spread)[0][1])
-    p_value = _wald(means, values, round_form, spread, freely=True)
+        spread = spreads.near(hurst, 0.0, 0.0)
+        hurst = _inside(_least_squares(design, _logarithms(means, spread), spread)[0][1])
+    p_value = _wald(means, np.eye(2), spreads.near(hurst, 0.0, 0.0), freely=True)
     u = v = 0.0
     for _ in range(_ROUNDS):
-        form = matrix(u, v)
-        spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
+        spread = spreads.near(hurst, u, v)
         slopes = log_square_slopes(means.places, u, v)
-        design = np.stack(
-            [np.ones(values.size), log_squares(means.places, form), hurst * slopes[0], hurst * slopes[1]],
-            axis=1,
-        )
-        coefficients, errors = _least_squares(design, values, spread)
+        columns = [np.ones(logs.size), log_squares(means.places, matrix(u, v))]
+        design = np.stack([*columns, *(hurst * slope for slope in slopes)], axis=1)
+        coefficients, errors = _least_squares(design, _logarithms(means, spread), spread)
         hurst = _inside(coefficients[1])
         u, v = u + coefficients[2], v + coefficients[3]
         size = float(np.hypot(u, v))
-        if size > _STEEPEST:
-            u, v = u * _STEEPEST / size, v * _STEEPEST / size
-        if np.hypot(*coefficients[2:]) < 1e-4 or size > _STEEPEST:
+        if size > STEEPEST:
+            u, v = u * STEEPEST / size, v * STEEPEST / size
+        if np.hypot(*coefficients[2:]) < 1e-4 or size > STEEPEST:
             break
-    form = matrix(u, v)
-    spread = covariance(means.vectors, means.shares, hurst, _waves(form, means.steps))
-    stretched = _wald(means, values, form, spread, freely=False)
-    return Isotropy.of(p_value, stretched, hurst, (u, v), errors[2:, 2:])
+    stretched = _wald(means, matrix(u, v), spreads.near(hurst, u, v), freely=False)
+    found = Isotropy.of(
+        p_value, stretched, hurst, (float(coefficients[1]), errors[1, 1]), (u, v), errors[2:, 2:]
+    )
+    if coefficients[1] < 1.0 + _SURELY * np.sqrt(errors[1, 1]):
+        return found
+    return replace(found, p_value=np.nan, stretched_p_value=np.nan, note=SMOOTH)
 
 
-def _wald(means: Means, values: Array, form: Array, spread: Array, *, freely: bool) -> float:
+class _Spreads:
+    """Covariances of means; one is taken again until the surface differs enough to change it."""
+
+    def __init__(self, means: Means, pairs: Pairs) -> None:
+        self.means, self.pairs = means, pairs
+        self.at = np.full(3, np.inf)
+        self.spread = np.zeros((0, 0))
+
+    def near(self, hurst: float, u: float, v: float) -> Array:
+        """Return the covariance for an exponent and the parts of the logarithm of a stretch."""
+        asked = np.array([hurst, u, v])
+        if np.abs(asked - self.at).max() > _SAME:
+            self.at, self.spread = asked, self.means.spread(self.pairs, hurst, matrix(u, v))
+        return self.spread
+
+
+def _wald(means: Means, form: Array, spread: Array, *, freely: bool) -> float:
     """Return how likely harmonics as large are by chance; the level of the second is free in a stretch."""
     from scipy.special import chdtrc
 
@@ -273,7 +261,8 @@ def _wald(means: Means, values: Array, form: Array, spread: Array, *, freely: bo
     if not freely:
         smooth, waves = np.concatenate([smooth, waves[:, :2]], axis=1), waves[:, 2:]
     root = np.linalg.cholesky(spread)
-    smooth, waves, values = (np.linalg.solve(root, part) for part in (smooth, waves, values[:, None]))
+    values = _logarithms(means, spread)[:, None]
+    smooth, waves, values = (np.linalg.solve(root, part) for part in (smooth, waves, values))
     basis = np.linalg.qr(smooth)[0]
     waves, values = (part - basis @ (basis.T @ part) for part in (waves, values))
     left, singular, _ = np.linalg.svd(waves, full_matrices=False)
@@ -323,11 +312,6 @@ def quadratic(places: Array, form: Array) -> Array:
     """Return h' M h for vectors h on the last axis."""
     y, x = places[..., 0], places[..., 1]
     return np.asarray(form[0, 0] * y * y + 2.0 * form[0, 1] * y * x + form[1, 1] * x * x)
-
-
-def _waves(form: Array, steps: tuple[float, float]) -> Array:
-    """Return the matrix that measures wavevectors in rad per cell."""
-    return np.asarray(np.linalg.inv(form) / np.outer(steps, steps))
 
 
 def _least_squares(design: Array, values: Array, spread: Array) -> tuple[Array, Array]:

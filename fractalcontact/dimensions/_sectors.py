@@ -24,9 +24,13 @@ WIDEST = 90.0 / _rays.DIRECTIONS  # half the angle of a sector, degrees
 LEAST = 100  # modes, to tell the harmonics of their directions
 _LEAST_TAPERED = 600  # the same in the whole plane of a tapered face
 _LONGEST, _SHORTEST = 3.5, 6.0  # steps of the wavenumber, and spacings: the waves of a tapered face
+_LOBE, _CLIFF = 4, 2e-3  # rings within which the power of a tapered face falls so far only at a cut-off
 _DEAD = 1e-20  # of the strongest mode: nothing but rounding
 _ROUNDS = 40
-_LIMITS = ([-0.9, -5.0, -5.0], [3.0, 5.0, 5.0])  # of H and of the parts of the logarithm of a stretch
+_LIMITS = (
+    [-0.99, -_rays.STEEPEST, -_rays.STEEPEST],
+    [3.0, _rays.STEEPEST, _rays.STEEPEST],
+)  # of H and of the parts of the logarithm of a stretch
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,7 @@ def isotropy(plane: Plane, hurst: float) -> _rays.Isotropy:
         if np.abs(step[1:]).max() < 1e-7:
             break
     stretched = _score_test(plane, np.linalg.inv(_rays.matrix(u, v)), hurst, free=2)
-    return _rays.Isotropy.of(p_value, stretched, hurst, (u, v), errors[2:, 2:])
+    return _rays.Isotropy.of(p_value, stretched, hurst, (1.0 + hurst, errors[1, 1]), (u, v), errors[2:, 2:])
 
 
 def tapered_test(
@@ -139,6 +143,8 @@ def tapered_test(
     low = max(low, narrow / scales[1])
     high = 1.0 / max(_SHORTEST * max(steps), scales[0]) / narrow
     kept = (radius >= low) & (radius <= high)
+    ring = np.rint(radius * (_LONGEST / low)).astype(int)
+    kept &= ring <= _last(np.bincount(ring[kept], power[kept]) / np.maximum(np.bincount(ring[kept]), 1))
     if np.count_nonzero(kept) < _LEAST_TAPERED:
         return float("nan")
     y, x = (waves[kept] @ np.linalg.cholesky(form)).T
@@ -155,6 +161,12 @@ def tapered_test(
         )
     spread = 2.0 * whole.reshape(len(whole), -1) @ near.reshape(len(whole), -1).T
     return _chance(centred.T @ excess, spread, free)
+
+
+def _last(mean: Array) -> int:
+    """Return the last ring before a cut-off: what follows is what the taper lets through."""
+    falls = np.flatnonzero(mean[_LOBE:] < _CLIFF * mean[:-_LOBE])
+    return int(falls[0]) if falls.size else mean.size
 
 
 def _score_test(plane: Plane, form: Array, hurst: float, *, free: int) -> float:

@@ -17,6 +17,7 @@ from fractalcontact.dimensions import _periodic, _rays, _sectors
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
 from fractalcontact.dimensions._faces import Face, read_faces, read_scales
 from fractalcontact.dimensions._fitting import LEAST_MODES, PeriodicModes, fitted
+from fractalcontact.dimensions._scatter import Pairs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16
-_WHITE = 0.05  # exponent below which heights have no length of correlation that could be stretched
 _STRANGE = 1e-3  # chance below which no stretch explains the face
+_COMPARED = 1 / 3  # of the face, that a second difference may span in a test
 _UNVARIED = 1e-22  # of the largest mean square: the heights do not vary along that direction
+_MODELLESS = (_rays.RIDGES, _rays.SMOOTH)
 _SMOOTH = "the heights do not vary along this direction"
 _BEYOND = "the face is no stretched fractional Brownian one, and no model tells how the estimates scatter"
 _FEW = "fewer than two lags of this direction fit into the face, or into the scales asked for"
@@ -115,9 +117,8 @@ def directions(
 
     with Problems("fractalcontact.dimensions.directions") as problems:
         asked = None if azimuth is None else np.unique(np.mod(problems.numbers("azimuth", azimuth), 180.0))
-        faces = read_faces(surface, problems, smallest=SMALLEST, taken=_RESULTS)
+        faces = read_faces(surface, problems, smallest=SMALLEST, profile=False, taken=_RESULTS)
         window = read_scales(problems, scales, faces)
-        problems.require("y" in getattr(surface, "dims", ("y",)), "surface", "dims (..., y, x)", surface)
     started = time.perf_counter()
     periodic = all(faces[0].grid.periodic) and all(face.complete for face in faces)
     rays = [] if periodic else _unique(_rays.rays(asked, faces[0].plane_steps))
@@ -178,18 +179,18 @@ def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] |
         one = undefined(CONSTANT) if face.is_constant else plane()
         return _Turned([one.limited() if np.isfinite(one.hurst) else one] * len(rays), None, one.note)
     means, owner = _rays.Means.of(face, rays, scales)
-    around, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales, _rays.COMPARED)
+    around = _compared(face, scales)
     level = _UNVARIED * max(means.means.max(initial=0.0), around.means.max(initial=0.0))
     varied, smooth = around.part(around.means > level), bool((around.means <= level).any())
     enough = np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > _rays.LEAST_LAGS
-    isotropy = _rays.isotropy(varied) if enough else None
-    strange = isotropy is not None and isotropy.stretched_p_value < _STRANGE
+    isotropy = _rays.isotropy(varied, _pairs(face, varied)) if enough else None
+    strange = isotropy is not None and (isotropy.stretched_p_value < _STRANGE or isotropy.note in _MODELLESS)
     if isotropy is not None and face.complete:
         isotropy = _by_waves(face, isotropy, scales)
     if smooth and isotropy is not None:
-        isotropy = replace(isotropy, p_value=0.0, stretched_p_value=0.0)
+        isotropy = replace(isotropy, p_value=0.0, stretched_p_value=0.0, note=_rays.RIDGES)
     beyond = strange or (isotropy is not None and isotropy.stretched_p_value < _STRANGE)
-    hurst, form = (isotropy.hurst, isotropy.form) if isotropy is not None else (0.5, np.eye(2))
+    hurst, form = (isotropy.hurst, isotropy.form) if isotropy is not None else (None, np.eye(2))
     estimates = []
     for place in range(len(rays)):
         own = means.part(owner == place)
@@ -198,19 +199,32 @@ def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] |
         elif len(own.means) < 2:
             estimates.append(undefined(_FEW))
         else:
-            estimates.append(_along(own, hurst, form, face.unit, _BEYOND if beyond else ""))
+            estimates.append(_along(face, own, hurst, form, _BEYOND if beyond else ""))
     note = "" if isotropy is not None else "too few lags fit into the face to compare directions"
     return _Turned(estimates, *_known(isotropy, note))
 
 
+def _compared(face: Face, scales: tuple[float, float] | None) -> _rays.Means:
+    """Measure the lags by which directions are compared: differences span a third of the face at most."""
+    means, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales)
+    inside = np.all(2 * np.abs(means.vectors) < _COMPARED * np.array(face.shape), axis=1)
+    return means.part(inside)
+
+
+def _pairs(face: Face, means: _rays.Means) -> Pairs:
+    return Pairs.of(face.heights, face.complete, means.vectors, means.numbers)
+
+
 def _known(isotropy: _rays.Isotropy | None, note: str) -> tuple[_rays.Isotropy | None, str]:
-    """Leave out the stretch of heights that are next to uncorrelated."""
-    if isotropy is None or isotropy.hurst >= _WHITE:
+    """Leave out a stretch that means nothing; ridges keep their azimuth."""
+    if isotropy is None or not isotropy.note:
         return isotropy, note
+    azimuth = isotropy.azimuth if isotropy.note == _rays.RIDGES else np.nan
+    chance = isotropy.stretched_p_value if isotropy.note == _rays.SMOOTH else np.nan
     blank = replace(
-        isotropy, stretch=np.nan, low=np.nan, high=np.nan, azimuth=np.nan, stretched_p_value=np.nan
+        isotropy, stretch=np.nan, low=np.nan, high=np.nan, azimuth=azimuth, stretched_p_value=chance
     )
-    return blank, "heights without correlation have no stretch"
+    return blank, isotropy.note
 
 
 def _by_waves(face: Face, found: _rays.Isotropy, scales: tuple[float, float] | None) -> _rays.Isotropy:
@@ -231,15 +245,17 @@ def _by_waves(face: Face, found: _rays.Isotropy, scales: tuple[float, float] | N
     )
 
 
-def _along(own: _rays.Means, hurst: float, form: Array, unit: float, reason: str) -> Estimate:
+def _along(face: Face, own: _rays.Means, hurst: float | None, form: Array, reason: str) -> Estimate:
     """Return the estimate of one direction."""
-    exponent, error, second = _rays.slope(own, hurst, form)
+    exponent, error, second = _rays.slope(own, _pairs(face, own), hurst, form)
     low, high = normal_interval(exponent, error)
     # a second difference over one lag has 4 - 4^H times the mean square of a first one
     first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan
     if reason:
         error = low = high = np.nan
-    estimate = Estimate(exponent, error, low, high, increment=float(np.sqrt(first)) * unit, not_given=reason)
+    estimate = Estimate(
+        exponent, error, low, high, increment=float(np.sqrt(first)) * face.unit, not_given=reason
+    )
     return estimate.limited()
 
 
