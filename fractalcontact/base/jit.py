@@ -29,12 +29,6 @@ def kernel(function: F) -> F:
     return compiled
 
 
-def inner_loop(function: F) -> F:
-    """Write a loop into the kernels that call it, where it is compiled with them and never by itself."""
-    written_in: F = numba.njit(inline="always")(function)
-    return written_in
-
-
 def sum_kernel(function: F) -> F:
     """Compile a serial loop whose sums over a row may be done in lanes: several times as fast.
 

@@ -62,12 +62,14 @@ def every_offset(cells: Array, size: int, periodic: Sequence[bool]) -> tuple[Arr
 
     nx = cells.shape[1]
     rows, across = (bands(n, size, wraps) for n, wraps in zip(cells.shape, periodic, strict=True))
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]  # each follows from the one before
     whole = across[:, 1] - across[:, 0] == size
     count, area = np.zeros((2, size, size), np.int64)
+    held = np.zeros((2, 2), np.int64)
     columns = np.zeros((3, nx), np.int32)
     prefix = np.zeros((2, nx + 1 + (2 * size if periodic[1] else 0)), np.int32)
     met, lost = np.zeros((2, size, int(whole.sum())), np.int32)
-    cover(cells, size, rows, across[~whole], columns, prefix, met, lost, count, area)
+    cover(cells, size, rows, across[~whole], held, columns, prefix, met, lost, count, area)
     count += _by_offset(met, size)
     area += size * (size * _by_offset(met, size) - _by_offset(lost, size))
     return count, area
@@ -98,7 +100,7 @@ def bands(n: int, size: int, wraps: bool) -> Array:
         cut = np.arange(1, size)  # cells of the band at the low end, or of that at the high end
         top = np.stack([0 * cut, cut, 0 * cut, cut + size, cut], axis=-1)
         bottom = np.stack([n - cut, 0 * cut + n, n - cut - size, 0 * cut + n, (n - cut) % size], axis=-1)
-        ends = np.concatenate([top, bottom[cut <= n][::-1]])  # each follows from the one before
+        ends = np.concatenate([top, bottom[cut <= n]])
         ends[:, :4] = np.clip(ends[:, :4], 0, n)
     return np.concatenate([whole, ends]).astype(np.int64)
 
@@ -121,28 +123,69 @@ def every_position(cells: Array, largest: int, periodic: Sequence[bool]) -> tupl
     every box that hangs over a free edge; in the second, boxes that hang over opposite edges by the same cut
     count once. No free axis is shorter than `largest`.
     """
-    from fractalcontact.domains import _mean_kernels as kernels
+    from fractalcontact.domains._mean_kernels import nearest_ahead
 
     (ny, nx), (wrap_y, wrap_x) = cells.shape, periodic
+    ahead = [(0, largest if wraps else 0) for wraps in periodic]
+    distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
     histogram = np.zeros(largest + 2, np.int64)
-    kernels.inside(cells, largest, wrap_y, wrap_x, np.full(nx + 1, largest + 1, np.int32), histogram)
-    whole = np.cumsum(histogram)[: largest + 1]
+    nearest_ahead(np.pad(cells, ahead, mode="wrap"), ny, nx, distance, histogram)
+    whole = np.cumsum(histogram)[: largest + 1]  # with the boxes that hang over the far edges
     folded = whole.copy()
-    top, bottom = np.full((2, nx), ny, np.int64)
-    left, right = np.full((2, ny), nx, np.int64)
-    kernels.from_edges(cells, top, bottom, left, right)
-    nearer, closer = np.minimum(top, bottom), np.minimum(left, right)
-    if not wrap_y:
-        for first, totals in ((top, whole), (bottom, whole), (nearer, folded)):
-            kernels.hanging(first, largest, wrap_x, first.copy(), totals)
-    if not wrap_x:
-        for first, totals in ((left, whole), (right, whole), (closer, folded)):
-            kernels.hanging(first, largest, wrap_y, first.copy(), totals)
+    for axis, wrap, along in ((0, wrap_y, wrap_x), (1, wrap_x, wrap_y)):
+        if not wrap:
+            low, high = _from_edges(cells, axis, largest)
+            hanging = _over_edge(np.stack([low, high, np.minimum(low, high)]), largest, along)
+            whole += hanging[0]
+            folded += hanging[2] - hanging[1]
     if not wrap_y and not wrap_x:
-        for first in (left, right, left[::-1], right[::-1]):
-            kernels.corner(np.minimum.accumulate(first[:largest]), whole)
-        kernels.corner(np.minimum.accumulate(np.minimum(closer, closer[::-1])[:largest]), folded)
+        left, right = _from_edges(cells, 1, largest)
+        nearer = np.minimum(left, right)
+        nearer = np.minimum(nearer, nearer[::-1])
+        corners = _over_corner(np.stack([left, right, left[::-1], right[::-1], nearer]), largest)
+        whole += corners[:3].sum(axis=0)
+        folded += corners[4] - corners[3]
     return whole, folded
+
+
+def _from_edges(cells: Array, axis: int, reach: int) -> Array:
+    """Return the cells from both ends of each line along `axis` to the set, `reach` where there are more."""
+    lines = np.moveaxis(cells.view(np.bool_), axis, 0)
+    ends = np.stack([lines[:reach], lines[: -reach - 1 : -1]])
+    return np.where(ends.any(axis=1), ends.argmax(axis=1), reach)
+
+
+def _over_edge(first: Array, largest: int, wrap: bool) -> Array:
+    """Count the positions of boxes of all sizes that hang over one edge and meet the set, (edges, sizes).
+
+    `first` (edges, n) is how far from the edge each line of cells across it meets the set.
+    """
+    n = first.shape[1]
+    totals = np.zeros((len(first), largest + 1), np.int64)
+    following = np.pad(first, ((0, 0), (0, largest - 1)), mode="wrap") if wrap else first
+    nearest = following
+    for size in range(2, largest + 1):
+        last = n if wrap else n - size + 1
+        nearest = np.minimum(nearest[:, :last], following[:, size - 1 : size - 1 + last])
+        totals[:, size] = np.maximum(size - 1 - nearest, 0).sum(axis=1)
+    return totals
+
+
+def _over_corner(first: Array, largest: int) -> Array:
+    """Count the positions of boxes of all sizes that hang over two edges and meet the set, (corners, sizes).
+
+    `first` (corners, n) is how far from one edge each line of cells meets the set, from the other edge
+    inwards.
+    """
+    nearest = np.minimum.accumulate(first[:, :largest], axis=1)
+    needed = np.maximum(np.arange(nearest.shape[1]), nearest) + 2  # the size from which on they meet it
+    places = np.minimum(needed, largest + 1) + (largest + 2) * np.arange(len(first))[:, None]
+    number, less = (
+        np.bincount(places.ravel(), weight, len(first) * (largest + 2)).reshape(len(first), -1).cumsum(axis=1)
+        for weight in (None, nearest.ravel())
+    )
+    totals = (np.arange(largest + 2) - 1) * number - less
+    return np.asarray(totals[:, : largest + 1], np.int64)
 
 
 def observed_in_boxes(valid: Array, size: int, periodic: Sequence[bool]) -> Array:

@@ -32,13 +32,13 @@ def _glided(planes: Planes, plane: int, size: int) -> float:
     rows, across = ny if wrap_y else ny - size + 1, nx if wrap_x else nx - size + 1
     masses = np.zeros(rows, np.int64)
     squares = np.zeros(rows, np.int64 if size**4 * across <= EXACT else np.float64)
-    columns, seen = np.zeros((2, nx), np.int32)
+    columns, seen = np.zeros((2, nx + size), np.int32)
     valid = planes.valid_of(plane)
     if valid is None:
-        kernels.glide(planes.cells[plane], size, wrap_x, columns, masses, squares)
+        kernels.glide(planes.cells[plane], size, across, columns, masses, squares)
         return _ratio(rows * across, masses, squares)
     places = np.zeros(rows, np.int64)
-    kernels.glide_observed(planes.cells[plane], valid, size, wrap_x, columns, seen, masses, squares, places)
+    kernels.glide_observed(planes.cells[plane], valid, size, across, columns, seen, masses, squares, places)
     return _ratio(int(places.sum()), masses, squares)
 
 

@@ -1,6 +1,6 @@
 """Loops of the gliding box: sums of the mass in it, and of its square, over all positions.
 
-Masks are uint8 (0 or 1), shape (ny, nx); `wrap` says that an axis is periodic. Sums are kept per row.
+Masks are uint8 (0 or 1), shape (ny, nx). Sums are kept per row.
 """
 
 from __future__ import annotations
@@ -9,53 +9,36 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import inner_loop, kernel
+from fractalcontact.base.jit import kernel
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-@inner_loop
-def _slide(columns: Array, leaving: Array, entering: Array) -> None:
-    for j in range(columns.size):
-        columns[j] += np.int32(entering[j]) - np.int32(leaving[j])
-
-
-@inner_loop
-def _first_band(mask: Array, size: int, columns: Array) -> None:
-    for k in range(size):
-        for j in range(columns.size):
-            columns[j] += np.int32(mask[k, j])
-
-
 @kernel
-def glide(mask: Array, size: int, wrap_x: bool, columns: Array, masses: Array, squares: Array) -> None:
-    """Add up the mass in the box and its square along every row of positions.
+def glide(mask: Array, size: int, across: int, columns: Array, masses: Array, squares: Array) -> None:
+    """Add up the mass in the box and its square along every row of `across` positions.
 
     `masses` (int64) and `squares` (int64, or float64 where it could overflow) hold one value per row of
-    positions: ny of them, or ny - size + 1 where y is free. `columns` (nx) int32 is zeros to work in.
+    positions: ny of them, or ny - size + 1 where y is free. `columns` (nx + size) int32 is zeros to work in.
     """
     ny, nx = mask.shape
-    last = nx if wrap_x else nx - size + 1
-    inner = nx - size  # positions after which the box does not yet go round
-    _first_band(mask, size, columns)
-    for i in range(masses.size):
-        inside = np.int64(0)
+    for i in range(1 - size, masses.size):
+        entering = (i + size - 1) % ny
+        leaving = i - 1 if i > 0 else 0
+        for j in range(nx):
+            columns[j] = columns[j] + mask[entering, j] - (i > 0) * mask[leaving, j]
+        if i < 0:
+            continue
+        for j in range(size):  # a periodic axis goes on
+            columns[nx + j] = columns[j]
+        inside, mass, square = 0, 0, squares[i]
         for j in range(size):
             inside += columns[j]
-        mass = np.int64(0)
-        square = squares[i]
-        for j in range(min(inner, last)):
+        for j in range(across):
             mass += inside
             square += inside * inside
             inside += columns[j + size] - columns[j]
-        for j in range(inner, last):
-            mass += inside
-            square += inside * inside
-            inside += columns[(j + size) % nx] - columns[j]
-        masses[i] = mass
-        squares[i] = square
-        if i + 1 < masses.size:
-            _slide(columns, mask[i], mask[(i + size) % ny])
+        masses[i], squares[i] = mass, square
 
 
 @kernel
@@ -63,7 +46,7 @@ def glide_observed(
     mask: Array,
     valid: Array,
     size: int,
-    wrap_x: bool,
+    across: int,
     columns: Array,
     seen: Array,
     masses: Array,
@@ -72,30 +55,32 @@ def glide_observed(
 ) -> None:
     """As `glide`, over the positions where every cell of the box was observed; `places` counts them.
 
-    `seen` (nx) int32 is zeros to work in, too.
+    `seen` (nx + size) int32 is zeros to work in, too.
     """
     ny, nx = mask.shape
-    last = nx if wrap_x else nx - size + 1
-    _first_band(mask, size, columns)
-    _first_band(valid, size, seen)
-    for i in range(masses.size):
-        inside, observed = np.int64(0), np.int64(0)
+    for i in range(1 - size, masses.size):
+        entering = (i + size - 1) % ny
+        leaving = i - 1 if i > 0 else 0
+        for j in range(nx):
+            columns[j] = columns[j] + mask[entering, j] - (i > 0) * mask[leaving, j]
+            seen[j] = seen[j] + valid[entering, j] - (i > 0) * valid[leaving, j]
+        if i < 0:
+            continue
+        for j in range(size):
+            columns[nx + j] = columns[j]
+            seen[nx + j] = seen[j]
+        inside, observed, square = 0, 0, squares[i]
         for j in range(size):
             inside += columns[j]
             observed += seen[j]
-        square = squares[i]
-        for j in range(last):
+        for j in range(across):
             if observed == size * size:
                 places[i] += 1
                 masses[i] += inside
                 square += inside * inside
-            beyond = (j + size) % nx
-            inside += columns[beyond] - columns[j]
-            observed += seen[beyond] - seen[j]
+            inside += columns[j + size] - columns[j]
+            observed += seen[j + size] - seen[j]
         squares[i] = square
-        if i + 1 < masses.size:
-            _slide(columns, mask[i], mask[(i + size) % ny])
-            _slide(seen, valid[i], valid[(i + size) % ny])
 
 
 @kernel

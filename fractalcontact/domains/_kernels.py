@@ -16,42 +16,12 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @kernel
-def _slide(mask: Array, columns: Array, start: int, stop: int, new_start: int, new_stop: int) -> None:
-    """Change the number of cells in each column from rows [start, stop) to rows [new_start, new_stop)."""
-    ny, nx = mask.shape
-    if new_start < start or new_start >= stop or new_stop < stop:
-        for j in range(nx):
-            columns[j] = 0
-        start = stop = new_start
-    for i in range(start, new_start):
-        row = mask[i % ny]
-        for j in range(nx):
-            columns[j] -= row[j]
-    for i in range(stop, new_stop):
-        row = mask[i % ny]
-        for j in range(nx):
-            columns[j] += row[j]
-
-
-@kernel
-def _occupied_before(columns: Array, less: Array, prefix: Array) -> None:
-    """Number of columns that hold more cells than `less`, left of each position; goes round where longer."""
-    nx = columns.size
-    total = np.int32(0)
-    prefix[0] = 0
-    for j in range(nx):
-        total += np.int32(columns[j] > less[j])
-        prefix[j + 1] = total
-    for j in range(nx + 1, prefix.size):
-        prefix[j] = total + prefix[j - nx]
-
-
-@kernel
 def cover(
     mask: Array,
     size: int,
     rows: Array,
     cut: Array,
+    held: Array,
     columns: Array,
     prefix: Array,
     met: Array,
@@ -61,39 +31,52 @@ def cover(
 ) -> None:
     """Add the boxes that meet the set in all bands of rows.
 
-    `rows` lists the bands of rows, `cut` those of columns that are cut by the edge. `met` and `lost` (size,
-    positions) get for each whole band of columns the boxes met, and the rows that those of them lose that
-    count by their part inside; `count` and `area` (size, size) the boxes cut in x and their area in cells.
-    `columns` (3, nx) and `prefix` (2, at least nx + 1) are zeros to work in: of the band, of a band that is
-    cut in y with those beside it, and nothing.
+    `rows` lists the bands of rows by their start, then by their stop, `cut` the bands of columns that are
+    cut by the edge. `met` and `lost` (size, positions) get for each whole band of columns the boxes met, and
+    the rows that those of them lose that count by their part inside; `count` and `area` (size, size) the
+    boxes cut in x and their area in cells.
+
+    The others are zeros to work in, for the band and, where it is cut in y, for it with those beside it:
+    `held` (2, 2) the rows summed up, `columns` (3, nx) the cells of the set in each column
+    (and, last, none), `prefix` (2, at
+    least nx + 1) how many columns left of each position hold any, or hold more than in the band; it goes
+    round where longer.
     """
-    positions = met.shape[1]
-    none: Any = np.int64(0)  # a literal would have `_slide` compiled twice
-    last = last_stop = last_wide = last_wide_stop = none
-    here, beside = prefix[0], prefix[1]
+    ny, nx = mask.shape
+    ahead = np.uint32(size)  # unsigned: no test for negatives
     for k in range(rows.shape[0]):
-        start, stop, wide, wide_stop, offset = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4]
-        _slide(mask, columns[0], last, last_stop, start, stop)
-        _occupied_before(columns[0], columns[2], here)
-        last, last_stop = start, stop
-        missing = size - (stop - start)
+        first, end, offset = rows[k, 0], rows[k, 1], rows[k, 4]
+        missing = size - (end - first)
+        for w in range(2 if missing > 0 else 1):
+            start, stop = rows[k, 2 * w], rows[k, 2 * w + 1]
+            if stop < held[w, 1]:  # periodic: the remainder ends before the last whole band
+                held[w, 0] = held[w, 1] = start
+                for j in range(nx):
+                    columns[w, j] = 0
+            for i in range(held[w, 0], start):
+                for j in range(nx):
+                    columns[w, j] -= mask[i % ny, j]
+            for i in range(held[w, 1], stop):
+                for j in range(nx):
+                    columns[w, j] += mask[i % ny, j]
+            held[w, 0], held[w, 1] = start, stop
+            total = 0
+            for j in range(nx):
+                total += columns[w, j] > columns[2 - 2 * w, j]
+                prefix[w, j + 1] = total
+            for j in range(nx + 1, prefix.shape[1]):
+                prefix[w, j] = total + prefix[w, j - nx]
         if missing > 0:
-            _slide(mask, columns[1], last_wide, last_wide_stop, wide, wide_stop)
-            _occupied_before(columns[1], columns[0], beside)
-            last_wide, last_wide_stop = wide, wide_stop
-            for j in range(positions):
-                inside = here[j + size] > here[j] and beside[j + size] > beside[j]
-                lost[offset, j] += np.int32(missing * inside)
-        for j in range(positions):
-            met[offset, j] += np.int32(here[j + size] > here[j])
+            for j in range(met.shape[1]):
+                inside = prefix[0, j + ahead] > prefix[0, j] and prefix[1, j + ahead] > prefix[1, j]
+                lost[offset, j] += missing * inside
+        for j in range(met.shape[1]):
+            met[offset, j] += prefix[0, j + ahead] > prefix[0, j]
         for c in range(cut.shape[0]):
             left, right, column = cut[c, 0], cut[c, 1], cut[c, 4]
-            inside = here[right] - here[left]
-            if inside > 0:
-                width, height = size, size
-                if here[cut[c, 3]] - here[cut[c, 2]] > inside:
-                    width = right - left
-                if missing > 0 and beside[right] > beside[left]:
-                    height = stop - start
+            here = prefix[0, right] - prefix[0, left]
+            if here > 0:
+                alone = prefix[0, cut[c, 3]] - prefix[0, cut[c, 2]] == here
+                above = missing == 0 or prefix[1, right] == prefix[1, left]
                 count[offset, column] += 1
-                area[offset, column] += width * height
+                area[offset, column] += (size if alone else right - left) * (size if above else end - first)
