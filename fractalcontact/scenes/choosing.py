@@ -20,7 +20,7 @@ from fractalcontact.scenes.given import face_grid
 from fractalcontact.scenes.scene import Scene
 
 MARGIN = 3.0  # asked of the curve, because no two faces are alike
-ERRORS = tuple(float(f"{e:.3g}") for e in np.geomspace(0.3, 1e-6, 34))
+ERRORS = tuple(float(f"{e:.3g}") for e in np.geomspace(0.3, 1e-12, 70))
 MEASURED_EDGE = 128.0  # points along an edge of the face on which tolerances were measured
 GROWTH = 1.15  # of seconds with the number of points, to that power
 WARM = 0.5  # seconds of a step that starts from the one before, over those of the first
@@ -56,8 +56,13 @@ def choose(scene: Scene) -> tuple[Scene, tuple[Choice, ...]]:
     if "error" not in scene.tables and "budget" not in scene.tables:
         return scene, ()
     items = dict(_items(scene))
-    if "error" in scene.tables:
-        picked = _pick(items, float(scene.tables["error"]))
+    picked: tuple[Choice, ...] = ()
+    if not items:
+        _warn(
+            "error or budget: nothing is left to be picked, no wanted result has an open method or tolerance"
+        )
+    elif "error" in scene.tables:
+        picked = _for_error(items, float(scene.tables["error"]))
     else:
         picked = _for_budget(items, float(scene.tables["budget"]))
     tables = {key: _copied(value) for key, value in scene.tables.items()}
@@ -70,19 +75,31 @@ def choose(scene: Scene) -> tuple[Scene, tuple[Choice, ...]]:
     return replace(scene, tables=tables), picked
 
 
+def _for_error(items: Mapping[str, list[Option]], error: float) -> tuple[Choice, ...]:
+    """Return the quickest options that keep the error, with a warning that names those that do not."""
+    picked = _pick(items, error)
+    beyond = [f"{one.key} comes to {one.option.error:.1g}" for one in picked if not one.reached]
+    if beyond:
+        _warn(f"an error of {error:g} is out of reach: {', '.join(beyond)}")
+    return picked
+
+
 def _for_budget(items: Mapping[str, list[Option]], budget: float) -> tuple[Choice, ...]:
     """Return the options of the least error that keep the budget, with a warning where none do."""
     picked = _pick(items, ERRORS[0])
     least = sum(one.option.seconds for one in picked)
     if least > budget:
-        told = f"a budget of {budget:g} s: what is wanted takes about {least:.2g} s at the least"
-        warnings.warn(told, FractalContactWarning, stacklevel=4)
+        _warn(f"a budget of {budget:g} s: what is wanted takes about {least:.2g} s at the least")
     for error in ERRORS[1:]:
         finer = _pick(items, error)
         if sum(one.option.seconds for one in finer) > budget:
             break
         picked = finer
     return picked
+
+
+def _warn(told: str) -> None:
+    warnings.warn(told, FractalContactWarning, stacklevel=4)
 
 
 def _copied(value: Any) -> Any:

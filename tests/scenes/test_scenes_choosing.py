@@ -71,13 +71,15 @@ def scene(tmp_path, top, **changes):
 
 
 def test_the_plan_says_what_was_picked(tmp_path):
-    told = str(fc.scenes.plan(scene(tmp_path, "error = 1e-3\n")))
+    with pytest.warns(FractalContactWarning, match="out of reach: want.dimensions comes to 0.0"):
+        told = str(fc.scenes.plan(scene(tmp_path, "error = 1e-3\n")))
     for key in ("joint.tolerance", "want.dimensions", "domains.box_dimension.cover"):
         assert f"picked: {key} = " in told
     assert "the least there is" in told  # no estimator comes within .001 on a face of 48 x 48
     assert "picked" not in str(fc.scenes.plan(scene(tmp_path, "")))
 
 
+@pytest.mark.filterwarnings("ignore:an error of")
 def test_a_looser_error_picks_the_quicker_estimator(tmp_path):
     picked = {}
     for error in (0.3, 1e-4):
@@ -88,6 +90,29 @@ def test_a_looser_error_picks_the_quicker_estimator(tmp_path):
     assert seconds[picked[0.3]] < seconds[picked[1e-4]]
 
 
+@pytest.mark.filterwarnings("ignore:an error of", "ignore:a budget of")
+@pytest.mark.parametrize(
+    ("key", "wishes"), [("error", 10.0 ** -np.arange(1, 13)), ("budget", 10.0 ** np.arange(-2, 5))]
+)
+def test_asking_for_more_never_costs_less_and_never_errs_more(tmp_path, key, wishes):
+    costs, errors = [], []
+    for wish in wishes:
+        _, choices = choose(scene(tmp_path, f"{key} = {wish}\n"))
+        costs.append(sum(choice.option.seconds for choice in choices))
+        errors.append(max(choice.option.error for choice in choices if choice.key.endswith("tolerance")))
+    assert costs == sorted(costs)
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-9  # the largest budget buys the least error that there is
+
+
+def test_a_scene_without_a_choice_says_so(tmp_path):
+    text = "budget = 3\n" + SOUND.replace('"closure", ', "")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.warns(FractalContactWarning, match="nothing is left to be picked"):
+        assert choose(fc.scenes.load(tmp_path / "study.toml"))[1] == ()
+
+
+@pytest.mark.filterwarnings("ignore:an error of")
 def test_what_the_scene_states_is_left(tmp_path):
     stated = scene(tmp_path, "error = 1e-2\n", **{"block = 2.4e-3": "block = 2.4e-3\ntolerance = 1e-7"})
     found, choices = choose(stated)
