@@ -14,15 +14,18 @@ _limit: ContextVar[int | None] = ContextVar("fractalcontact_threads", default=No
 
 def thread_count() -> int:
     """Return the number of threads in force here."""
-    chosen = _limit.get()
+    chosen = _limit.get() or asked()
     if chosen is not None:
         return chosen
-    asked = os.environ.get("FRACTALCONTACT_THREADS", "")
-    if asked.isdigit() and int(asked) > 0:
-        return int(asked)
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def asked() -> int | None:
+    """Return the number that the environment asks for, None if it asks for none."""
+    word = os.environ.get("FRACTALCONTACT_THREADS", "")
+    return int(word) if word.isdigit() and int(word) > 0 else None
 
 
 @contextmanager

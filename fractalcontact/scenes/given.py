@@ -22,10 +22,12 @@ LARGE = 1 << 18  # nodes of a face that is not made twice
 
 
 def read_surface(table: Table, folder: Path) -> xr.DataArray:
-    """Return the face that a table of the scene describes."""
+    """Return the face that a table of the scene describes; with `member`, that one of its ensemble alone."""
     from fractalcontact import surfaces
 
     options = {key: value for key, value in table.items() if key not in ("level", "despike", "fill")}
+    if "member" in options:
+        options["rng"] = np.random.SeedSequence(options["rng"], spawn_key=(options.pop("member"),))
     if "generate" in options:
         generate: Callable[..., xr.DataArray] = getattr(surfaces, options.pop("generate"))
         face = generate(**options)

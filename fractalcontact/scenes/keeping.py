@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import secrets
 import shutil
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +30,7 @@ class Store:
     """Results of finished parts, in a folder (or nowhere)."""
 
     def __init__(self, out: Path | None) -> None:
-        self.folder = None if out is None else out / FOLDER
+        self.folder = None if out is None else out.absolute() / FOLDER
 
     def get(self, key: str) -> xr.Dataset | None:
         """Return what was kept under this name, None if nothing sound was."""
@@ -49,10 +51,50 @@ class Store:
         if self.folder is not None:
             netcdf.save(result.assign_attrs({_KEY: key}), self.folder / f"{key}.nc")
 
+    def kept(self, digests: Iterable[str]) -> dict[str, xr.Dataset]:
+        """Return what was kept of some stages, by name."""
+        if self.folder is None:
+            return {}
+        names = (path.stem for one in digests for path in self.folder.glob(f"*.{one}.*.nc"))
+        return {name: found for name in names if (found := self.get(name)) is not None}
+
     def clear(self) -> None:
         """Remove all that is kept."""
         if self.folder is not None:
             shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Carried(Store):
+    """What is kept where the folder is out of reach: sent with the work, and what was added taken back."""
+
+    def __init__(self, kept: Mapping[str, xr.Dataset]) -> None:
+        super().__init__(None)
+        self.before, self.added = kept, dict[str, "xr.Dataset"]()
+
+    def get(self, key: str) -> xr.Dataset | None:
+        """Return what was kept under this name, None if nothing was."""
+        return self.before.get(key)
+
+    def put(self, key: str, result: xr.Dataset) -> None:
+        """Keep a result."""
+        self.added[key] = result
+
+
+def seeded(scene: Scene, store: Store) -> Scene:
+    """Return the scene with a seed for each face made without one: that of a run it goes on from."""
+    made = [name for name in ("surface", "upper") if "generate" in scene.table(name)]
+    open_ones = [name for name in made if "rng" not in scene.table(name)]
+    if not open_ones:
+        return scene
+    key = f"seeds.{_hashed(scene.tables)}"
+    kept = store.get(key)
+    if kept is None:
+        import xarray as xr
+
+        kept = xr.Dataset(attrs={name: str(secrets.randbits(48)) for name in open_ones})
+        store.put(key, kept)
+    tables = {name: {**scene.table(name), "rng": int(kept.attrs[name])} for name in open_ones}
+    return replace(scene, tables={**scene.tables, **tables})
 
 
 def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tuple[str, ...]) -> str:
@@ -81,7 +123,11 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
     if room == "domains":
         tables["domains"] = scene.table("domains").get(name, {})
     tables["needs"] = [digests[need] for need in stage.needs]
-    text = json.dumps([stage.name, tables], sort_keys=True, default=str)
+    return _hashed([stage.name, tables])
+
+
+def _hashed(facts: Any) -> str:
+    text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

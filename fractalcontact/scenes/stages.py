@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.netcdf import as_dataset
-from fractalcontact.base.schema import encoded, label
 from fractalcontact.scenes.given import contact_options, crack_options, read_surface
 from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
 from fractalcontact.scenes.planning import loads_of
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     Results = Mapping[str, xr.Dataset]
 
 CHUNK = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
-MEMBER = "member"
 WHOLE = ("islands", "lineage", "evolution")  # what follows the set along a path reads all maps at once
 Part = Callable[[], "xr.Dataset"]
 
@@ -52,7 +50,7 @@ class Work:
             rows = [found[k : k + length] for k in range(0, len(found), length)]
             # a row that is not complete is left out, unless it is all there is
             rows = [row for row in rows if len(row) == length] or rows[:1]
-            found = [_joined(row, dim) for row in rows]
+            found = [joined(row, dim) for row in rows]
         return found[0] if found else None
 
 
@@ -75,24 +73,6 @@ class Followed:
             results.append(one(source))
             seconds.append(time.perf_counter() - start)
         return [without(source, self.dropped), *results], seconds
-
-
-@dataclass(frozen=True, repr=False)
-class Numbered:
-    """A part of one member of an ensemble, whose result says which."""
-
-    part: Part
-    member: int
-
-    def __call__(self) -> xr.Dataset:
-        """Return the result with the number of the member ahead of its dims."""
-        result = self.part()
-        # what a load came to may differ from member to member
-        beside = [name for name, coord in result.coords.items() if name != "step" and "step" in coord.dims]
-        told = result.reset_coords(beside).expand_dims({MEMBER: [self.member]}).set_coords(beside)
-        for name, variable in told.variables.items():
-            variable.attrs = dict(result[name].attrs) if name in result.variables else {}
-        return encoded(told.assign_coords({MEMBER: label(told[MEMBER])})).assign_attrs(result.attrs)
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,13 +107,13 @@ def without(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
     return rest.drop_vars([dim for dim in ("y", "x") if dim in rest.coords and dim not in used])
 
 
-def _joined(results: list[xr.Dataset], dim: str) -> xr.Dataset:
+def joined(results: list[xr.Dataset], dim: str) -> xr.Dataset:
     """Join results along a dim; seconds are added up."""
     if len(results) == 1:
         return results[0]
     import xarray as xr
 
-    joined = xr.concat(
+    whole = xr.concat(
         results,
         dim=dim,
         data_vars="minimal",
@@ -142,21 +122,18 @@ def _joined(results: list[xr.Dataset], dim: str) -> xr.Dataset:
         join="override",
         combine_attrs="override",
     )
-    if "run_time" in joined and dim not in joined["run_time"].dims:
-        joined["run_time"] = results[0]["run_time"].copy(data=sum(one["run_time"].values for one in results))
+    if "run_time" in whole and dim not in whole["run_time"].dims:
+        whole["run_time"] = results[0]["run_time"].copy(data=sum(one["run_time"].values for one in results))
     if dim == "step":
-        attributes = dict(joined["step"].attrs)
-        joined = joined.assign_coords(step=("step", np.arange(joined.sizes["step"]), attributes))
-    for name, variable in joined.variables.items():
+        attributes = dict(whole["step"].attrs)
+        whole = whole.assign_coords(step=("step", np.arange(whole.sizes["step"]), attributes))
+    for name, variable in whole.variables.items():
         variable.encoding = dict(results[0].variables[name].encoding)
-    return joined
+    return whole
 
 
 def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]) -> Work:
-    """Return what is to be done for a stage, given the results and the work of those it needs.
-
-    Of an ensemble every member is a part by itself.
-    """
+    """Return what is to be done for a stage, given the results and the work of those it needs."""
     room, _, name = stage.name.partition("/")
     if reads_part(stage):
         source = works[stage.needs[0]]
@@ -165,23 +142,6 @@ def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]
         return Work((partial(measure(stage, scene), results[stage.needs[0]]),))
     if room == "surfaces":
         return _surface_work(name, scene, results)
-    if MEMBER not in results["surfaces"].dims:
-        return _work(stage, scene, results)
-    members = range(results["surfaces"].sizes[MEMBER])
-    works_of = [
-        _work(stage, scene, {key: of_member(one, m) for key, one in results.items()}) for m in members
-    ]
-    parts = tuple(Numbered(part, m) for m, one in zip(members, works_of, strict=True) for part in one.parts)
-    return Work(parts, (MEMBER, *works_of[0].along), (len(members), *works_of[0].shape))
-
-
-def of_member(result: xr.Dataset, number: int) -> xr.Dataset:
-    """Return the result of one member of an ensemble."""
-    return result.isel({MEMBER: number}, drop=True) if MEMBER in result.dims else result
-
-
-def _work(stage: Stage, scene: Scene, results: Results) -> Work:
-    room, _, name = stage.name.partition("/")
     if room == "dimensions":
         return _dimension_work(name, scene, results)
     if room == "contact":

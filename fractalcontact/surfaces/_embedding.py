@@ -9,6 +9,7 @@ can be summed over a torus of side R + extent and sampled with Fourier transform
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from fractalcontact.base.errors import FractalContactError
 
 Array = np.ndarray[Any, np.dtype[Any]]
 ROUNDING = 1e-14  # largest negative eigenvalue, over the largest, that rounding may leave
+KEPT = 1 << 22  # points of a torus whose amplitudes are kept: 8 MB
 BLOCK = 1 << 16  # numbers worked on at a time: they stay in the cache
 
 
@@ -101,7 +103,15 @@ class Embedding:
 
 
 def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
-    """Return the embedding of a surface of this shape; ny = 1 makes a profile."""
+    """Return the embedding of a surface of this shape; ny = 1 makes a profile.
+
+    The last one is kept, if it is small, for the many surfaces of a sweep.
+    """
+    torus = torus_of(shape, spacing, hurst)
+    return (_last if torus[0] * torus[1] <= KEPT else _embedded)(shape, spacing, hurst)
+
+
+def _embedded(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
     model = Stein.of(hurst)
     step = _in_diagonals(shape, spacing)
     torus = torus_of(shape, spacing, hurst)
@@ -119,8 +129,12 @@ def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) ->
         clipped = float(np.count_nonzero(eigenvalues < 0.0) / eigenvalues.size)
         np.maximum(eigenvalues, 0.0, out=eigenvalues)
     amplitude = np.sqrt(eigenvalues, out=eigenvalues)
+    amplitude.flags.writeable = False
     drift = float(np.sqrt(2.0 * model.c2))
     return Embedding(shape, torus, step, amplitude, drift, smallest / largest, clipped)
+
+
+_last = lru_cache(maxsize=1)(_embedded)
 
 
 def torus_of(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> tuple[int, int]:

@@ -9,7 +9,7 @@ import xarray as xr
 from study import SOUND, command
 
 import fractalcontact as fc
-from fractalcontact.scenes import running, stages
+from fractalcontact.scenes import keeping, stages, studying
 
 WHOLE = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -129,7 +129,7 @@ def test_a_changed_scene_does_not_take_stages_of_another(tmp_path):
     for text in (first, second, first):
         (tmp_path / "study.toml").write_text(text, encoding="utf-8")
         scene = fc.scenes.load(tmp_path / "study.toml")
-        keys.append(running._Study(scene, running.Store(None), False, None).digests)
+        keys.append(studying.Study(scene, keeping.Store(None), False, None).digests)
     assert keys[0] == keys[2]
     assert keys[0]["joints/closure"] != keys[1]["joints/closure"]
     assert keys[0]["surfaces"] == keys[1]["surfaces"]
@@ -165,21 +165,23 @@ def test_methods_are_listed():
 
 def test_parts_can_run_elsewhere(tmp_path):
     import pickle
+    from concurrent.futures import Future
 
     class Worker:
-        """Takes parts as a cluster does: as bytes."""
+        """Takes tasks as a cluster does: as bytes."""
 
         sent = 0
 
-        def submit(self, part, pure):
-            Worker.sent += 1
-            result = pickle.loads(pickle.dumps(part))()
+        def submit(self):
+            """Stand for what tells a client."""
 
-            class Future:
-                def result(self):
-                    return result
-
-            return Future()
+        def map(self, function, tasks, pure):
+            futures = []
+            for task in tasks:
+                Worker.sent += 1
+                futures.append(Future())
+                futures[-1].set_result(pickle.loads(pickle.dumps(function))(pickle.loads(pickle.dumps(task))))
+            return futures
 
     (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
     here = fc.scenes.run(tmp_path / "study.toml", progress=False)
