@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
         help="surfaces, dimensions, contact, domains, joints; all if none is named; or estimators alone: "
         "bias, error over the least possible one and coverage of every estimator of roughness",
     )
-    accuracy.add_argument("-o", "--out", help="folder for accuracy.nc and its figures")
+    accuracy.add_argument("-o", "--out", help="folder for the results (NetCDF) and their figures")
     accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
     accuracy.add_argument("--extreme", action="store_true", help="run the catalogue of extreme cases instead")
     accuracy.add_argument(
@@ -156,9 +156,10 @@ def _told(line: str, problems: Sequence[str]) -> bool:
 
 def _accuracy(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
-    from fractalcontact.accuracy.reporting import cases_table, curves_table
+    from fractalcontact.accuracy.reporting import cases_dataset, cases_table, curves_table
 
-    if options.out is not None and not options.extreme:
+    _check_accuracy(options)
+    if options.out is not None:
         from fractalcontact.scenes.running import writable
 
         writable(options.out)  # before the measuring, not after it
@@ -168,6 +169,11 @@ def _accuracy(options: argparse.Namespace) -> int:
         cases = accuracy.cases.items()
         findings = examine_apart([name for name, case in cases if options.large or not case.large])
         print(cases_table(findings))
+        if options.out is not None:
+            from fractalcontact.base.netcdf import save
+
+            file = save(cases_dataset(findings), Path(options.out) / "extremes.nc")
+            print(f"\nwritten to {options.out}: {file.name}")
         return 0 if all(one.ok for found in findings.values() for one in found) else 1
     if options.lean:
         return _lean(options)
@@ -190,6 +196,18 @@ def _accuracy(options: argparse.Namespace) -> int:
             error_against_time(part.to_dataset()).savefig(folder / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     return 0
+
+
+def _check_accuracy(options: argparse.Namespace) -> None:
+    """Raise if words were given that would not be heard."""
+    from fractalcontact.base.checks import Problems
+
+    with Problems("fractalcontact accuracy") as problems:
+        if options.extreme:
+            problems.require(not options.parts, "parts", "none with --extreme", " ".join(options.parts))
+            problems.require(options.curves is None, "--curves", "nothing with --extreme", options.curves)
+        else:
+            problems.require(not options.large, "--large", "nothing without --extreme", "--large")
 
 
 def _lean(options: argparse.Namespace) -> int:

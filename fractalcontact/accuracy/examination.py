@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.accuracy import independent
 from fractalcontact.accuracy.catalogue import NOT_DEFINED, REFUSED, Case, Expectation
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CLOSE = 1e-6
+ERROR = "independent_error"  # of a result, against what no room computed
+LENGTHS, MODULI = 7, 13  # powers of two by which units are changed
 Probe = Callable[[Any, Case], "xr.Dataset"]
 LONGEST = 120.0  # seconds: a case that takes longer hangs
 
@@ -103,7 +106,21 @@ def _run(case: Case, name: str, probe: Probe) -> list[Finding]:
     seconds = time.perf_counter() - start
     findings = [_held(key, value, result, seconds) for key, value in wanted.items()]
     findings.append(_sane(name, result, seconds))
+    if ERROR in result:
+        error = float(result[ERROR])
+        findings.append(Finding(f"{name}.{ERROR}", 0.0, error, error <= CLOSE, seconds, error))
+    if case.kind == "surface":
+        findings.append(_in_units(name, probe, case, result))
     return [replace(one, ok=one.ok and (case.large or seconds < LONGEST)) for one in findings]
+
+
+def _in_units(name: str, probe: Probe, case: Case, result: xr.Dataset) -> Finding:
+    """Hold that a change of units by powers of two changes no bit of a result but the exponents."""
+    start = time.perf_counter()
+    face = independent.in_other_units(case.make(), LENGTHS)
+    stiffer = replace(case, modulus=case.modulus * 2.0**MODULI)
+    error = independent.unit_error(result, probe(face, stiffer), LENGTHS, MODULI)
+    return Finding(f"{name}.dependence_on_units", 0.0, error, error == 0, time.perf_counter() - start, error)
 
 
 def _held(key: str, expected: Expectation, result: xr.Dataset, seconds: float) -> Finding:
@@ -160,7 +177,10 @@ def _tells(attributes: Mapping[Any, Any]) -> bool:
 def _described(surface: xr.DataArray, _: Case) -> xr.Dataset:
     from fractalcontact import surfaces
 
-    return surfaces.describe(surface)
+    result = surfaces.describe(surface)
+    if np.isfinite(surface.values).any():
+        result[ERROR] = independent.spread_error(surface, result)
+    return result
 
 
 def _levelled(surface: xr.DataArray, _: Case) -> xr.Dataset:
@@ -209,7 +229,8 @@ def _pressed(surface: xr.DataArray, case: Case) -> xr.Dataset:
         boundary="free",
         keep=("gap", "pressure"),
     )
-    return _checked_balance(result, force)
+    error = independent.halfspace_error(surface, _checked_balance(result, force), modulus)
+    return result.drop_vars(["gap", "pressure"]).assign({ERROR: error})
 
 
 def _checked_balance(result: xr.Dataset, force: np.ndarray) -> xr.Dataset:
@@ -220,16 +241,16 @@ def _checked_balance(result: xr.Dataset, force: np.ndarray) -> xr.Dataset:
         raise ArithmeticError(f"pressures carry {carried} N of {force} N")
     if not bool(result["converged"].all()):
         raise ArithmeticError(f"not converged: {result['residual'].values}")
-    return result.drop_vars(["gap", "pressure"])
+    return result
 
 
 def _slid(surface: xr.DataArray, case: Case) -> xr.Dataset:
     from fractalcontact import joints
 
     step = float(surface.x[1] - surface.x[0])
-    return joints.dilatancy(_crack(surface, case), shear=[step], direction=["E"]).assign_attrs(
-        examination_scale=step
-    )
+    crack = _crack(surface, case)
+    result = joints.dilatancy(crack, shear=[step], direction=["E"]).assign_attrs(examination_scale=step)
+    return result.assign({ERROR: independent.sliding_error(surface, result, crack.layout.cells)})
 
 
 def _closed(surface: xr.DataArray, case: Case) -> xr.Dataset:
@@ -259,7 +280,8 @@ def _mask_function(name: str) -> Probe:
 
         options = {"q": [0.0, 1.0, 2.0]} if name == "generalised_dimensions" else {}
         result: xr.Dataset = getattr(domains, name)(mask, **options)
-        return result
+        against = {"islands": independent.island_error, "lacunarity": independent.single_cell_error}
+        return result.assign({ERROR: against[name](mask, result)}) if name in against else result
 
     return probe
 

@@ -122,23 +122,45 @@ def cases_table(findings: Mapping[str, Sequence[Finding]]) -> str:
         ("case", "function and quantity", "expected", "got", "error", "seconds", "")
     ]
     for name, found in findings.items():
-        for one in found:
-            got = one.got if isinstance(one.got, str) else f"{one.got:.6g}"
-            expected = "" if one.expected is None else _expectation(one.expected)
-            rows.append(
-                (
-                    name,
-                    one.name,
-                    expected,
-                    got[:60],
-                    "" if np.isnan(one.error) else f"{one.error:.1e}",
-                    f"{one.run_time:.3f}",
-                    "" if one.ok else "FAILED",
-                )
+        rows += [
+            (
+                name,
+                one.name,
+                "" if one.expected is None else _expectation(one.expected),
+                _outcome(one)[:60],
+                "" if np.isnan(one.error) else f"{one.error:.1e}",
+                f"{one.run_time:.3f}",
+                "" if one.ok else "FAILED",
             )
+            for one in found
+        ]
     failed = sum(not one.ok for found in findings.values() for one in found)
     total = sum(len(found) for found in findings.values())
     return f"{table(rows)}\n\n{total} findings on {len(findings)} cases, {failed} failed"
+
+
+def cases_dataset(findings: Mapping[str, Sequence[Finding]]) -> xr.Dataset:
+    """Return all findings, one after the other along `finding`."""
+    import xarray as xr
+
+    from fractalcontact.base.provenance import stamp
+    from fractalcontact.base.schema import label
+
+    all_of = [(case, one) for case, found in findings.items() for one in found]
+    columns = {
+        "case": [case for case, _ in all_of],
+        "quantity": [one.name for _, one in all_of],
+        "expectation": ["" if one.expected is None else _expectation(one.expected) for _, one in all_of],
+        "outcome": [_outcome(one) for _, one in all_of],
+        "value": [np.nan if isinstance(one.got, str) else one.got for _, one in all_of],
+        "error": [one.error for _, one in all_of],
+        "run_time": [one.run_time for _, one in all_of],
+        "passed": [one.ok for _, one in all_of],
+    }
+    table_of = xr.Dataset({name: ("finding", np.array(column)) for name, column in columns.items()})
+    result = label(table_of.assign_coords(finding=np.arange(len(all_of))))
+    result["error"].attrs["comment"] = "NaN where nothing but a finite number or a reason was expected"
+    return stamp(result, "fractalcontact.accuracy", {"cases": list(findings)}, title="Extreme cases")
 
 
 def worst_rows(findings: Mapping[str, Sequence[Finding]]) -> list[tuple[str, ...]]:
@@ -146,7 +168,7 @@ def worst_rows(findings: Mapping[str, Sequence[Finding]]) -> list[tuple[str, ...
     rows: list[tuple[str, ...]] = [("case", "worst quantity", "expected", "got", "error", "slowest call, s")]
     for name, found in findings.items():
         worst = max(found, key=lambda one: (not one.ok, np.nan_to_num(one.error, nan=-1.0)))
-        got = worst.got if isinstance(worst.got, str) else f"{worst.got:.6g}"
+        got = _outcome(worst)
         expected = "finite or explained" if worst.expected is None else _expectation(worst.expected)
         error = "" if np.isnan(worst.error) else f"{worst.error:.1e}"
         rows.append(
@@ -160,6 +182,10 @@ def worst_rows(findings: Mapping[str, Sequence[Finding]]) -> list[tuple[str, ...
             )
         )
     return rows
+
+
+def _outcome(finding: Finding) -> str:
+    return finding.got if isinstance(finding.got, str) else f"{finding.got:.6g}"
 
 
 def _expectation(expected: object) -> str:

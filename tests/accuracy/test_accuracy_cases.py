@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 import fractalcontact as fc
 from fractalcontact.accuracy.catalogue import NOT_DEFINED, REFUSED, Case
+from fractalcontact.accuracy.independent import in_other_units
 from fractalcontact.accuracy.reporting import worst_rows
-from fractalcontact.base.errors import InvalidInput
 
 CASES = {name: case for name, case in fc.accuracy.cases.items() if not case.large}
 SURFACES = [case for case in CASES.values() if case.kind == "surface"]
@@ -57,55 +57,51 @@ def test_the_error_is_the_distance_from_what_is_expected():
     assert row[3].startswith("FAILED")
 
 
-def scaled(array, power):
-    factor = 2.0**power
-    axes = {}
-    for dim in ("y", "x"):
-        attributes = {
-            key: value * factor if key == "period" else value for key, value in array[dim].attrs.items()
-        }
-        axes[dim] = (dim, array[dim].values * factor, attributes)
-    return array.assign_coords(axes).copy(data=array.values * factor)
+def broken(function, name, factor):
+    """Return a function whose result has one variable off by a factor."""
+
+    def other(*arguments, **options):
+        result = function(*arguments, **options)
+        return result.assign({name: (result[name] * factor).assign_attrs(result[name].attrs)})
+
+    return other
+
+
+PRESSES = "n = 3", "prime", "strip", "spacings 1:100", "E* = 1e-6 Pa", "slope 10", "offset 1e9", "one spike"
+BREAKS = (
+    (PRESSES, "contact", "press", ("closure", "gap", "pressure")),
+    (("H = 0.01", "nanometres", "islands of NaN"), "surfaces", "describe", ("rms_height",)),
+    (("plane", "mountains"), "joints", "dilatancy", ("rigid_dilatancy",)),
+    (("carpet", "a strip", "three by three", "a mask of one cell"), "domains", "islands", ("n_islands",)),
+    (("dust", "three by three", "all but one"), "domains", "lacunarity", ("lacunarity",)),
+)
+
+
+@pytest.mark.parametrize(
+    ("case", "room", "function", "variable"),
+    [(case, *place, one) for cases, *place, variables in BREAKS for case in cases for one in variables],
+)
+def test_a_broken_function_is_found_out(case, room, function, variable, monkeypatch):
+    house = getattr(fc, room)
+    factor = 2 if variable == "n_islands" else 1.0001
+    monkeypatch.setattr(house, function, broken(getattr(house, function), variable, factor))
+    assert not all(one.ok for one in fc.accuracy.examine(CASES[case]))
+
+
+def test_a_result_that_depends_on_units_is_found_out(monkeypatch):
+    original = fc.surfaces.describe
+
+    def absolute(surface):
+        result = original(surface)
+        return result.assign(rms_height=(result["rms_height"] + 1e-12).assign_attrs(units="m"))
+
+    monkeypatch.setattr(fc.surfaces, "describe", absolute)
+    wrong = {one.name for one in fc.accuracy.examine(CASES["prime"]) if not one.ok}
+    assert "surfaces.describe.dependence_on_units" in wrong
 
 
 def numbers(result, names):
     return [np.asarray(result[name].values) for name in names if name in result]
-
-
-@pytest.mark.parametrize("case", SURFACES, ids=lambda case: case.name)
-@pytest.mark.parametrize("power", [-20, 13])
-def test_units_by_powers_of_two_change_no_bit_but_the_exponent(case, power):
-    face = case.make()
-    other = scaled(face, power)
-    for function, pure in (
-        (fc.surfaces.describe, ("rms_slope", "skewness", "kurtosis", "nayak_parameter")),
-        (fc.dimensions.estimate, ("hurst", "standard_error")),
-    ):
-        try:
-            ours = function(face)
-        except InvalidInput:
-            with pytest.raises(InvalidInput):
-                function(other)
-            continue
-        for one, two in zip(numbers(ours, pure), numbers(function(other), pure), strict=True):
-            np.testing.assert_array_equal(one, two)
-
-
-@pytest.mark.parametrize("case", SURFACES, ids=lambda case: case.name)
-def test_contact_does_not_depend_on_units(case):
-    face = case.make()
-    if not np.isfinite(face.values).all():
-        pytest.skip("refused, see the catalogue")
-    area = face.size * float(face.x[1] - face.x[0]) * float(face.y[1] - face.y[0])
-    force = 1e-3 * 2.0**30 * area
-    options = {"influence": "square", "boundary": "free", "keep": ("state", "pressure")}
-    ours = fc.contact.press(face, contact_modulus=2.0**30, normal_force=force, **options)
-    theirs = fc.contact.press(
-        scaled(face, 7), contact_modulus=2.0**50, normal_force=force * 2.0**34, **options
-    )
-    np.testing.assert_array_equal(ours["state"], theirs["state"])
-    np.testing.assert_array_equal(ours["pressure"] * 2.0**20, theirs["pressure"])
-    np.testing.assert_array_equal(ours["closure"] * 2.0**7, theirs["closure"])
 
 
 @pytest.mark.parametrize("case", MASKS, ids=lambda case: case.name)
@@ -143,7 +139,10 @@ def test_a_turned_face_at_any_load_and_scale_is_pressed_alike(case, share, turn,
     options = {"influence": "square", "boundary": "free", "keep": (), "tolerance": 1e-10}
     ours = fc.contact.press(face, contact_modulus=case.modulus, normal_force=force, **options)
     theirs = fc.contact.press(
-        scaled(turned, power), contact_modulus=case.modulus, normal_force=force * 4.0**power, **options
+        in_other_units(turned, power),
+        contact_modulus=case.modulus,
+        normal_force=force * 4.0**power,
+        **options,
     )
     assert ours["converged"].all()
     assert theirs["converged"].all()

@@ -2,9 +2,12 @@
 
 import os
 import time
+from types import SimpleNamespace
 
 import pytest
 
+import fractalcontact as fc
+from fractalcontact import cli
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import examine
 from fractalcontact.accuracy.watching import Lost, examine_apart, watched
@@ -28,3 +31,28 @@ def test_what_ends_its_process_is_told():
 def test_a_case_is_examined_apart_as_here(name):
     (apart,) = examine_apart([name]).values()
     assert [(one.name, one.ok) for one in apart] == [(one.name, one.ok) for one in examine(cases[name])]
+
+
+def test_the_findings_are_written_where_they_are_asked_for(tmp_path, monkeypatch, capsys, compliance):
+    catalogue = {name: cases[name] for name in ("nothing observed", "one cell")}
+    monkeypatch.setattr(fc, "accuracy", SimpleNamespace(cases=catalogue))
+    assert cli.main(["accuracy", "--extreme", "-o", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert "0 failed" in told
+    assert "extremes.nc" in told
+    found = fc.open(tmp_path / "out" / "extremes.nc")
+    assert set(found["case"].values) == set(catalogue)
+    assert found["passed"].all()
+    row = found["quantity"] == "domains.lacunarity.lacunarity"
+    assert found["value"].values[row] == 1024.0
+    assert found["expectation"].values[row] == "1024"
+    assert f"{found.sizes['finding']} findings" in told
+    assert not compliance(tmp_path / "out" / "extremes.nc")
+
+
+@pytest.mark.parametrize(
+    "words", [["contact", "--extreme"], ["--extreme", "--curves", "x.json"], ["--large"]]
+)
+def test_words_that_would_not_be_heard_are_refused(words, capsys):
+    assert cli.main(["accuracy", *words]) == 2
+    assert "expected" in capsys.readouterr().err
