@@ -58,6 +58,9 @@ def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -
     Notes
     -----
     Memory is that of arrays and Python objects; what a transform library works in is not seen.
+
+    The type of number is no knob: results are float64 throughout. A large free contact begins in single
+    precision of its own accord, and ends at the same tolerance.
     """
     import xarray as xr
 

@@ -39,6 +39,44 @@ def test_every_public_method_is_measured():
     assert all(len(set(found)) == len(found) for found in names.values())
 
 
+# what measures a set, a flow or a face, and by what name its trial goes; the rest is no measure but a
+# count, a map or a summary of these
+TRIALS = {
+    "domains": {
+        "box_dimension": "box dimension",
+        "correlation_dimension": "correlation dimension",
+        "minkowski_dimension": "Minkowski dimension",
+        "boundary_dimension": "boundary dimension",
+        "generalised_dimensions": "generalised dimensions",
+        "area_dimension": "area dimension",
+        "lacunarity": "lacunarity",
+        "islands": "islands",
+        "percolation": "percolation",
+    },
+    "joints": {
+        "transmissivity": "transmissivity",
+        "dilatancy": "rigid dilatancy",
+        "closure": "closure of the interface",
+    },
+}
+UNMEASURED = {"box_counts", "describe", "evolution", "lineage"}  # of domains
+
+
+def test_every_measure_of_a_domain_and_every_flow_has_a_trial():
+    assert set(TRIALS["domains"]) | UNMEASURED == set(fc.domains.__all__)
+    for part, words in TRIALS.items():
+        measured = [one.method for c in measuring.contests(part) for one in c.experiments]
+        for word in words.values():
+            assert any(method.startswith(word) for method in measured), word
+
+
+def test_islands_and_crossings_at_the_critical_coverage_are_the_known_ones():
+    trials = {one.method: one for c in measuring.contests("domains") for one in c.experiments}
+    for name, size, most in (("islands", 512, 0.05), ("percolation", 64, 0.19)):
+        trial = trials[name]
+        assert trial.error(trial.solve(trial.prepare(size)), size) < most
+
+
 def stub(method, seconds, errors):
     """An experiment whose run times and errors are known."""
     return Experiment(

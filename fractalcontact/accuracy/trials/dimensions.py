@@ -52,6 +52,17 @@ def contests() -> tuple[Contest, ...]:
             noisy,
             given=True,
         ),
+        Contest(
+            "Hurst exponent by direction",
+            f"{error}, eight directions of each",
+            "exact fractional Brownian surfaces, which have one exponent in all directions",
+            (
+                Experiment(
+                    "by direction", SIZES[:4], lambda n: _faces(int(n), 0.0), _by_direction, _directed_error
+                ),
+            ),
+            given=True,
+        ),
         Contest("window of scales", error, "exact fractional Brownian surfaces, 256 x 256", (windows,)),
     )
 
@@ -86,6 +97,21 @@ def _exponents(method: str, faces: xr.DataArray, options: dict[str, Any]) -> lis
     from fractalcontact import dimensions as room
 
     return [float(v) for v in room.estimate(faces, [method], **options)["hurst"].values.ravel()]
+
+
+def _by_direction(faces: xr.DataArray) -> np.ndarray[Any, Any]:
+    """Return the exponents of one surface, which is timed."""
+    return _directed(faces.isel(member=0))
+
+
+def _directed(faces: xr.DataArray) -> np.ndarray[Any, Any]:
+    from fractalcontact import dimensions as room
+
+    return room.directions(faces)["hurst"].values
+
+
+def _directed_error(_: Any, knob: float) -> float:
+    return float(np.sqrt(np.nanmean((_directed(_faces(int(knob), 0.0)) - HURST) ** 2)))
 
 
 def _errors(method: str, prepare: Callable[[float], Case]) -> Callable[[float, float], float]:

@@ -16,6 +16,9 @@ SIZES = (64, 128, 256, 512, 1024)
 HURST, COVERAGE, BOX = 0.5, 0.1, 4
 WEIGHTS = np.array([[0.4, 0.3], [0.2, 0.1]])
 ORDERS = (0.0, 2.0, 3.0)
+# site percolation on the square lattice: coverage, islands for each cell, and what a periodic mask has more
+CRITICAL, PER_CELL, EXCESS = 0.59274605, 0.0275981, 0.8835
+CROSSINGS = 64
 
 
 def contests() -> tuple[Contest, ...]:
@@ -53,6 +56,9 @@ def contests() -> tuple[Contest, ...]:
         Experiment(f"lacunarity, {boxes} boxes", SIZES, _dust, partial(_lacunarity, boxes), _dust_error)
         for boxes in ("gliding", "fixed")
     )
+    several = Experiment("area dimension", (27, 81, 243, 729), _resolutions, _area_dimension, _carpet_error)
+    islands = Experiment("islands", SIZES, _critical, _island_density, _islands_error)
+    crossing = Experiment("percolation", SIZES[:3], _critical, _crosses, _crossing_error)
     moments = Experiment("generalised dimensions", SIZES, _cascade, _moments, _moments_error)
     return (
         Contest(
@@ -81,6 +87,26 @@ def contests() -> tuple[Contest, ...]:
             "largest error of D_q at q = 0, 2, 3",
             "log2 of the sum of the four weights to the power q, over 1 - q",
             (moments,),
+        ),
+        Contest(
+            "carpet of Sierpinski at three resolutions",
+            "error of the dimension",
+            "log 8 / log 3",
+            (several,),
+        ),
+        Contest(
+            "number of islands at the critical coverage",
+            "relative error of the islands for each cell, one periodic mask",
+            f"{PER_CELL} + {EXCESS}/n^2 (Ziff, Finch and Adamchik 1997); chance leaves some 1/n",
+            (islands,),
+            given=True,
+        ),
+        Contest(
+            "crossing at the critical coverage",
+            f"error of the share of {CROSSINGS} masks that are crossed along x",
+            "1/2 for large masks, by symmetry and universality (Cardy 1992); chance leaves .06",
+            (crossing,),
+            given=True,
         ),
     )
 
@@ -137,6 +163,46 @@ def _lacunarity(boxes: str, mask: xr.DataArray) -> float:
 
 def _dust_error(found: float, _: float) -> float:
     return float(abs((found - 1.0) / ((1.0 - COVERAGE) / (COVERAGE * BOX**2)) - 1.0))
+
+
+def _resolutions(n: float) -> list[xr.DataArray]:
+    import xarray as xr
+
+    masks = []
+    for size in (int(n) // 9, int(n) // 3, int(n)):
+        places = (np.arange(size) + 0.5) / size
+        masks.append(xr.DataArray(_carpet(size).values, dims=("y", "x"), coords={"y": places, "x": places}))
+    return masks
+
+
+def _area_dimension(masks: list[xr.DataArray]) -> float:
+    from fractalcontact import domains as room
+
+    return float(room.area_dimension(masks)["area_dimension"])
+
+
+def _critical(n: float, seed: int = 0) -> xr.DataArray:
+    return _mask(np.random.default_rng((int(n), seed)).random((int(n), int(n))) < CRITICAL)
+
+
+def _island_density(mask: xr.DataArray) -> float:
+    from fractalcontact import domains as room
+
+    return float(room.islands(mask, periodic=True, keep=())["n_islands"]) / mask.size
+
+
+def _islands_error(density: float, n: float) -> float:
+    return float(abs(density / (PER_CELL + EXCESS / n**2) - 1.0))
+
+
+def _crosses(mask: xr.DataArray) -> bool:
+    from fractalcontact import domains as room
+
+    return bool(room.percolation(mask, periodic=False)["percolates"].sel(axis="x"))
+
+
+def _crossing_error(_: bool, n: float) -> float:
+    return float(abs(np.mean([_crosses(_critical(n, seed)) for seed in range(CROSSINGS)]) - 0.5))
 
 
 def _cascade(n: float) -> xr.DataArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,9 @@ def contests() -> tuple[Contest, ...]:
     """Return what is measured of flow and dilatancy."""
     sizes = (8, 16, 32, 64, 128, 256, 512)
     across = Experiment("transmissivity, across", sizes, _corrugated, _flow, _flow_error)
+    around = Experiment(
+        "transmissivity, across, periodic", sizes[:5], partial(_corrugated, periodic=True), _flow, _flow_error
+    )
     board = Experiment(
         "transmissivity, checkerboard", (8, 16, 32, 64, 128), _checkerboard, _flow, _board_error
     )
@@ -38,7 +41,7 @@ def contests() -> tuple[Contest, ...]:
             "sinusoidal aperture, across",
             "relative error of the hydraulic aperture",
             "(1 - e^2)^(5/2) / (1 + e^2/2) for the cube of the aperture across the crests",
-            (across,),
+            (across, around),
         ),
         Contest(
             "checkerboard",
@@ -56,17 +59,17 @@ def contests() -> tuple[Contest, ...]:
     )
 
 
-def _gap(values: Any, spacing: float) -> xr.DataArray:
+def _gap(values: Any, spacing: float, periodic: bool = False) -> xr.DataArray:
     from fractalcontact import surfaces as room
     from fractalcontact.base.schema import label
 
-    return label(room.from_array(values, spacing).rename("gap"))
+    return label(room.from_array(values, spacing, periodic=periodic).rename("gap"))
 
 
-def _corrugated(n: float) -> xr.DataArray:
+def _corrugated(n: float, periodic: bool = False) -> xr.DataArray:
     x = (np.arange(int(n)) + 0.5) / n
     gap = 1e-4 * (1.0 + RIPPLE * np.cos(2.0 * np.pi * x))
-    return _gap(np.broadcast_to(gap, (int(n), int(n))), 1.0 / n)
+    return _gap(np.broadcast_to(gap, (int(n), int(n))), 1.0 / n, periodic)
 
 
 def _checkerboard(n: float) -> xr.DataArray:
