@@ -170,7 +170,9 @@ def _why_not(folder: Path, error: Exception) -> str:
 def _with_words(dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset with its words as fixed-width strings, as they were before they were written."""
     words = {
-        name: variable.astype(str) for name, variable in dataset.variables.items() if variable.dtype == object
+        name: variable.astype(str)
+        for name, variable in dataset.variables.items()
+        if variable.dtype == object and all(isinstance(one, str) for one in variable.values.flat)
     }
     return dataset.assign_coords(
         {name: value for name, value in words.items() if name in dataset.coords}

@@ -72,7 +72,7 @@ def stage_table(result: Any) -> str:
     """Return the stages of a study: seconds, origin, and what each says of its accuracy."""
     entry = _entry(result)
     stages = entry.get("stages", {})
-    if not stages:
+    if not stages or not _are_stages(stages):
         return _single_entry(entry)
     rows = [("stage", "seconds", "achieved")]
     for name, facts in stages.items():
@@ -81,6 +81,14 @@ def stage_table(result: Any) -> str:
         rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_told(told)) + note))
     rows.append(("total", f"{sum(facts['run_time'] for facts in stages.values()):.2f}", ""))
     return table(rows)
+
+
+def _are_stages(stages: Any) -> bool:
+    """Say whether they are stages as a study writes them, and not something of the same name."""
+    return isinstance(stages, dict) and all(
+        isinstance(facts, dict) and isinstance(facts.get("run_time"), (int, float))
+        for facts in stages.values()
+    )
 
 
 def _entry(result: Any) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Nothing is lost: a scene stopped by a signal, a full disk or a damaged file, and what comes after."""
 
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -16,6 +15,8 @@ import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, UnreadableFile
 from fractalcontact.base.stopping import Stopped
 from fractalcontact.scenes import stages
+
+resource = pytest.importorskip("resource")  # signals and limits as Unix has them
 
 STUDY = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -188,6 +189,22 @@ def test_a_file_of_another_origin_is_told_for_what_it_is(tmp_path):
         file.provenance = "from a boat"
     assert "temperature" in fc.open(tmp_path / "other.nc")
     assert "temperature" in contents(tmp_path / "other.nc")
+
+
+@pytest.mark.parametrize(
+    "told", ['{"stages": {"a": 3}}', '{"stages": {"a": {"residual": null}}}', '{"stages": [1]}', "[1]", "3"]
+)
+def test_a_provenance_of_another_kind_is_let_be(tmp_path, told):
+    from fractalcontact.scenes.reporting import contents
+
+    with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
+        file.createDimension("t", 2)
+        file.createVariable("temperature", "f8", ("t",))[:] = 1.0
+        file.createVariable("ragged", file.createVLType("f8", "list"), ("t",))
+        file.createVariable("word", str, ("t",))[:] = np.array(["a", "b"], dtype=object)
+        file.provenance = told
+    assert "temperature" in contents(tmp_path / "other.nc")
+    assert list(fc.open(tmp_path / "other.nc")["word"].values) == ["a", "b"]
 
 
 def limited(size):
