@@ -22,10 +22,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 prange = numba.prange
 
+# no kernel is called from C, so none gets the entry that C would need
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
 
 def kernel(function: F) -> F:
     """Compile a serial loop; it holds no Python lock while it runs."""
-    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled: F = numba.njit(**_OPTIONS)(function)
     return compiled
 
 
@@ -35,17 +38,13 @@ def sum_kernel(function: F) -> F:
     The order of the sums is then the compiler's, the same for every call and any number of threads. The
     arrays must be finite.
     """
-    compiled: F = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz", "nnan"}
-    )(function)
+    compiled: F = numba.njit(**_OPTIONS, fastmath={"reassoc", "nsz", "nnan"})(function)
     return compiled
 
 
 def gap_sum_kernel(function: F) -> F:
     """Compile a `sum_kernel` whose arrays may hold NaN, which then reaches every sum that meets it."""
-    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})(
-        function
-    )
+    compiled: F = numba.njit(**_OPTIONS, fastmath={"reassoc", "nsz"})(function)
     return compiled
 
 
@@ -55,7 +54,7 @@ def parallel_kernel(function: F) -> F:
     The same source runs serially when one thread is asked for, and in plain Python when the compiler is
     switched off; the iterations of its `prange` must not share a sum.
     """
-    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy", parallel=True)(function)
+    compiled: F = numba.njit(**_OPTIONS, parallel=True)(function)
     return compiled
 
 
