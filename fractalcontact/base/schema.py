@@ -124,10 +124,10 @@ QUANTITIES: dict[str, Quantity] = {
     "cube_count": Quantity("1", "number of cubes that meet the surface"),
     "window_size": Quantity("m", "edge of the window"),
     "roughness": Quantity("m", "mean root mean square height inside the windows"),
+    "variation": Quantity("m", "mean range of the heights over a stretch"),
     "covering_area": Quantity("m2", "area of the triangulated surface"),
     "covering_length": Quantity("m", "length of the polygon through the profile"),
     "vertical_scale": Quantity("1", "factor on the heights"),
-    "variation": Quantity("m2", "volume of the height variation over the scale, per length"),
     "local_slope": Quantity(
         "1", "local slope in log-log scale", {"comment": "NaN where a value is not positive, or stands alone"}
     ),

@@ -99,7 +99,8 @@ def radial_average(
         (ny, nx) and (dy, dx) of the heights.
     edges : ndarray, optional
         Ascending edges of the rings in rad m-1 (the lower one belongs to the ring). Default: rings as wide
-        as the coarser step of the wavenumbers, centred on its multiples.
+        as the coarser step of the wavenumbers, centred on its multiples; below the first of them, rings as
+        wide as the finer step, so that every mode but the mean is in a ring.
 
     Returns
     -------
@@ -113,8 +114,10 @@ def radial_average(
     weights = np.broadcast_to(half_weights(shape[-1]), radius.shape)
     nyquist = np.pi / max(spacing)
     if edges is None:
-        step = max(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
+        finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
         edges = step * (np.arange(int(np.floor(nyquist / step + 0.5)) + 1) + 0.5)
+        low = finer * (np.arange(int(np.ceil(0.5 * step / finer - 0.5 - 1e-9))) + 0.5)
+        edges = np.concatenate([low, edges])
     edges = np.asarray(edges, dtype=np.float64)
     ring = np.searchsorted(edges, radius.ravel(), side="right") - 1
     inside = (

@@ -7,6 +7,7 @@ variogram         half the mean square increment against the lag
 madogram          half the mean absolute increment against the lag
 second_variogram  mean square second difference against the lag
 roughness_length  rms height in windows against their edge
+variation         range of the heights over stretches against their length
 cube_counts       number of cubes that meet the surface against their edge
 covering          area of the triangulated surface against the edge of the triangles
 

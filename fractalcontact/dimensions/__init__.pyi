@@ -4,6 +4,7 @@ from .curves import madogram as madogram
 from .curves import roughness_length as roughness_length
 from .curves import second_variogram as second_variogram
 from .curves import spectrum as spectrum
+from .curves import variation as variation
 from .curves import variogram as variogram
 from .estimating import estimate as estimate
 from .estimating import methods as methods
@@ -19,5 +20,6 @@ __all__ = [
     "roughness_length",
     "second_variogram",
     "spectrum",
+    "variation",
     "variogram",
 ]

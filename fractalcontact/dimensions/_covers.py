@@ -68,6 +68,25 @@ def cube_counts(heights: Array, edges: Array, lengths: Array, extent: float, axe
     return counts
 
 
+def mean_ranges(heights: Array, edges: Array) -> tuple[Array, Array]:
+    """Return the mean range of the heights over stretches of the rows and of the columns, and their number.
+
+    Stretches are `edges` (k, 2) spacings long along y and x, one more point than that, in every position.
+    """
+    means, numbers = np.full(len(edges), np.nan), np.zeros(len(edges), dtype=np.int64)
+    for k, (ey, ex) in enumerate(edges):
+        total = 0.0
+        for size_y, size_x in ((1, ex + 1), (ey + 1, 1)) if ey else ((1, ex + 1),):
+            spread = _running(heights, size_y, size_x, np.maximum)
+            spread -= _running(heights, size_y, size_x, np.minimum)
+            spread = spread[np.isfinite(spread)]
+            total += float(np.sum(spread))
+            numbers[k] += spread.size
+        if numbers[k]:
+            means[k] = total / numbers[k]
+    return means, numbers
+
+
 def _running(heights: Array, size_y: int, size_x: int, extreme: Any) -> Array:
     """Return the extreme over every window, by doubling (van Herk needs no less work for these sizes)."""
     for axis, size in ((0, size_y), (1, size_x)):

@@ -16,13 +16,8 @@ FEW = 64  # lag vectors up to which sums over pairs are faster than transforms
 _SEPARATE = 4.5  # spacings up to which every distance is a point of the curve
 
 
-def near_offsets(
-    shape: tuple[int, int], spacing: tuple[float, float], longest: float, reach: int = 1
-) -> Array:
-    """Return every lag vector of a half-plane up to a length: shape (k, 2), steps in y and x."""
-    steps = [
-        min(int(longest / s * (1 + 1e-9)), (n - 1) // reach) for n, s in zip(shape, spacing, strict=True)
-    ]
+def near_offsets(steps: tuple[int, int], spacing: tuple[float, float], longest: float) -> Array:
+    """Return every lag vector of a half-plane up to a length: shape (k, 2), at most `steps` in y and x."""
     y, x = np.meshgrid(np.arange(steps[0] + 1), np.arange(-steps[1], steps[1] + 1), indexing="ij")
     half = ((y > 0) | (x > 0)) & (np.hypot(y * spacing[0], x * spacing[1]) <= longest * (1 + 1e-9))
     return np.stack([y[half], x[half]], axis=1)

@@ -16,7 +16,7 @@ from fractalcontact.dimensions._faces import Face
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _STEEP = 2.0**300
-SMALLEST = {"roughness_length": 5, "cube_counts": 3, "covering": 3}
+SMALLEST = {"roughness_length": 5, "variation": 3, "cube_counts": 3, "covering": 3}
 
 
 @dataclass(frozen=True)
@@ -109,11 +109,11 @@ def wide_slope(scale: Array, value: Array, count: Array) -> Array:
 def variogram(face: Face, longest: float | None = None) -> Curve:
     """Return half the mean square increment; `longest` in m."""
     lazy = face.is_lazy
-    extent = min(face.grid.extent)
-    longest = (
-        (4.0 * max(face.grid.spacing) if lazy else 0.5 * extent) if longest is None else min(longest, extent)
-    )
-    offsets = _lags.near_offsets(face.shape, face.spacing, longest)
+    if longest is None:
+        longest = 4.0 * max(face.grid.spacing) if lazy else 0.5 * min(face.grid.extent)
+    longest = min(longest, float(np.linalg.norm(face.grid.extent)))
+    steps = _farthest(face, longest, 1)
+    offsets = _lags.near_offsets(steps, face.spacing, longest)
     wide = max(face.grid.spacing)
     if lazy or len(offsets) <= _lags.FEW:
         return _pooled(face, offsets, _lags.SQUARE, 0.5, wide, longest)
@@ -146,12 +146,17 @@ def _along_axes(face: Face, longest: float | None, kind: int, factor: float, sha
         least = max(face.grid.spacing)
         longest = 4.0 * least if face.is_lazy else max(share * min(face.grid.extent), least)
     longest = min(longest, max(face.grid.extent))
-    largest = [
-        min(int(longest / s * (1 + 1e-9)), (n - 1) // reach)
-        for n, s in zip(face.shape, face.spacing, strict=True)
-    ]
-    offsets = _lags.axis_offsets(face.shape, (largest[0], largest[1]))
+    offsets = _lags.axis_offsets(face.shape, _farthest(face, longest, reach))
     return _pooled(face, offsets, kind, factor, min(face.grid.spacing), longest)
+
+
+def _farthest(face: Face, longest: float, reach: int) -> tuple[int, int]:
+    """Return the largest steps in y and x: within the face, or half a period, beyond which lags come back."""
+    y, x = (
+        min(int(longest / step * (1 + 1e-9)), n // 2 if wraps and not face.is_lazy else (n - 1) // reach)
+        for n, step, wraps in zip(face.shape, face.spacing, face.periodic, strict=True)
+    )
+    return y, x
 
 
 def _pooled(face: Face, offsets: Array, kind: int, factor: float, width: float, longest: float) -> Curve:
@@ -184,6 +189,13 @@ def roughness_length(face: Face) -> Curve:
     edges = edges[np.argsort(edges[:, 1])]
     means, numbers = _covers.roughness(face.heights, edges)
     return Curve(_edge_lengths(face, edges), means * face.unit, numbers, edges=edges)
+
+
+def variation(face: Face) -> Curve:
+    """Return the mean range of the heights over stretches of the rows and of the columns."""
+    edges = _covers.sizes(face.shape, face.spacing)
+    means, numbers = _covers.mean_ranges(face.heights, edges)
+    return Curve(_edge_lengths(face, edges), means * face.unit, numbers)
 
 
 def cube_counts(face: Face, vertical_scale: float | str = "range") -> Curve:
@@ -225,6 +237,7 @@ MEASURES: dict[str, Callable[..., Curve]] = {
     "madogram": madogram,
     "second_variogram": second_variogram,
     "roughness_length": roughness_length,
+    "variation": variation,
     "cube_counts": cube_counts,
     "covering": covering,
 }

@@ -130,11 +130,11 @@ class CurveMethod:
     counts where it is None. `octaves` lets every octave of a free face weigh alike: a measured face leaves
     its power law at the short end first, where most of the modes are; on a periodic one counts are right.
     `window` chooses the scales of a face. `levels` tells that the measure does not see a plane; `discrete`
-    sets the line against what windows of few points are expected to give; `also` is a note to every
-    estimate.
+    sets the line against what windows of few points are expected to give; `lags` tells that the curve can
+    be measured up to a longest lag; `also` is a note to every estimate.
     """
 
-    measure: Callable[[Face], _measures.Curve]
+    measure: Callable[..., _measures.Curve]
     to_hurst: Callable[[float, int], float]
     power: float | None
     window: Callable[[Face], tuple[float, float, str]]
@@ -142,6 +142,7 @@ class CurveMethod:
     octaves: bool = False
     levels: bool = False
     discrete: bool = False
+    lags: bool = False
     also: str = ""
 
     def __call__(self, face: Face, scales: Scales, noise: bool) -> Estimate:
@@ -151,7 +152,8 @@ class CurveMethod:
         if face.is_constant and not self.also:
             return undefined(CONSTANT)
         # slopes know no unit, but for those methods that have a natural scale
-        curve = self.measure(face.unitless() if face.is_extreme and not self.also else face)
+        longest = (scales[1],) if self.lags and scales is not None else ()
+        curve = self.measure(face.unitless() if face.is_extreme and not self.also else face, *longest)
         lengths = 2.0 * np.pi / curve.scale if self.as_wavelength else curve.scale
         low, high, rule = self.window(face) if scales is None else (*scales, _ASKED)
         inside = (lengths >= low * (1 - 1e-9)) & (lengths <= high * (1 + 1e-9)) & (curve.value > 0)
@@ -239,6 +241,15 @@ def _edges(face: Face) -> tuple[float, float, str]:
     return spacing, extent / 2.0, "a small face: one spacing to half the extent"
 
 
+def _stretches(face: Face) -> tuple[float, float, str]:
+    """Lengths over which heights range."""
+    spacing, extent = max(face.grid.spacing), min(face.grid.extent)
+    if extent / 4.0 >= 16.0 * spacing:
+        rule = "8 spacings to a quarter of the extent: shorter stretches miss what lies between their points"
+        return 8.0 * spacing, extent / 4.0, rule
+    return _edges(face)
+
+
 _UNIT = "depends on the unit of height: see the curve's vertical_scale"
 METHODS: dict[str, Method] = {
     "likelihood": Method(
@@ -267,16 +278,18 @@ METHODS: dict[str, Method] = {
     ),
     "variogram": Method(
         "slope of the mean square increment; fractional Brownian faces of H below 0.6; no interval",
-        CurveMethod(_measures.variogram, lambda slope, _: 0.5 * slope, -2.0, _short_lags),
+        CurveMethod(_measures.variogram, lambda slope, _: 0.5 * slope, -2.0, _short_lags, lags=True),
     ),
     "madogram": Method(
         "slope of the mean absolute increment; as the variogram, less moved by outliers; no interval",
-        CurveMethod(_measures.madogram, lambda slope, _: slope, 0.0, _short_lags),
+        CurveMethod(_measures.madogram, lambda slope, _: slope, 0.0, _short_lags, lags=True),
     ),
     "second_variogram": Method(
         "slope of the mean square second difference; fractional Brownian faces of any H, tilted or not; "
         "no interval",
-        CurveMethod(_measures.second_variogram, lambda slope, _: 0.5 * slope, 0.0, _short_lags, levels=True),
+        CurveMethod(
+            _measures.second_variogram, lambda slope, _: 0.5 * slope, 0.0, _short_lags, levels=True, lags=True
+        ),
     ),
     "roughness_length": Method(
         "growth of the rms height in windows about their planes, as expected of so few points; fractional "
@@ -285,6 +298,11 @@ METHODS: dict[str, Method] = {
             _measures.roughness_length, lambda slope, _: slope, 0.0, _windows, levels=True, discrete=True
         ),
         smallest=5,
+    ),
+    "variation": Method(
+        "growth of the range of heights over stretches of rows and columns; H too high by 0.05 to 0.25 where "
+        "it is below 0.8; no interval",
+        CurveMethod(_measures.variation, lambda slope, _: slope, 0.0, _stretches),
     ),
     "cube_counts": Method(
         "slope of the number of cubes that meet the surface, heights scaled to the extent; H too high by "

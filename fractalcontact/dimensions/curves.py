@@ -89,15 +89,17 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
     surface : DataArray
         Heights in metres, dims (..., y, x) or (..., x); NaN where nothing was observed.
     max_lag : float, optional
-        Largest lag in metres. Default: half the shorter extent. Few lags are summed in one pass, also over
-        a surface that is not in memory (then the default is four spacings); many by transforms.
+        Largest lag in metres, up to the diagonal. Default: half the shorter extent. Few lags are summed in
+        one pass, also over a surface that is not in memory (then the default is four spacings); many by
+        transforms.
 
     Returns
     -------
     Dataset over `lag` (m)
         `variogram` (m2), `pair_count` and `local_slope`, which is 2 H for a self-affine surface. Pairs in all
         directions are pooled. Up to 4.5 spacings each distance is a lag of its own; beyond, they are pooled
-        in rings as wide as the larger spacing. Pairs wrap around periodic axes.
+        in rings as wide as the larger spacing. Pairs wrap around periodic axes, where
+        no lag is longer than half the period.
 
     Raises
     ------
@@ -183,6 +185,45 @@ def roughness_length(surface: xr.DataArray) -> xr.Dataset:
     """
     return _window_curve(
         "roughness_length", surface, "window_size", {"roughness": "value"}, {}, "Roughness inside windows"
+    )
+
+
+def variation(surface: xr.DataArray) -> xr.Dataset:
+    """Return the mean range of the heights over stretches of the rows and of the columns.
+
+    The boxes that a profile meets in a stretch are as high as the range of the profile there: this is what
+    box counting measures, without a grid and without a unit of height.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x); stretches with a NaN in them are left out.
+
+    Returns
+    -------
+    Dataset over `window_size` (m)
+        `variation` (m), `pair_count` (of stretches) and `local_slope`, which is H for a self-affine surface.
+        Lengths double from one spacing to half the face.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, or nothing was observed.
+
+    Notes
+    -----
+    Over one spacing it is the mean absolute increment, twice the madogram. Hall and Wood (1993) take the
+    difference of the two ends of a stretch for its range, over one and two spacings: that is
+    ``estimate(surface, "madogram", scales=(dx, 2 * dx))``. The range sees more of the stretch and less of
+    the heights between the points, so that its slope is too high where H is small.
+
+    References
+    ----------
+    Dubuc, Quiniou, Roques-Carmes, Tricot and Zucker (1989), Physical Review A 39; Hall and Wood (1993),
+    Biometrika 80.
+    """
+    return _window_curve(
+        "variation", surface, "window_size", {"variation": "value"}, {}, "Range of heights over stretches"
     )
 
 
@@ -307,7 +348,7 @@ def _window_curve(
     started = time.perf_counter()
     arguments = () if scale is None else (scale,)
     curves = [_measures.MEASURES[name](face, *arguments) for face in faces]
-    counted = {"pair_count": "count"} if name == "roughness_length" else {}
+    counted = {"pair_count": "count"} if name in ("roughness_length", "variation") else {}
     result = stack(surface, faces, dim, curves, value, counted)
     # over its first value, a constant curve has slope 0 to the last bit
     slopes = [local_slope(c.scale, c.value / (c.value[:1] if (c.value > 0).all() else 1.0)) for c in curves]

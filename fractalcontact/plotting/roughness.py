@@ -28,6 +28,7 @@ CURVES = {
     "madogram": (1.0, 0.0, 0.0),
     "cube_count": (1.0, -1.0, 0.0),
     "roughness": (1.0, 0.0, 0.0),
+    "variation": (1.0, 0.0, 0.0),
     "covering_area": (1.0, 0.0, -1.0),
 }
 COLUMNS = 3

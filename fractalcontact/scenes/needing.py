@@ -56,6 +56,7 @@ NEEDS: Mapping[str, Need] = {
     "dimensions/roughness_length": Need((FFT, "scipy.optimize"), _SUMS.kernels),
     "dimensions/cube_counts": Need((FFT,)),
     "dimensions/covering": _SUMS,
+    "dimensions/variation": Need((FFT,)),
     "contact": _PRESSED,
     "joints/register": Need((FFT, "skimage.registration", "scipy.ndimage")),
     "joints/closure": _PRESSED,

@@ -111,6 +111,7 @@ CURVES = (
     "second_variogram",
     "cube_counts",
     "roughness_length",
+    "variation",
     "covering",
 )
 

@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base import spectra
 from fractalcontact.base.schema import QUANTITIES
 
 CURVES = (
@@ -14,6 +13,7 @@ CURVES = (
     "madogram",
     "second_variogram",
     "roughness_length",
+    "variation",
     "cube_counts",
     "covering",
 )
@@ -121,6 +121,28 @@ def test_increments_along_the_axes(name, periodic):
         assert int(at.pair_count) == values.size
 
 
+@pytest.mark.parametrize("name", ["variogram", "madogram", "second_variogram"])
+def test_no_lag_of_a_periodic_profile_is_longer_than_half_its_period(name):
+    face = fc.surfaces.spectral(60, 1e-3, hurst=0.6, rms_height=1e-5, rng=3)
+    curve = getattr(fc.dimensions, name)(face, max_lag=0.05)
+    assert 0.02 < float(curve.lag.max()) <= 0.03 * (1 + 1e-9)
+
+
+def test_lags_along_the_long_side_of_a_slender_face():
+    heights = np.random.default_rng(5).standard_normal((6, 80)).cumsum(axis=1)
+    curve = fc.dimensions.variogram(surface(heights), max_lag=0.06)
+    assert float(curve.lag.max()) > 0.059
+    squares, number = 0.0, 0
+    for dy in range(6):
+        for dx in range(-79, 80):
+            if 0 < np.hypot(dx, dy) <= 60 and (dy > 0 or dx > 0):
+                here = heights[dy:, max(dx, 0) : 80 + min(dx, 0)]
+                there = heights[: 6 - dy, max(-dx, 0) : 80 - max(dx, 0)]
+                squares, number = squares + np.sum((here - there) ** 2), number + here.size
+    assert int(curve.pair_count.sum()) == number
+    assert float((2 * curve.variogram * curve.pair_count).sum()) == pytest.approx(squares, rel=1e-10)
+
+
 def test_second_differences_see_no_plane(rough):
     tilted = rough + 0.3 * rough.x - 0.2 * rough.y
     tilted.attrs = rough.attrs
@@ -133,12 +155,22 @@ def test_spectrum_carries_the_mean_square():
     face = fc.surfaces.spectral((64, 48), (2e-3, 1e-3), hurst=0.7, rms_height=1e-5, short_cutoff=6e-3, rng=4)
     curve = fc.dimensions.spectrum(face)
     total = float((curve.power_spectral_density * curve.mode_count).sum()) / (64 * 2e-3 * 48 * 1e-3)
-    # the lowest modes along y lie below the first ring, whose width is the coarser step
-    power, weights = spectra.periodogram(face.values, (2e-3, 1e-3))
-    step = 2 * np.pi / (48 * 1e-3)
-    below = spectra.radial_wavenumber((64, 48), (2e-3, 1e-3)) < 0.5 * step
-    rest = float((power * weights)[below].sum()) / (64 * 2e-3 * 48 * 1e-3)
-    assert total + rest == pytest.approx(1e-10, rel=1e-12)
+    assert total == pytest.approx(1e-10, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "spacing"), [((12, 120), (1.0, 1.0)), ((60, 8), (1.0, 3.0)), ((31, 8), (5.0, 1.0))]
+)
+def test_slender_faces_lose_none_of_their_longest_waves(shape, spacing):
+    face = fc.surfaces.spectral(shape, spacing, hurst=0.7, rms_height=1e-3, rng=4)
+    curve = fc.dimensions.spectrum(face)
+    full = np.hypot(*np.meshgrid(*(np.fft.fftfreq(n, s) for n, s in zip(shape, spacing, strict=True))))
+    inside = (full > 0) & (full <= 0.5 / max(spacing) * (1 + 1e-9))
+    assert int(curve.mode_count.sum()) == np.count_nonzero(inside)
+    assert float(curve.wavenumber[0]) == pytest.approx(2 * np.pi * full[full > 0].min(), rel=1e-9)
+    power = np.abs(np.fft.fft2(face.values)).T ** 2 / np.prod(shape) ** 2
+    total = float((curve.power_spectral_density * curve.mode_count).sum())
+    assert total / np.prod(shape) / np.prod(spacing) == pytest.approx(power[inside].sum(), rel=1e-12)
 
 
 def test_spectrum_of_one_wave():
@@ -195,6 +227,34 @@ def test_roughness_is_the_rms_about_a_plane(rough):
     assert float(found.window_size[0]) == pytest.approx(8e-3)
     assert float(found.roughness[0]) == pytest.approx(np.mean(values), rel=1e-10)
     assert int(found.pair_count[0]) == len(values)
+
+
+@pytest.mark.parametrize(
+    ("shape", "spacing"), [((24, 17), (1e-3, 1e-3)), ((13, 40), (2e-3, 1e-3)), ((1, 50), (1.0, 1e-3))]
+)
+def test_variation_is_the_mean_range_over_stretches(shape, spacing):
+    rng = np.random.default_rng(9)
+    heights = rng.standard_normal(shape).cumsum(axis=1)
+    heights[rng.random(shape) < 0.05] = np.nan
+    profile = shape[0] == 1
+    found = fc.dimensions.variation(
+        surface(heights[0] if profile else heights, spacing[-1 if profile else slice(None)])
+    )
+    assert found.window_size.size >= 3
+    for size, value, number in zip(found.window_size, found.variation, found.pair_count, strict=True):
+        ranges = []
+        for lines, step in ((heights, spacing[1]), (heights.T, spacing[0])):
+            length = round(float(size) / step)
+            for line in lines if len(lines[0]) > 1 else ():
+                parts = [line[i : i + length + 1] for i in range(line.size - length)]
+                ranges += [np.ptp(part) for part in parts if np.isfinite(part).all()]
+        assert int(number) == len(ranges)
+        assert float(value) == pytest.approx(np.mean(ranges), rel=1e-12)
+    once, pairs_of = (
+        fc.dimensions.madogram(surface(heights[0], 1e-3)),
+        fc.dimensions.variation(surface(heights[0], 1e-3)),
+    )
+    assert float(pairs_of.variation[0]) == pytest.approx(2.0 * float(once.madogram[0]), rel=1e-12)
 
 
 def test_cube_counts_of_flat_faces_are_those_of_a_plane():
@@ -267,7 +327,7 @@ def test_units_of_powers_of_two_change_no_bit(rough, name):
     curve = getattr(fc.dimensions, name)
     one, other = curve(rough), curve(rough * 2.0**-30)
     value = next(iter(one.data_vars))
-    power = {"cube_counts": 0, "madogram": 1, "roughness_length": 1}.get(name, 2)
+    power = {"cube_counts": 0, "madogram": 1, "roughness_length": 1, "variation": 1}.get(name, 2)
     np.testing.assert_array_equal(one[value] * 2.0 ** (-30 * power), other[value])
     np.testing.assert_array_equal(one.local_slope.isnull(), other.local_slope.isnull())
 

@@ -221,6 +221,15 @@ def test_scales_limit_the_fit(rough):
     assert set(json.loads(empty.hurst.attrs["note"])) == set(NAMES)
 
 
+@pytest.mark.parametrize("method", ["variogram", "madogram", "second_variogram"])
+def test_lags_are_fitted_as_far_as_they_were_asked_for(rough, method):
+    """Farther than the curve goes by itself."""
+    extent = min(n * 1e-4 for n in rough.shape)
+    longest = {"variogram": 0.8, "madogram": 0.8, "second_variogram": 0.4}[method] * extent
+    found = fc.dimensions.estimate(rough, method, scales=(0.1 * extent, longest))
+    assert 0.85 * longest < float(found.scale_max[0]) <= longest * (1 + 1e-9)
+
+
 def test_a_stack_is_its_members():
     stack = fc.surfaces.fbm((40, 40), 1e-3, hurst=0.5, rms_increment=1e-5, members=3, rng=30)
     found = estimate(stack, ["default", "variogram"])
