@@ -24,7 +24,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 FROM_ROUND = 2.447746830680816  # root of 95 % of chi square with two degrees of freedom
 MULTIPLES = (1, 2, 4)
 DIRECTIONS = 8
-LEAST_LAGS = 13  # a curve of three numbers, eight harmonics, and two to spare
+LEAST_LAGS = 14  # a curve of four numbers, eight harmonics, and two to spare
+_DEGREE = 3  # of the smooth curve over the length
 _REACH = 8  # components of a direction that was asked for
 _NEAR = 2.5  # degrees within which the shorter of two lattice directions is better
 _LOWEST, _HIGHEST = 0.02, 0.98  # exponents whose covariances are taken
@@ -118,6 +119,8 @@ class Isotropy:
         The matrix M of that surface, y first.
     note : str
         Why there is no stretch; empty if there is one.
+    bend : float
+        Curvature of the power law over the length, in standard errors.
     """
 
     p_value: float
@@ -129,6 +132,7 @@ class Isotropy:
     hurst: float
     form: Array
     note: str
+    bend: float = 0.0
 
     @classmethod
     def of(
@@ -209,10 +213,13 @@ def isotropy(means: Means, pairs: Pairs) -> Isotropy:
     spreads = _Spreads(means, pairs)
     logs = np.log(np.hypot(*means.places.T))
     design = np.stack([np.ones(logs.size), 2.0 * logs], axis=1)
-    hurst = _inside(np.linalg.lstsq(design, np.log(means.means))[0][1])
+    first = float(np.linalg.lstsq(design, np.log(means.means))[0][1])
+    hurst = _inside(first)
     for _ in range(3):
         spread = spreads.near(hurst, 0.0, 0.0)
-        hurst = _inside(_least_squares(design, _logarithms(means, spread), spread)[0][1])
+        (_, slope), errors = _least_squares(design, _logarithms(means, spread), spread)
+        hurst = _inside(slope)
+    smooth = first > 1.0 + _SURELY * np.sqrt(errors[1, 1])
     p_value = _wald(means, np.eye(2), spreads.near(hurst, 0.0, 0.0), freely=True)
     u = v = 0.0
     for _ in range(_ROUNDS):
@@ -228,13 +235,21 @@ def isotropy(means: Means, pairs: Pairs) -> Isotropy:
             u, v = u * STEEPEST / size, v * STEEPEST / size
         if np.hypot(*coefficients[2:]) < 1e-4 or size > STEEPEST:
             break
-    stretched = _wald(means, matrix(u, v), spreads.near(hurst, u, v), freely=False)
-    found = Isotropy.of(
-        p_value, stretched, hurst, (float(coefficients[1]), errors[1, 1]), (u, v), errors[2:, 2:]
-    )
-    if coefficients[1] < 1.0 + _SURELY * np.sqrt(errors[1, 1]):
+    spread = spreads.near(hurst, u, v)
+    stretched = _wald(means, matrix(u, v), spread, freely=False)
+    power = float(coefficients[1]), float(errors[1, 1])
+    found = Isotropy.of(p_value, stretched, hurst, power, (u, v), errors[2:, 2:])
+    found = replace(found, bend=_bend(means, matrix(u, v), spread))
+    if not smooth:
         return found
     return replace(found, p_value=np.nan, stretched_p_value=np.nan, note=SMOOTH)
+
+
+def _bend(means: Means, form: Array, spread: Array) -> float:
+    """Return the curvature of the means over the length, in standard errors."""
+    smooth = _columns(means.places, form)[0][:, :3]
+    coefficients, errors = _least_squares(smooth, _logarithms(means, spread), spread)
+    return float(coefficients[2] / np.sqrt(errors[2, 2]))
 
 
 class _Spreads:
@@ -255,7 +270,7 @@ class _Spreads:
 
 def _wald(means: Means, form: Array, spread: Array, *, freely: bool) -> float:
     """Return how likely harmonics as large are by chance; the level of the second is free in a stretch."""
-    from scipy.special import chdtrc
+    from scipy.stats import chi2
 
     smooth, waves = _columns(means.places, form)
     if not freely:
@@ -269,14 +284,15 @@ def _wald(means: Means, form: Array, spread: Array, *, freely: bool) -> float:
     kept = singular > 1e-6 * singular.max(initial=0.0)
     if not kept.any():
         return float("nan")
-    return float(chdtrc(np.count_nonzero(kept), np.sum((left[:, kept].T @ values) ** 2)))
+    return float(chi2.sf(np.sum((left[:, kept].T @ values) ** 2), np.count_nonzero(kept)))
 
 
 def _columns(places: Array, form: Array) -> tuple[Array, Array]:
     """Return the columns of a smooth curve over the length, and those of the harmonics of the direction."""
     y, x = (places @ np.linalg.cholesky(form)).T
     logs, angle = np.log(np.hypot(y, x)), np.arctan2(y, x)
-    smooth = np.stack([np.ones(logs.size), 2.0 * logs, (logs - logs.mean()) ** 2], axis=1)
+    bends = [(logs - logs.mean()) ** power for power in range(2, _DEGREE + 1)]
+    smooth = np.stack([np.ones(logs.size), 2.0 * logs, *bends], axis=1)
     return smooth, harmonics(logs, angle)
 
 

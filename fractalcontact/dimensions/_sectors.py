@@ -24,6 +24,7 @@ WIDEST = 90.0 / _rays.DIRECTIONS  # half the angle of a sector, degrees
 LEAST = 100  # modes, to tell the harmonics of their directions
 _LEAST_TAPERED = 600  # the same in the whole plane of a tapered face
 _LONGEST, _SHORTEST = 3.5, 6.0  # steps of the wavenumber, and spacings: the waves of a tapered face
+_LEAK = 2  # modes on either side that the taper ties to one
 _LOBE, _CLIFF = 4, 2e-3  # rings within which the power of a tapered face falls so far only at a cut-off
 _DEAD = 1e-20  # of the strongest mode: nothing but rounding
 _ROUNDS = 40
@@ -108,59 +109,75 @@ def isotropy(plane: Plane, hurst: float) -> _rays.Isotropy:
     return _rays.Isotropy.of(p_value, stretched, hurst, (1.0 + hurst, errors[1, 1]), (u, v), errors[2:, 2:])
 
 
-def tapered_test(
-    heights: Array,
-    steps: tuple[float, float],
-    form: Array,
-    hurst: float,
-    *,
-    free: int,
-    scales: tuple[float, float] = (0.0, np.inf),
-) -> float:
-    """Do the score test on a complete face with free edges, under a Hann taper; NaN if it is too small.
+@dataclass(frozen=True)
+class Tapered:
+    """The long waves of a complete face with free edges, under a Hann taper.
 
     Only waves longer than six spacings and shorter than a third of the extent are compared: shorter ones
-    stand for their aliases too, which follow the grid, and longer ones feel the taper. `form` measures
-    wavevectors, `scales` are wavelengths, the first `free` harmonics were fitted.
+    stand for their aliases too, which follow the grid, and longer ones feel the taper.
+
+    Attributes
+    ----------
+    power : ndarray, shape (my, mx)
+        Both signs of the wavevector, in ascending order, and two modes more at either end.
+    waves : ndarray, shape (my, mx, 2)
+        Wavevectors, y first, over 2 pi.
+    low, high : float
+        The band.
     """
-    ny, nx = heights.shape
-    tapers = [window_weights(n, "hann") for n in (ny, nx)]
-    modes = fft.rfft2(without_trend(heights, plane=True) * tapers[0][:, None] * tapers[1])
-    columns = np.minimum(np.arange(nx), -np.arange(nx) % nx)
-    rows = np.where(np.arange(nx) <= nx // 2, 0, 1)
-    half = modes.real**2 + modes.imag**2
-    mirrored = np.stack([half, half[-np.arange(ny) % ny]])
-    power = mirrored[rows, :, columns].T
-    waves = np.stack(
-        np.meshgrid(
-            *(np.fft.fftfreq(n, step) for n, step in zip((ny, nx), steps, strict=True)), indexing="ij"
-        ),
-        axis=-1,
-    )
-    radius = np.sqrt(_rays.quadratic(waves, form))
-    narrow = float(np.sqrt(np.linalg.eigvalsh(form)[-1]))
-    low = _LONGEST / min(n * step for n, step in zip((ny, nx), steps, strict=True)) * narrow
-    low = max(low, narrow / scales[1])
-    high = 1.0 / max(_SHORTEST * max(steps), scales[0]) / narrow
-    kept = (radius >= low) & (radius <= high)
-    ring = np.rint(radius * (_LONGEST / low)).astype(int)
-    kept &= ring <= _last(np.bincount(ring[kept], power[kept]) / np.maximum(np.bincount(ring[kept]), 1))
-    if np.count_nonzero(kept) < _LEAST_TAPERED:
-        return float("nan")
-    y, x = (waves[kept] @ np.linalg.cholesky(form)).T
-    excess, centred = _excess(
-        power[kept], radius[kept] * (_LONGEST / low), np.arctan2(y, x), np.ones(y.size), hurst
-    )
-    whole = np.zeros((centred.shape[1], ny, nx))
-    whole[:, kept] = centred.T
-    near = whole
-    for axis in (1, 2):  # squared correlations of modes one and two apart
-        near = near + sum(
-            share * np.roll(near, shift, axis)
-            for share, shift in ((4 / 9, 1), (4 / 9, -1), (1 / 36, 2), (1 / 36, -2))
+
+    power: Array
+    waves: Array
+    low: float
+    high: float
+
+    @classmethod
+    def of(
+        cls, heights: Array, steps: tuple[float, float], scales: tuple[float, float] = (0.0, np.inf)
+    ) -> Tapered:
+        """Transform a face; `scales` are wavelengths."""
+        ny, nx = heights.shape
+        level = without_trend(heights, plane=True)
+        level *= window_weights(ny, "hann")[:, None]
+        level *= window_weights(nx, "hann")
+        extents = [n * step for n, step in zip((ny, nx), steps, strict=True)]
+        high = 1.0 / max(_SHORTEST * max(steps), scales[0])
+        y, x = (np.arange(-m, m + 1) for m in (int(high * extent * (1 + 1e-9)) + _LEAK for extent in extents))
+        half = fft.rfft2(level)[:, : x[-1] + 1][y]
+        right = half.real**2 + half.imag**2
+        power = np.concatenate([right[::-1, :0:-1], right], axis=1)
+        waves = np.stack(np.meshgrid(y / extents[0], x / extents[1], indexing="ij"), axis=-1)
+        return cls(power, waves, max(_LONGEST / min(extents), 1.0 / scales[1]), high)
+
+    def test(self, form: Array, hurst: float, *, free: int) -> float:
+        """Do the score test; NaN if there are too few waves.
+
+        `form` measures wavevectors; the first `free` harmonics were fitted.
+        """
+        radius = np.sqrt(_rays.quadratic(self.waves, form))
+        narrow = float(np.sqrt(np.linalg.eigvalsh(form)[-1]))
+        low, high = self.low * narrow, self.high / narrow
+        kept = (radius >= low * (1 - 1e-9)) & (radius <= high * (1 + 1e-9))
+        ring = np.rint(np.round(radius * (_LONGEST / low), 9)).astype(int)
+        mean = np.bincount(ring[kept], self.power[kept]) / np.maximum(np.bincount(ring[kept]), 1)
+        kept &= ring <= _last(mean)
+        if np.count_nonzero(kept) < _LEAST_TAPERED:
+            return float("nan")
+        y, x = (self.waves[kept] @ np.linalg.cholesky(form)).T
+        excess, centred = _excess(
+            self.power[kept], radius[kept] * (_LONGEST / low), np.arctan2(y, x), np.ones(y.size), hurst
         )
-    spread = 2.0 * whole.reshape(len(whole), -1) @ near.reshape(len(whole), -1).T
-    return _chance(centred.T @ excess, spread, free)
+        spread = []
+        for one in centred.T:
+            near = np.zeros(kept.shape)
+            near[kept] = one
+            for axis in (0, 1):  # squared correlations of modes one and two apart
+                near = near + sum(
+                    share * np.roll(near, shift, axis)
+                    for share, shift in ((4 / 9, 1), (4 / 9, -1), (1 / 36, 2), (1 / 36, -2))
+                )
+            spread.append(2.0 * near[kept] @ centred)
+        return _chance(centred.T @ excess, np.array(spread), free)
 
 
 def _last(mean: Array) -> int:
@@ -185,7 +202,7 @@ def _excess(power: Array, radius: Array, angle: Array, weights: Array, hurst: fl
     Rings are one wide in `radius`; the power law of exponent `hurst` is taken out first, for the lowest rings
     are as wide as their modes are apart.
     """
-    ring = np.unique(np.rint(radius).astype(int), return_inverse=True)[1]
+    ring = np.unique(np.rint(np.round(radius, 9)).astype(int), return_inverse=True)[1]
     total = np.bincount(ring, weights)
     power = power * (radius / radius.max()) ** (2.0 + 2.0 * hurst)
     excess = power / (np.bincount(ring, weights * power) / total)[ring] - 1.0

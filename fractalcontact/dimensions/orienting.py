@@ -26,6 +26,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16
 _STRANGE = 1e-3  # chance below which no stretch explains the face
+_BENT = 3.3  # curvature of the power law, in standard errors, beyond which an interval is widened
 _COMPARED = 1 / 3  # of the face, that a second difference may span in a test
 _UNVARIED = 1e-22  # of the largest mean square: the heights do not vary along that direction
 _MODELLESS = (_rays.RIDGES, _rays.SMOOTH)
@@ -190,7 +191,6 @@ def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] |
     if smooth and isotropy is not None:
         isotropy = replace(isotropy, p_value=0.0, stretched_p_value=0.0, note=_rays.RIDGES)
     beyond = strange or (isotropy is not None and isotropy.stretched_p_value < _STRANGE)
-    hurst, form = (isotropy.hurst, isotropy.form) if isotropy is not None else (None, np.eye(2))
     estimates = []
     for place in range(len(rays)):
         own = means.part(owner == place)
@@ -199,7 +199,7 @@ def _turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] |
         elif len(own.means) < 2:
             estimates.append(undefined(_FEW))
         else:
-            estimates.append(_along(face, own, hurst, form, _BEYOND if beyond else ""))
+            estimates.append(_along(face, own, isotropy, _BEYOND if beyond else ""))
     note = "" if isotropy is not None else "too few lags fit into the face to compare directions"
     return _Turned(estimates, *_known(isotropy, note))
 
@@ -228,15 +228,20 @@ def _known(isotropy: _rays.Isotropy | None, note: str) -> tuple[_rays.Isotropy |
 
 
 def _by_waves(face: Face, found: _rays.Isotropy, scales: tuple[float, float] | None) -> _rays.Isotropy:
-    """Take the chances from the waves of a complete face, if it is large enough: they know no family."""
+    """Take the chances from the waves of a complete face, if it is large enough: they know no family.
+
+    Where the power law of the lags is straight, they are asked too: they feel narrow ridges better.
+    """
     low, high = (0.0, np.inf) if scales is None else scales
     window = low / face.spacing[1], high / face.spacing[1]
 
+    waves = _sectors.Tapered.of(face.heights, face.plane_steps, window)
+
     def chance(form: Array, free: int, otherwise: float) -> float:
-        value = _sectors.tapered_test(
-            face.heights, face.plane_steps, form, found.hurst, free=free, scales=window
-        )
-        return value if np.isfinite(value) else otherwise
+        value = waves.test(form, found.hurst, free=free)
+        if not np.isfinite(value):
+            return otherwise
+        return min(2.0 * min(value, otherwise), 1.0) if abs(found.bend) < _BENT else value
 
     return replace(
         found,
@@ -245,18 +250,32 @@ def _by_waves(face: Face, found: _rays.Isotropy, scales: tuple[float, float] | N
     )
 
 
-def _along(face: Face, own: _rays.Means, hurst: float | None, form: Array, reason: str) -> Estimate:
-    """Return the estimate of one direction."""
+def _along(face: Face, own: _rays.Means, isotropy: _rays.Isotropy | None, reason: str) -> Estimate:
+    """Return the estimate of one direction.
+
+    Where the power law bends over the length more than chance allows, the interval also holds the exponents
+    between the shorter and between the longer lags.
+    """
+    hurst, form = (None, np.eye(2)) if isotropy is None else (isotropy.hurst, isotropy.form)
     exponent, error, second = _rays.slope(own, _pairs(face, own), hurst, form)
     low, high = normal_interval(exponent, error)
+    note = ""
+    if isotropy is not None and abs(isotropy.bend) > _BENT:
+        for start in range(len(own.means) - 1):
+            part = own.part(np.arange(start, start + 2))
+            ends = normal_interval(*_rays.slope(part, _pairs(face, part), hurst, form)[:2])
+            low, high = min(low, ends[0]), max(high, ends[1])
+        note = (
+            f"the exponent changes with the lag ({isotropy.bend:+.1f} standard deviations): the interval "
+            "holds those between the shorter and between the longer lags"
+        )
     # a second difference over one lag has 4 - 4^H times the mean square of a first one
     first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan
+    increment = float(np.sqrt(first)) * face.unit
     if reason:
         error = low = high = np.nan
-    estimate = Estimate(
-        exponent, error, low, high, increment=float(np.sqrt(first)) * face.unit, not_given=reason
-    )
-    return estimate.limited()
+        note = ""
+    return Estimate(exponent, error, low, high, increment=increment, not_given=reason, note=note).limited()
 
 
 def _sectored(face: Face, azimuths: Array, scales: tuple[float, float] | None) -> _Turned:
