@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from fractalcontact.domains._masks import Array, Planes, together
 
@@ -325,6 +324,8 @@ TINY = 1e-24  # variance of slopes that differ by rounding alone
 
 def deviations(sizes: Array) -> float:
     """Return how many standard deviations of the local slopes make 95 %: Student's t, of the sizes less 2."""
+    from scipy.special import stdtrit
+
     return float(stdtrit(max(sizes.size - 2, 1), 0.975))
 
 

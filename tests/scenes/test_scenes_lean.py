@@ -21,15 +21,18 @@ from pathlib import Path
 started = time.process_time()
 from fractalcontact.cli import main
 code = main(sys.argv[1:])
-kernels, seconds = 0, 0.0
+kernels, forms = 0, {}
 if "numba" in sys.modules:
     from numba.core.dispatcher import Dispatcher
     import gc
     for one in gc.get_objects():
         if isinstance(one, Dispatcher) and one.py_func.__module__.startswith("fractalcontact"):
             kernels += sum(one.stats.cache_misses.values())
+            if one.overloads:
+                name = one.py_func.__module__.split(".")[1] + "." + one.py_func.__name__
+                forms[name] = len(one.overloads)
 print(json.dumps({
-    "code": code, "kernels": kernels, "cpu": time.process_time() - started,
+    "code": code, "kernels": kernels, "forms": forms, "cpu": time.process_time() - started,
     "modules": sorted({name.split(".")[0] for name in sys.modules}),
     "rooms": sorted({name.split(".")[1] for name in sys.modules if name.startswith("fractalcontact.")}),
     "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
@@ -79,11 +82,30 @@ DIMENSION = FACE + '[want]\ndimensions = ["default"]\n'
 PRESSED = FACE + '[contact]\ncontact_modulus = 1e9\nnominal_pressure = 1e5\n[want]\ncontact = ["press"]\n'
 
 
+PAPER = (
+    SOUND.replace('"rigid_dilatancy"]', '"rigid_dilatancy", "elastic_dilatancy", "friction"]')
+    + 'dimensions = ["default", "spectrum", "variogram", "cube_counts"]\n'
+    + 'domains = ["box_dimension", "lacunarity"]\nkeep = ["state"]\n'
+)
+
+
 WANTED = {
     "rigid": (SOUND.replace('"closure", ', ""), {"surfaces", "joints"}),
     "dimension": (DIMENSION, {"surfaces", "dimensions"}),
     "pressed": (PRESSED, {"surfaces", "contact"}),
     "closure": (SOUND, {"surfaces", "joints", "contact"}),
+    "paper": (PAPER, {"surfaces", "dimensions", "joints", "contact", "domains"}),
+}
+SOLVER = {
+    *("bend", "collect", "correct", "extend", "inspect", "multiply", "pair_sum", "scale_modes"),
+    *("select", "survey", "turn", "weigh"),
+}
+COMPILED = {
+    "rigid": set(),
+    "dimension": {"dimensions.increment_sums"},
+    "closure": {f"contact.{name}" for name in SOLVER},
+    "paper": {"dimensions.increment_sums", "domains.cover", "domains.nearest_ahead", "domains.glide"}
+    | {f"contact.{name}" for name in SOLVER},
 }
 
 
@@ -104,6 +126,11 @@ def test_only_the_rooms_that_are_needed_are_entered(footprints, name):
     found = footprints(name)
     assert set(found["rooms"]) & set(ROOMS) == WANTED[name][1]
     assert not {"matplotlib", "skimage", "dask.distributed", "tqdm"} & set(found["modules"])
+
+
+@pytest.mark.parametrize("name", list(COMPILED))
+def test_only_these_kernels_are_needed_each_for_one_kind_of_arrays(footprints, name):
+    assert footprints(name)["forms"] == dict.fromkeys(COMPILED[name], 1)
 
 
 def test_a_second_run_compiles_nothing(footprints):
