@@ -20,7 +20,7 @@ CHUNK = 256
 SMALLEST = 8  # observed points
 _LOW, _HIGH = 1e-3, 0.999
 _QUIET, _LOUD = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
-_QUANTILE = 3.841458820694124  # 95 % of chi square with one degree of freedom
+QUANTILE = 3.841458820694124  # 95 % of chi square with one degree of freedom
 
 
 @dataclass(frozen=True)
@@ -114,10 +114,10 @@ def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> P
             found[hurst] = _best_noise(increments, hurst) if noise else (*increments.solve(hurst, 0.0), 0.0)
         return found[hurst]
 
-    hurst = _minimum(lambda h: best(h)[0], _LOW, _HIGH)
+    hurst = minimum(lambda h: best(h)[0], _LOW, _HIGH)
     least, amplitude, level = best(hurst)
-    low = _crossing(lambda h: best(h)[0] - least - _QUANTILE, hurst, _LOW, 0.0)
-    high = _crossing(lambda h: best(h)[0] - least - _QUANTILE, hurst, _HIGH, 1.0)
+    low = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _LOW, 0.0)
+    high = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _HIGH, 1.0)
     return ProfileFit(
         hurst, _curvature(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
     )
@@ -125,22 +125,26 @@ def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> P
 
 def _best_noise(increments: Increments, hurst: float) -> tuple[float, float, float]:
     """Return deviance, amplitude and noise at the best noise for one exponent."""
-    level = float(np.exp(_minimum(lambda t: increments.solve(hurst, np.exp(t))[0], _QUIET, _LOUD, 1e-3)))
+    level = float(np.exp(minimum(lambda t: increments.solve(hurst, np.exp(t))[0], _QUIET, _LOUD, 1e-3)))
     with_noise, without = increments.solve(hurst, level), increments.solve(hurst, 0.0)
     return (*with_noise, level) if with_noise[0] < without[0] else (*without, 0.0)
 
 
-def _minimum(function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5) -> float:
+def minimum(
+    function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5, points: int = 9
+) -> float:
+    """Return where a function of one number, which may have side valleys, is least."""
     from scipy.optimize import minimize_scalar
 
     # a coarse look first: the bounded search alone may settle in a side valley
-    grid = np.linspace(low, high, 9)
+    grid = np.linspace(low, high, points)
     k = int(np.argmin([function(g) for g in grid]))
-    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, 8)])
+    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, points - 1)])
     return float(minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
 
 
-def _crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
+def crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
+    """Return where a function that is negative `inside` vanishes; `beyond` if not up to the limit."""
     from scipy.optimize import brentq
 
     if function(limit) < 0:

@@ -14,7 +14,7 @@ from fractalcontact.dimensions._estimates import Estimate, normal_interval
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LEAST_MODES = 12
-_STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
+STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
 _UNEVEN = 4.0  # the same for the scatter of the modes about their expected power
 _FEW_PROBES, _MANY_POINTS = 3, 1 << 18
 _FEW_POINTS = 1 << 14
@@ -201,7 +201,7 @@ def fitted(modes: Modes, start: float, noise: bool) -> tuple[_whittle.WhittleFit
     error = modes.error(fit)
     interval = normal_interval(fit.hurst, error)
     notes = [] if fit.converged else ["the fit stopped at the limit of its range"]
-    if abs(fit.misfit) > _STRANGE:
+    if abs(fit.misfit) > STRANGE:
         middle = float(np.median(modes.order))
         interval = _holding(interval, modes, modes.order > middle, fit.hurst, noise)
         notes.append(

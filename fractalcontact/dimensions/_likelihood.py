@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _exact, _increments, _modes, _periodic, _whittle
+from fractalcontact.dimensions import _exact, _increments, _modes, _periodic, _plateaus, _whittle
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, plane, undefined
 from fractalcontact.dimensions._evenness import evenness
 from fractalcontact.dimensions._faces import Face
-from fractalcontact.dimensions._fitting import LEAST_MODES, FreeModes, PeriodicModes, fitted
+from fractalcontact.dimensions._fitting import LEAST_MODES, STRANGE, FreeModes, PeriodicModes, fitted
 from fractalcontact.dimensions._rounding import quantum, told
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -20,6 +20,14 @@ Scales = tuple[float, float] | None
 _ROUNDING = 1e-26  # share of the mean square that transforms lose
 _PERIODIC = "all modes of the band: cut-offs and plateau found from the spectrum"
 _FAMILY = "periodic family: power law between cut-offs"
+_TORN = (
+    "a periodic face with gaps, or with one periodic axis, is taken as free, and the interval is for another "
+    "family than its own: see fractalcontact.surfaces.fill"
+)
+_DROWNED = (
+    "a cut-off that is under the noise looks like another exponent: give `scales` inside the power law of a "
+    "surface; the modes of a profile are too few"
+)
 _FREE = "all modes that vary along both axes"
 _SMOOTHED = "the fitted noise is below zero and told as 0: there is none, or short waves were smoothed away"
 _ASKED = "asked for"
@@ -33,7 +41,10 @@ def likelihood(face: Face, scales: Scales, noise: bool) -> Estimate:
         return plane()
     if all(face.grid.periodic) and face.complete:
         return _periodic_face(face, scales, noise)
-    return _profile(face, scales, noise) if face.axes == 1 else _free_face(face, scales, noise)
+    found = _profile(face, scales, noise) if face.axes == 1 else _free_face(face, scales, noise)
+    if not any(face.grid.periodic) or found.not_given:
+        return found
+    return replace(found, standard_error=np.nan, low=np.nan, high=np.nan, not_given=_TORN)
 
 
 def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
@@ -83,11 +94,20 @@ def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
     heights = face.heights if face.axes == 2 else face.heights[0]
     modes = _periodic.modes(heights, face.steps)
     unit = max(face.grid.extent)
-    low, high = _periodic.band(modes) if scales is None else (unit / scales[1], unit / scales[0])
+    bent = face.axes == 1 and scales is None and not noise
+    if bent:
+        low, high = _periodic.cut_offs(modes)
+    else:
+        low, high = _periodic.band(modes) if scales is None else (unit / scales[1], unit / scales[0])
     modes = modes.inside(low * (1 - 1e-9), high * (1 + 1e-9))
     if modes.weights.sum() < LEAST_MODES:
         return undefined(f"{modes.weights.sum():.0f} modes in the band, at least {LEAST_MODES} are needed")
-    fit, estimate = fitted(PeriodicModes(modes), 0.5, noise)
+    if bent:
+        modes, fit, estimate = _beyond_plateau(modes)
+    else:
+        fit, estimate = fitted(PeriodicModes(modes), 0.5, noise)
+    if noise and (face.axes == 1 or (scales is None and abs(fit.misfit) > STRANGE)):
+        estimate = replace(estimate, standard_error=np.nan, low=np.nan, high=np.nan, not_given=_DROWNED)
     rounded = "" if noise else _rounded(face.heights, estimate.standard_error)
     if rounded:
         loud = fitted(PeriodicModes(modes), 0.5, True)[1]
@@ -107,6 +127,18 @@ def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
             if part
         ),
     )
+
+
+def _beyond_plateau(modes: _periodic.Modes) -> tuple[_periodic.Modes, _whittle.WhittleFit, Estimate]:
+    """Fit a profile with a plateau of any length; return its modes beyond that as well."""
+    found = _plateaus.fit(modes)
+    modes = modes.inside(found.corner, np.inf)
+    fit, estimate = fitted(PeriodicModes(modes), float(np.clip(found.hurst, 0.01, 1.5)), False)
+    low, high = found.low, found.high
+    if estimate.note:  # the modes do not follow one power law
+        low, high = min(low, estimate.low), max(high, estimate.high)
+    estimate = replace(estimate, hurst=found.hurst, standard_error=found.standard_error, low=low, high=high)
+    return modes, fit, estimate
 
 
 def _profile(face: Face, scales: Scales, noise: bool) -> Estimate:

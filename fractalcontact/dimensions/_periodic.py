@@ -68,17 +68,28 @@ def band(modes: Modes) -> tuple[float, float]:
     plateau is what the likelihood of power law with plateau finds; on a surface only if that is much better
     than the power law alone.
     """
+    low, high = cut_offs(modes)
+    rings, mean, counts = _rings(modes)
+    chosen = (rings >= np.floor(low)) & (rings <= np.ceil(high))
+    return max(low, _plateau(rings[chosen], mean[chosen], counts[chosen], modes.axes)), high
+
+
+def cut_offs(modes: Modes) -> tuple[float, float]:
+    """Return the wavenumbers between which the cut-offs leave the power law alone."""
+    rings, mean, _ = _rings(modes)
+    first, last = _cliffs(mean)
+    low = -np.inf if first == 0 else float(rings[first]) + 0.5
+    high = np.inf if last == mean.size - 1 else float(rings[last]) - 0.5
+    return low, high
+
+
+def _rings(modes: Modes) -> tuple[Array, Array, Array]:
+    """Return whole wavenumbers that have modes, their mean power, and how many real numbers each holds."""
     ring = np.rint(modes.wavenumber).astype(int)
     counts = np.bincount(ring, modes.weights)
     total = np.bincount(ring, modes.weights * modes.power)
     rings = np.flatnonzero(counts > 0)
-    counts, mean = counts[rings], total[rings] / counts[rings]
-    first, last = _cliffs(mean)
-    low = -np.inf if first == 0 else rings[first] + 0.5
-    high = np.inf if last == mean.size - 1 else rings[last] - 0.5
-    chosen = slice(first, last + 1)
-    bend = _plateau(rings[chosen].astype(float), mean[chosen], counts[chosen], modes.axes)
-    return (max(low, bend), high)
+    return rings.astype(float), total[rings] / counts[rings], counts[rings]
 
 
 def power_law(modes: Modes, hurst: float) -> Array:

@@ -252,6 +252,15 @@ def test_profiles(hurst):
     np.testing.assert_allclose(one(tilted).hurst, found.hurst[0], atol=1e-4)
 
 
+def test_a_periodic_face_with_gaps_has_no_interval_and_says_why():
+    for shape in (256, (32, 40)):
+        face = fc.surfaces.spectral(shape, 1e-3, hurst=0.6, rms_height=1e-5, short_cutoff=4e-3, rng=35)
+        torn = one(face.where(face.x != face.x[7]))
+        assert np.isfinite(float(torn.hurst))
+        assert np.isnan([float(torn[name]) for name in ("standard_error", "ci_low", "ci_high")]).all()
+        assert "fill" in json.loads(torn.ci_low.attrs["not_given"])["default"]
+
+
 def test_periodic_profile():
     profile = fc.surfaces.spectral(2048, 1e-3, hurst=0.6, rms_height=1e-5, rng=32)
     found = one(profile)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 import scipy.fft
+import scipy.stats
 
 import fractalcontact as fc
 from fractalcontact.base import threads
-from fractalcontact.dimensions import _exact, _gaps, _modes, _periodic, _whittle
+from fractalcontact.dimensions import _exact, _gaps, _modes, _periodic, _plateaus, _whittle
 
 
 def squares(shape, steps, observed=None):
@@ -209,6 +210,53 @@ def test_one_weak_mode_is_no_cut_off(shape):
     highest = [_periodic.band(_periodic.modes(face.values, steps))[1] for face in faces]
     longest = max(faces.shape[1:])
     assert min(highest) >= 0.5 * longest - 4
+
+
+def modes_of_a_profile(power):
+    wavenumber = np.arange(1.0, power.size + 1)
+    return _periodic.Modes(power, wavenumber, np.full(power.size, 2.0), 1)
+
+
+def test_running_sums_are_the_likelihood_of_every_corner():
+    modes = modes_of_a_profile(np.random.default_rng(12).exponential(size=40))
+    hurst, q = 0.4, modes.wavenumber
+    deviances = _plateaus.Plateaus(modes).deviances(hurst)
+    assert deviances.size == 40 - _plateaus.LEAST_BEYOND
+    for k in (0, 5, 32):
+        expected = np.maximum(q, q[k]) ** (-1 - 2 * hurst)
+        expected *= np.mean(modes.power / expected)
+        direct = -2.0 * scipy.stats.expon.logpdf(modes.power, scale=expected).sum()
+        # the sum of all squares over their expectations is the number of modes, twice
+        assert deviances[k] == pytest.approx(direct - 2.0 * q.size, rel=1e-12)
+
+
+@pytest.mark.parametrize(("corner", "count"), [(0, 32), (8, 64), (20, 128)])
+def test_the_interval_of_a_profile_knows_that_its_plateau_is_not_known(corner, count):
+    """Modes drawn from the model: 300 of them tell a coverage of .95 to .0126."""
+    rng, held = np.random.default_rng([13, corner]), 0
+    for _ in range(300):
+        expected = np.maximum(np.arange(1.0, count + 1), corner) ** -2.0
+        found = _plateaus.fit(modes_of_a_profile(expected * rng.exponential(size=count)))
+        held += found.low <= 0.5 <= found.high
+    assert 0.95 - 3 * 0.0126 < held / 300 < 0.95 + 3 * 0.0126
+
+
+def test_noise_of_a_periodic_profile_is_found_without_an_interval():
+    profile = fc.surfaces.spectral(2048, 1.0, hurst=0.6, rms_height=30.0, rolloff=128.0, rng=14)
+    noisy = profile + np.random.default_rng(15).standard_normal(2048)
+    found = fc.dimensions.estimate(noisy, noise=True)
+    assert found.noise_height.item() == pytest.approx(1.0, abs=0.25)
+    assert found.hurst.item() == pytest.approx(0.6, abs=0.15)
+    assert np.isnan(found.ci_low.item())
+    assert "noise" in found.ci_low.attrs["not_given"]
+
+
+def test_a_cut_off_under_noise_leaves_no_interval():
+    face = fc.surfaces.spectral((64, 64), 1.0, hurst=0.5, rms_height=10.0, short_cutoff=4.0, rng=16)
+    noisy = face + 0.3 * np.random.default_rng(17).standard_normal(face.shape)
+    assert "scales" in fc.dimensions.estimate(noisy, noise=True).ci_low.attrs["not_given"]
+    told = fc.dimensions.estimate(noisy, noise=True, scales=(5.0, 100.0))
+    assert told.ci_low.item() < 0.5 < told.ci_high.item()
 
 
 def test_a_short_plateau_of_a_profile_is_seen():
