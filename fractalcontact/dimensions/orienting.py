@@ -81,12 +81,15 @@ def directions(
         isotropy_p_value : how likely an isotropic surface shows as much of a difference between directions.
         Below .05 the face is told from an isotropic one, at that risk of an error.
         stretch, stretch_low, stretch_high, stretch_azimuth : correlations are `stretch` times as long along
-        `stretch_azimuth` as across it (`fractalcontact.surfaces.spectral` names them so); the azimuth means
-        nothing where the interval begins at 1.
+        `stretch_azimuth` as across it (`fractalcontact.surfaces.spectral` names them so), with its 95 %
+        interval; the azimuth means nothing where that begins at 1. NaN where the exponent (of a periodic
+        face: one more) is below .05 or within three standard errors of 0, for heights without correlation
+        have no stretch; where ridges run on (the azimuth is then theirs); and where a face is smoother than
+        a fractal one.
         stretch_p_value : how likely a stretch of an isotropic surface shows as much of a difference beyond
         the stretch. A small one tells two exponents, ridges, or a sum f(x) + g(y).
-        The attribute `reason` of hurst and the attribute `not_given` of ci_low and ci_high say why a number
-        is missing.
+        The attribute `reason` of each of these and of hurst, and the attribute `not_given` of ci_low and
+        ci_high, say why a number is missing.
 
     Raises
     ------
@@ -95,19 +98,49 @@ def directions(
 
     Notes
     -----
-    Tests: the modes over the mean of their ring of wavevectors are held against the second and fourth
-    harmonics of the direction, in level and in slope (chi square with 8 degrees of freedom, 6 beyond a
-    stretch). The spectrum may have any form. A face with free edges is tapered, and tested by its waves from
-    6 spacings to a third of the extent. Where heights are missing, or fewer than about 90 points stand along
-    an edge, its second differences are tested in the same way, for fractional Brownian heights. As
-    measured, 1 to 9 % of complete isotropic faces of 32 to 256 points and 5 to 8 % of faces with gaps fall
-    below .05.
-
     Exponents: a face with free edges is measured by second differences over 1, 2 and 4 steps of the lattice
     along each direction; `azimuth` is that of the nearest direction of the lattice, and the interval is that
-    of a stretched fractional Brownian surface. A periodic face is measured by the waves of its band that run
-    within 11 degrees of the direction: where two exponents H_x and H_y were built in, with the harmonic
-    mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
+    of a stretched fractional Brownian surface, edges and gaps counted. Where the exponent changes with the
+    lag, the interval also holds those of the shorter and of the longer lags; where no stretch explains the
+    face (`stretch_p_value` below .001), or ridges run on, there is none. A periodic face is measured by the
+    waves of its band that run within 11 degrees of the direction: where two exponents H_x and H_y were built
+    in, with the harmonic mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
+
+    Tests: of a periodic face, the modes over the mean of their ring of wavevectors are held against the
+    second and fourth harmonics of the direction, in level and in slope (chi square with 8 degrees of
+    freedom, 6 beyond a stretch). The spectrum may have any form. A face with free edges is tapered and
+    tested by its waves from 6 spacings to a third of the extent; its second differences are tested in the
+    same way where they follow a power law of the lag, and the smaller chance counts twice. They are tested
+    alone where heights are missing or fewer than about 90 points stand along an edge, from 25 points on.
+
+    Measured on faces without a lay, 150 to 600 of each kind, which leaves .018 to .009 of scatter on a share
+    of .95 or of .05: the share of 95 % intervals that hold the exponent, over all directions; of faces below
+    .05 in the test of isotropy; and of intervals of the stretch that begin at 1.
+
+    =======================================  =============  ==========  ==========
+    faces                                    exponent       isotropy    stretch
+    =======================================  =============  ==========  ==========
+    free, 32 to 192 points, H .05 to .95     .942 to .967   .02 to .05  .94 to .98
+    free, 40 by 80, spacings 2 : 1, H .9     .948           .04         .96
+    gaps, 10 and 30 %, points and blocks     .946 to .952   .04 to .07  .94 to .96
+    periodic, 64 to 112 points, H .95        .949           .05         .96
+    the same, H .05 and .1                   .982           .05         .95
+    stretched by 1.2 and 2, free, 80 points  .952 to .958               .96 to .98
+    noise, 10 % of the variogram at lag 1    .77            .05         .91
+    =======================================  =============  ==========  ==========
+
+    The last column of the stretched faces is the share of intervals that hold the stretch. The exponent of
+    a periodic face ends at 0, so that intervals near it hold it more often. Noise lowers the exponent of the
+    shortest lags: by .045 along the axes here, where .47 of the intervals hold it. Choose `scales` beyond
+    the noise.
+
+    How often the test of isotropy falls below .05 at 64, 128 and 256 points along an edge (40 to 60 faces, 10
+    to 15 of the largest): stretch 2, always; stretch 1.2 at H .7, free 1, .93, 1, periodic .85, 1, 1; two
+    exponents .4 and .8, always (and beyond a stretch, in at least .65 of them); ridges as rough as the face
+    they run over, always, those of .3 of its increments .33, .95, 1, those of .1 never.
+
+    Memory: at 2048 by 2048 points, beyond the heights, 32 bytes a point (free), 17 (gaps) and 218 (periodic).
+    A face that is not in memory is read whole.
 
     References
     ----------
