@@ -54,7 +54,8 @@ def fbm(
         Return this many independent surfaces along a dim `member`. Member i has a random stream of its own
         and does not depend on how many there are.
     rng : None, int, SeedSequence, BitGenerator or Generator
-        Random stream (SPEC 7); its entropy is kept in the provenance.
+        Random stream (SPEC 7); its record is kept, and `json.loads(surface.attrs["provenance"])["random"]`
+        given here makes the same surface again.
 
     Returns
     -------

@@ -50,7 +50,8 @@ def midpoint(
     members : int, optional
         Return this many independent surfaces along a dim `member`, from streams of their own.
     rng : None, int, SeedSequence, BitGenerator or Generator
-        Random stream (SPEC 7); its entropy is kept in the provenance.
+        Random stream (SPEC 7); its record is kept, and `json.loads(surface.attrs["provenance"])["random"]`
+        given here makes the same surface again.
 
     Returns
     -------

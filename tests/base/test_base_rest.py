@@ -1,5 +1,6 @@
 """Transforms, random streams, threads, scaling fits, and what importing costs."""
 
+import json
 import subprocess
 import sys
 
@@ -52,12 +53,49 @@ def test_threads_are_limited_inside_the_block_only(monkeypatch):
     assert threads.thread_count() == 3
 
 
-def test_a_stream_can_be_made_again_from_its_record():
-    stream = rng.generator(np.random.SeedSequence(12345, spawn_key=(7,)))
-    record = rng.record(stream)
-    seed = np.random.SeedSequence(int(record["entropy"]), spawn_key=tuple(record["spawn_key"]))
-    again = np.random.Generator(getattr(np.random, record["bit_generator"])(seed))
-    assert again.random() == stream.random()
+def drawn_from(stream):
+    stream.random(7)
+    return stream
+
+
+def with_children(stream):
+    stream.spawn(3)
+    return stream
+
+
+STREAMS = {
+    "a whole number": lambda: 7,
+    "several numbers": lambda: [1, 2, 2**40],
+    "entropy of the machine": lambda: None,
+    "a child": lambda: np.random.SeedSequence(12345, spawn_key=(7,)),
+    "one drawn from": lambda: drawn_from(np.random.default_rng(3)),
+    "half a word left": lambda: drawn_from(np.random.Generator(np.random.SFC64(5))),
+    "one with children": lambda: with_children(np.random.default_rng(3)),
+    "both": lambda: drawn_from(with_children(np.random.default_rng(3))),
+    "another kind": lambda: np.random.Generator(np.random.Philox(4)),
+    "an old kind, drawn from": lambda: drawn_from(np.random.Generator(np.random.MT19937(4))),
+}
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_stream_can_be_made_again_from_its_record(name):
+    stream = rng.generator(STREAMS[name]())
+    stream.integers(0, 5, dtype=np.uint8) if name == "half a word left" else None
+    record = json.loads(json.dumps(rng.record(stream)))
+    again = rng.generator(record)
+    np.testing.assert_array_equal(again.random(5), stream.random(5))
+    np.testing.assert_array_equal(again.spawn(2)[1].standard_normal(4), stream.spawn(2)[1].standard_normal(4))
+
+
+def test_what_is_no_stream_is_refused():
+    for wrong in (
+        "x",
+        -1,
+        {"bit_generator": "None"},
+        {"bit_generator": "PCG64", "entropy": "x", "spawn_key": []},
+    ):
+        with pytest.raises(ValueError, match="rng: expected"):
+            rng.generator(wrong)
 
 
 def test_a_line_is_fitted_as_scipy_fits_it():

@@ -228,6 +228,7 @@ def test_the_slope_of_each_curve_is_that_of_the_surface_it_is_measured_on(name, 
         "madogram": 3 - dimension,
         "cube_count": -dimension,
         "roughness": 3 - dimension,
+        "variation": 3 - dimension,
         "covering_area": 2 - dimension,
     }
     assert np.dot(CURVES[name], (hurst, 3.0, 1.0)) == pytest.approx(of_surfaces[name])

@@ -43,6 +43,19 @@ def test_same_stream_same_surface_and_members(name):
     np.testing.assert_array_equal(made(name, members=3).values[:2], made(name, members=2).values)
 
 
+@pytest.mark.parametrize("members", [None, 2])
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_file_alone_tells_how_to_make_its_surface_again(name, members, tmp_path):
+    """Also where the stream had been drawn from, and had had children."""
+    stream = np.random.default_rng(8)
+    stream.random(3)
+    stream.spawn(1)
+    surface = made(name, rng=stream, members=members)
+    kept = fc.open(fc.save(surface, tmp_path / "surface.nc"))
+    again = made(name, rng=json.loads(kept.attrs["provenance"])["random"], members=members)
+    np.testing.assert_array_equal(again.values, surface.values)
+
+
 @pytest.mark.parametrize("name", MAKERS)
 def test_powers_of_two_change_no_bit(name):
     lengths = {key: 2.0**20 * value for key, value in MAKERS[name].items() if key != "hurst"}
