@@ -24,9 +24,9 @@ WRONG_INPUT, STOPPED = 2, 128
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    if arguments is None:
-        leave_dask()
     options = _parser().parse_args(arguments)
+    if arguments is None and not getattr(options, "workers", 0):
+        leave_dask()
     warnings.showwarning = _say_warning
     try:
         with leaving(_leave):
@@ -57,6 +57,13 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("-o", "--out", help="folder for result.nc and the figures")
     run.add_argument("--plan", action="store_true", help="print the stages that would run, and why; run none")
     run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    run.add_argument(
+        "--workers",
+        type=int,
+        default=0,
+        metavar="N",
+        help="share the work between N processes (extra `dask`); for ensembles, shears, directions",
+    )
     run.set_defaults(action=_run)
 
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
@@ -66,7 +73,12 @@ def _parser() -> argparse.ArgumentParser:
         help="surfaces, dimensions, contact, domains, joints; all if none is named; or estimators alone: "
         "bias, error over the least possible one and coverage of every estimator of roughness",
     )
-    accuracy.add_argument("-o", "--out", help="folder for the results (NetCDF) and their figures")
+    accuracy.add_argument(
+        "-o",
+        "--out",
+        help="folder for the results (NetCDF) and their figures; "
+        "estimators are kept case by case, and the same command goes on after a stop",
+    )
     accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
     accuracy.add_argument("--extreme", action="store_true", help="run the catalogue of extreme cases instead")
     accuracy.add_argument(
@@ -108,10 +120,14 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     if options.out is None:
         raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
+    if options.workers < 0:
+        raise InvalidInput("fractalcontact run", [f"--workers: expected at least 0, got {options.workers}"])
     from fractalcontact.scenes.reporting import summary
     from fractalcontact.scenes.running import RESULT, run
+    from fractalcontact.scenes.working import hired
 
-    tree = run(scene, out=options.out, progress=not options.quiet)
+    with hired(options.workers) as client:
+        tree = run(scene, out=options.out, progress=not options.quiet, client=client)
     if not options.quiet:
         print(summary(tree))
         figures = len(list(Path(options.out).glob("*.png")))
@@ -233,16 +249,14 @@ def _estimators(options: argparse.Namespace) -> int:
 
     asked = {name: getattr(options, name) for name in ("hurst", "sizes", "families", "methods", "members")}
     given = {name: values for name, values in asked.items() if values is not None}
-    result = accuracy.estimators(**given, rng=options.seed, progress=True)
+    file = None if options.out is None else Path(options.out) / "estimators.nc"
+    result = accuracy.estimators(**given, rng=options.seed, keep=file, progress=True)
     print(estimators_table(result))
-    if options.out is not None:
-        from fractalcontact.base.netcdf import save
+    if file is not None:
         from fractalcontact.plotting import estimator_errors
 
-        folder = Path(options.out)
-        written = [save(result, folder / "estimators.nc").name, "estimators.png"]
-        estimator_errors(result).savefig(folder / written[-1], dpi=150)
-        print(f"\nwritten to {options.out}: {', '.join(written)}")
+        estimator_errors(result).savefig(file.with_suffix(".png"), dpi=150)
+        print(f"\nwritten to {options.out}: estimators.nc, estimators.png")
     return 0
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import platform
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
         expected = "a DataArray, Dataset or DataTree"
         raise InvalidInput(where, [f"result: expected {expected}, got {type(result).__name__}"])
-    temporary = target.with_name(f".{target.name}.{os.getpid()}{PARTIAL}")
+    temporary = target.with_name(f".{target.name}.{_machine()}.{os.getpid()}{PARTIAL}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
@@ -190,11 +191,16 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
 
 
 def clear_partial(folder: Path) -> None:
-    """Remove the temporary files of runs that are no longer alive."""
-    for leftover in folder.glob(f".*{PARTIAL}"):
+    """Remove the temporary files of runs on this machine that are no longer alive."""
+    for leftover in folder.glob(f".*.{_machine()}.*{PARTIAL}"):
         number = leftover.name.removesuffix(PARTIAL).rpartition(".")[2]
         if number.isdigit() and int(number) != os.getpid() and not _alive(int(number)):
             leftover.unlink(missing_ok=True)
+
+
+def _machine() -> str:
+    """Return the name of this machine: others that see the same folder number their processes alike."""
+    return "".join(letter for letter in platform.node() if letter.isalnum() or letter == "-") or "here"
 
 
 def _alive(process: int) -> bool:

@@ -7,17 +7,20 @@ reach; from elsewhere they come back with the result and are written here.
 from __future__ import annotations
 
 import ctypes
+import importlib.util
+import logging
 import queue
+import signal
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 from fractalcontact.base import stopping, threads
-from fractalcontact.base.errors import FractalContactError
+from fractalcontact.base.errors import FractalContactError, MissingExtra
 from fractalcontact.scenes.keeping import Carried, Store
 
 R = TypeVar("R")
@@ -45,7 +48,7 @@ def _side_by_side(
     tasks: Mapping[int, Task[R]], store: Store, stop: stopping.Stop, client: Any
 ) -> Iterator[tuple[int, R]]:
     """Hand all tasks to the workers; once a stop is asked for they end what they are at and begin nothing."""
-    run, told = uuid.uuid4().hex, False
+    run = uuid.uuid4().hex
     near = store.folder is None or _within_reach(store.folder, client)
     sent = [
         _Sent(task, store if near else Carried(store.kept(getattr(task, "digests", ()))), run)
@@ -57,9 +60,8 @@ def _side_by_side(
         future.add_done_callback(done.put)
     try:
         while futures:
-            if stop and not told:
-                client.run(_note_stop, run)
-                told = True
+            if stop:  # said again and again: a worker that was lost is replaced by one that does not know
+                client.run(_note_stop, run, on_error="ignore")
             try:
                 future = done.get(timeout=PAUSE)
             except queue.Empty:
@@ -114,6 +116,37 @@ class _StopAfar(stopping.Stop):
 
     def __bool__(self) -> bool:
         return self.run in _stopped
+
+
+@contextmanager
+def hired(count: int) -> Iterator[Any]:
+    """Give a client of so many workers on this machine, of one thread each; of none, no client.
+
+    Raises
+    ------
+    MissingExtra
+        The library that runs them is not installed.
+    """
+    if count == 0:
+        yield None
+        return
+    if importlib.util.find_spec("distributed") is None:
+        raise MissingExtra("a study on several workers", "dask.distributed", "dask")
+    import distributed
+
+    with (
+        distributed.LocalCluster(
+            n_workers=count, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        client.run(_ignore_interrupts)
+        yield client
+
+
+def _ignore_interrupts() -> None:
+    """Leave it to the run to end in good order: what comes from the keyboard reaches its workers too."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _result(future: Any) -> Any:
