@@ -8,6 +8,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.scenes.reporting import contents
 
 ROOMS = ("surfaces", "dimensions", "contact", "domains", "joints")
 # these give no labelled data: an object, a number, a table of words, the named laws of the handbooks
@@ -138,6 +139,7 @@ def test_labels_file_and_round_trip(result, tmp_path, compliance):
     assert "provenance" in found.attrs, name
     path = fc.save(found, tmp_path / "result.nc")
     assert compliance(path) == [], name
+    assert "run time" in contents(path), name
     xr.testing.assert_identical(fc.open(path), found)
     if isinstance(found, xr.Dataset):
         found.to_netcdf(tmp_path / "plain.nc")

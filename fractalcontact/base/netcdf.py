@@ -11,6 +11,7 @@ import contextlib
 import os
 import platform
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -110,14 +111,15 @@ def open(path: str | os.PathLike[str]) -> Any:
 
 @dataclass(frozen=True)
 class Outline:
-    """What a group of a file holds: its attributes, and the sizes and attributes of each variable."""
+    """What a group of a file holds: attributes, sizes and attributes of each variable, some numbers."""
 
     attrs: dict[str, Any]
     variables: dict[str, tuple[dict[str, int], dict[str, Any]]]
+    numbers: dict[str, Any]
 
 
-def outline(path: str | os.PathLike[str]) -> dict[str, Outline]:
-    """Return what a NetCDF file holds, group by group, without reading a number.
+def outline(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[str, Outline]:
+    """Return what a NetCDF file holds, group by group, and the numbers of the variables that `read` picks.
 
     Raises
     ------
@@ -138,6 +140,11 @@ def outline(path: str | os.PathLike[str]) -> dict[str, Outline]:
             {
                 str(name): (_sizes(variable), dict(variable.__dict__))
                 for name, variable in group.variables.items()
+            },
+            {
+                str(name): variable[...]
+                for name, variable in group.variables.items()
+                if variable.dtype.kind in "biuf" and read(str(name))
             },
         )
         for name, child in group.groups.items():

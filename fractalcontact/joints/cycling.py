@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._directions import one_direction
 from fractalcontact.joints._slopes import fitted_slopes, neighbour_slopes
@@ -22,6 +22,7 @@ WHERE = "fractalcontact.joints.cyclic_shear"
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
+@accounted("that of the dilatancy")
 def cyclic_shear(
     dilatancy: xr.Dataset,
     path: Sequence[float] | Array,

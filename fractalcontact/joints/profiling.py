@@ -10,7 +10,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import check_surface
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._checks import direction_coords
 from fractalcontact.joints._directions import Direction, several_directions
@@ -29,6 +29,7 @@ REFERENCES = (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
+@accounted("that of the correlation with the slope, which is empirical")
 def roughness_coefficient(
     face: xr.DataArray,
     *,

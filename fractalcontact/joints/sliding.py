@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._checks import (
     block_coords,
@@ -30,6 +30,7 @@ WHERE = "fractalcontact.joints.delta_surface"
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
+@accounted()
 def delta_surface(
     crack: Crack,
     shear: float | Sequence[float] | Array,

@@ -8,7 +8,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.inheritance import leading_coords
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints import _laws
 
@@ -27,6 +27,7 @@ FITS = ("closure_length", "reference_pressure", "exponential_misfit", "initial_s
         "greatest_closure", "hyperbolic_misfit")  # fmt: skip
 
 
+@accounted()
 def closure_laws(closure: xr.Dataset) -> xr.Dataset:
     """Fit the named laws of closure to a computed one, and take its stiffness.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.inheritance import familiar
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._slopes import fitted_slopes, neighbour_slopes
 
@@ -26,6 +26,7 @@ LOCKED = (
 )
 
 
+@accounted("that of the dilatancy")
 def friction(
     dilatancy: xr.Dataset,
     *,

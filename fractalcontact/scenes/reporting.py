@@ -54,13 +54,13 @@ def contents(path: str | os.PathLike[str]) -> str:
     UnreadableFile
         There is no such file, or it is not complete.
     """
-    groups = outline(path)
+    groups = outline(path, _tells_error)
     root = groups["/"]
     told = ("title", "source", "completeness", "picked")
     lines = [str(root.attrs[key]) for key in told if key in root.attrs]
     for place, group in groups.items():
         if group.variables:
-            lines += ["", place, *_variable_lines(group), *_reason_lines(group)]
+            lines += ["", place, *_variable_lines(group), *_reason_lines(group), *_achieved_lines(group)]
     for place, group in groups.items():
         stages = stage_table(group)
         if stages and (place == "/" or not root.attrs.get("provenance")):
@@ -129,6 +129,28 @@ def _variable_lines(group: Outline) -> Iterable[str]:
         dims = ", ".join(f"{dim} {size}" for dim, size in sizes.items())
         units = attributes.get("units", "")
         yield f"  {name:<28} ({dims})  {attributes.get('long_name', '')}" + (f" [{units}]" if units else "")
+
+
+def _tells_error(name: str) -> bool:
+    ends = ("_error", "_low", "_high", "misfit")
+    return name in ("run_time", "residual", "converged") or name.endswith(ends)
+
+
+def _achieved_lines(group: Outline) -> Iterable[str]:
+    """Yield the achieved errors of a group and its run time, each from the least to the greatest."""
+    for name, numbers in group.numbers.items():
+        values: np.ndarray[Any, Any] = np.ravel(np.ma.filled(np.ma.asarray(numbers, dtype=float), np.nan))
+        known = values[np.isfinite(values)]
+        word = name.replace("_", " ")
+        if name == "converged":
+            yield f"    converged: {int(known.sum())} of {values.size}"
+        elif known.size == 0:
+            yield f"    {word}: not given"
+        elif name == "run_time":
+            yield f"    {word}: {known.sum():.3g} s"
+        else:
+            ends = dict.fromkeys(f"{value:.3g}" for value in (known.min(), known.max()))
+            yield f"    {word}: {' ... '.join(ends)}"
 
 
 def _reason_lines(group: Outline) -> Iterable[str]:

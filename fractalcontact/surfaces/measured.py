@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
+@provenance.accounted("none: heights as given")
 def from_array(
     heights: Any,
     spacing: float | Sequence[float],
@@ -126,6 +127,7 @@ NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 
 
+@provenance.accounted("none: heights as the file states them")
 def read(
     path: str | os.PathLike[str],
     *,

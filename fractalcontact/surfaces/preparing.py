@@ -19,6 +19,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 SHAPES = ("mean", "plane", "quadric")
 
 
+@provenance.accounted("rounding")
 def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
     """Remove the mean, the mean plane or the mean quadric.
 
@@ -68,6 +69,7 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
     return _finished(levelled, surface, "level", {"order": degree}, "Levelled surface")
 
 
+@provenance.accounted("not known: nothing was measured at filled points")
 def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:
     """Fill small gaps (NaN) with the smoothest surface through what is around them.
 
