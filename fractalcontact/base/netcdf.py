@@ -54,7 +54,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
         expected = "a DataArray, Dataset or DataTree"
         raise InvalidInput(where, [f"result: expected {expected}, got {type(result).__name__}"])
-    temporary = target.with_name(f".{target.name}.{_machine()}.{os.getpid()}{PARTIAL}")
+    temporary = unfinished(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
@@ -144,7 +144,7 @@ def outline(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[s
             {
                 str(name): variable[...]
                 for name, variable in group.variables.items()
-                if variable.dtype.kind in "biuf" and read(str(name))
+                if getattr(variable.dtype, "kind", "O") in "biuf" and read(str(name))
             },
         )
         for name, child in group.groups.items():
@@ -195,6 +195,11 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
     dataset[name].encoding = dict(array.encoding)
     dataset.attrs = {key: array.attrs[key] for key in _GLOBAL if key in array.attrs}
     return dataset
+
+
+def unfinished(target: Path) -> Path:
+    """Return the name under which this process writes a file until it is complete."""
+    return target.with_name(f".{target.name}.{_machine()}.{os.getpid()}{PARTIAL}")
 
 
 def clear_partial(folder: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fractalcontact.base.netcdf import PARTIAL
+from fractalcontact.base.netcdf import unfinished
 from fractalcontact.base.progress import track
 from fractalcontact.plotting import closing, domain_maps, forgetting, lacunar, leakage, roughness, sliding
 from fractalcontact.plotting._reading import words
@@ -116,7 +116,7 @@ def _write(figure: Figure, target: Path) -> Path:
     if layout is not None:
         layout.execute(figure)
         figure.set_layout_engine("none")
-    temporary = target.with_name(f".{target.name}.{os.getpid()}{PARTIAL}")
+    temporary = unfinished(target)
     try:
         canvas.print_png(temporary)  # type: ignore[no-untyped-call]
         temporary.replace(target)
