@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import time
+import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fractalcontact.accuracy import _bounds
+from fractalcontact.accuracy._keeping import FAMILIES, SHORTEST, WHERE, Bench, check_name
 from fractalcontact.base import rng as streams
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.netcdf import save
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import stamp
-from fractalcontact.base.schema import label
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-WHERE = "fractalcontact.accuracy.estimators"
-SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
 SPACING, HEIGHT = 1e-4, 1e-6
 _BATCH = 1 << 22  # points made at a time
 _POINTS = 25600  # members times points along an edge, unless members are given
 _LEVEL = 0.95
-FAMILIES = {
-    "fbm": "exact fractional Brownian surface",
-    "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
-}
 
 
 def estimators(
@@ -40,6 +34,7 @@ def estimators(
     *,
     members: int | Sequence[int] | None = None,
     rng: streams.RNGLike = None,
+    keep: str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> xr.Dataset:
     """Measure every estimator of the Hurst exponent on surfaces whose exponent is known.
@@ -60,6 +55,10 @@ def estimators(
         (400, 100 and 25), which tells a coverage of 95 % to within 1, 2 and 4 %.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Random stream (SPEC 7); its entropy is kept in the provenance.
+    keep : path-like, optional
+        NetCDF file that is written anew after every case, so that a run that is stopped loses no more than
+        the case at hand: the same call goes on from there. A file that is finished, or of another call, is
+        replaced.
     progress : bool
         Show a bar.
 
@@ -85,8 +84,6 @@ def estimators(
     The bound of fractional Brownian surfaces is that of Whittle's information, 2 / var(d ln f / dH) over
     the number of points; of a power law it is that of its modes.
     """
-    import xarray as xr
-
     from fractalcontact import dimensions
 
     known = dimensions.methods()
@@ -97,59 +94,24 @@ def estimators(
         names = tuple(known) if methods is None else problems.choices("methods", methods, known)
         problems.require(bool(kinds and names), "families / methods", "at least one of each", "none")
         counts = _counts(problems, members, edges)
-    source = streams.generator(rng)
+        check_name(keep, problems)
+    bench = Bench(names, kinds, exponents, edges, counts)
+    source = bench.resume(keep, rng)
     entropy = streams.record(source)
     cells = [(k, h, n) for n in range(len(edges)) for k in range(len(kinds)) for h in range(exponents.size)]
-    shape = (len(names), len(kinds), exponents.size, len(edges))
-    columns: dict[str, Array] = {name: np.full(shape, np.nan) for name in _MEASURED}
-    least = np.empty(shape[1:])
-    started = time.perf_counter()
     # a stream for each cell, whatever else is asked for in the same run
-    for (k, h, n), stream in track(
-        list(zip(cells, source.spawn(len(cells)), strict=True)), progress, "estimators", unit="case"
-    ):
+    streamed = list(zip(cells, source.spawn(len(cells)), strict=True))
+    for (k, h, n), stream in track(streamed, progress, "estimators", unit="case"):
+        if bench.has(k, h, n):
+            continue
         truth, edge = float(exponents[h]), edges[n]
-        least[k, h, n] = _bound(kinds[k], truth, edge)
+        least = _bound(kinds[k], truth, edge)
         found = _sample(kinds[k], truth, edge, counts[n], names, stream)
-        for m in range(len(names)):
-            for name, value in _judged(truth, least[k, h, n], *(part[:, m] for part in found)).items():
-                columns[name][m, k, h, n] = value
-    dims = ("method", "family", "hurst", "size")
-    result = label(
-        xr.Dataset(
-            {name: (dims, values) for name, values in columns.items()}
-            | {"least_error": (dims[1:], least), "member_count": ("size", np.asarray(counts))},
-            coords={"method": list(names), "family": list(kinds), "hurst": exponents, "size": edges},
-        )
-    )
-    result["family"].attrs["comment"] = "; ".join(f"{kind}: {FAMILIES[kind]}" for kind in kinds)
-    for name in ("interval_coverage", "interval_coverage_low", "interval_coverage_high"):
-        result[name].attrs["reason"] = "NaN: the method gives no interval, because it has no honest one"
-    for name in ("bias", "rms_error", "error_ratio", "error_ratio_low", "error_ratio_high"):
-        result[name].attrs["reason"] = "NaN: the method gave no exponent"
-    return stamp(
-        result,
-        WHERE,
-        {"hurst": exponents, "sizes": edges, "families": list(kinds), "methods": list(names)},
-        title="Estimators of the Hurst exponent on surfaces of known exponent",
-        references="Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63",
-        random=entropy,
-        run_time=time.perf_counter() - started,
-    )
-
-
-_MEASURED = (
-    "bias",
-    "rms_error",
-    "error_ratio",
-    "error_ratio_low",
-    "error_ratio_high",
-    "interval_coverage",
-    "interval_coverage_low",
-    "interval_coverage_high",
-    "interval_share",
-    "run_time",
-)
+        rows = [_judged(truth, least, *(part[:, m] for part in found)) for m in range(len(names))]
+        bench.add(k, h, n, least, rows)
+        if keep is not None:
+            save(bench.table(entropy), keep)
+    return bench.table(entropy)
 
 
 def _counts(problems: Problems, members: Any, edges: Sequence[int]) -> list[int]:

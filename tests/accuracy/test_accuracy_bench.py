@@ -1,5 +1,7 @@
 """The bench of the estimators: its bounds against closed forms and tables, its counts by hand."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -129,3 +131,45 @@ def test_wrong_input_is_named():
         fc.accuracy.estimators(hurst=1.5, sizes=8, families="cantor", methods="magic", members=[1, 2])
     for word in ("hurst", "sizes", "cantor", "magic", "members"):
         assert word in str(caught.value)
+
+
+CASES = {"hurst": (0.3, 0.7), "sizes": (16, 20), "families": "fbm", "methods": "increments", "members": 4}
+
+
+def test_a_stopped_bench_goes_on_where_it_was(tmp_path, monkeypatch):
+    """The third case is stopped; the same call does the last two and gives the numbers of a whole run."""
+    file, sampled, sample = tmp_path / "bench.nc", [], bench._sample
+
+    def stopping(family, hurst, n, *rest):
+        if len(sampled) == 2:
+            raise KeyboardInterrupt
+        sampled.append((hurst, n))
+        return sample(family, hurst, n, *rest)
+
+    monkeypatch.setattr(bench, "_sample", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        fc.accuracy.estimators(**CASES, keep=file)
+    part = fc.open(file)
+    assert np.isfinite(part["least_error"]).sum() == 2
+    assert "stopped" in part["rms_error"].attrs["reason"]
+    monkeypatch.setattr(bench, "_sample", lambda *given: sampled.append(given[1:3]) or sample(*given))
+    whole = fc.accuracy.estimators(**CASES, keep=file)
+    assert sampled == [(0.3, 16), (0.7, 16), (0.3, 20), (0.7, 20)]
+    assert fc.open(file).drop_vars("run_time").equals(whole.drop_vars("run_time"))
+    begun = json.loads(whole.attrs["provenance"])["random"]
+    again = fc.accuracy.estimators(**CASES, rng=begun)
+    assert again.drop_vars("run_time").equals(whole.drop_vars("run_time"))
+
+
+def test_a_file_of_other_cases_or_of_another_stream_is_not_gone_on_with(tmp_path):
+    file = tmp_path / "bench.nc"
+    made = fc.accuracy.estimators(**CASES, rng=1, keep=file)
+    made["least_error"][0, 0, 0] = np.nan
+    made["bias"][:] = 99.0
+    for asked in ({"rng": 2}, {"members": 5}, {"hurst": (0.3, 0.6)}):
+        fc.save(made, file)
+        assert float(abs(fc.accuracy.estimators(**CASES | asked, keep=file)["bias"]).max()) < 1.0
+    file.write_text("no table")
+    assert np.isfinite(fc.accuracy.estimators(**CASES, keep=file)["bias"]).all()
+    with pytest.raises(InvalidInput, match=r"keep: expected a file name that ends in '\.nc'"):
+        fc.accuracy.estimators(**CASES, keep=tmp_path / "bench.txt")
