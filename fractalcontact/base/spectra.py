@@ -210,13 +210,11 @@ def _square(waves: Sequence[Array]) -> Array:
     return np.asarray(waves[0][:, None] ** 2 + waves[1] ** 2)
 
 
-def aliased_power_law(
-    waves: tuple[Array, Array], hurst: float, form: Array | None = None, images: int = 5
-) -> Array:
+def aliased_power_law(waves: tuple[Array, Array], hurst: float, images: int = 5) -> Array:
     """Return the spectral density of a sampled fractional Brownian surface, up to a factor.
 
-    All waves that the grid takes for one and the same are summed: sum over k of (u' form u)^(-1 - hurst),
-    u = w + 2 pi k; those beyond `images` along either axis as an integral.
+    All waves that a square grid takes for one and the same are summed, |w + 2 pi k| to the power
+    -2 - 2 hurst over all k; those beyond `images` along either axis as an integral.
 
     Parameters
     ----------
@@ -224,22 +222,15 @@ def aliased_power_law(
         Wavenumbers in rad per cell that broadcast against each other; not both zero.
     hurst : float
         Above 0.
-    form : ndarray, shape (2, 2), optional
-        Positive definite, y first; the identity is an isotropic surface on a square grid.
     """
-    form = np.eye(2) if form is None else form
     offsets = 2.0 * np.pi * np.arange(-images, images + 1)
     total: Array = np.zeros(1)
     for dy in offsets:
         for dx in offsets:
-            y, x = waves[0] + dy, waves[1] + dx
-            square = form[0, 0] * y * y + 2.0 * form[0, 1] * y * x + form[1, 1] * x * x
-            total = total + square ** (-1.0 - hurst)
+            total = total + ((waves[0] + dy) ** 2 + (waves[1] + dx) ** 2) ** (-1.0 - hurst)
     angle = (np.arange(2000) + 0.5) / 2000 * np.pi
-    y, x = np.sin(angle), np.cos(angle)
-    radius = (2 * images + 1) * np.pi / np.maximum(np.abs(y), np.abs(x))
-    square = form[0, 0] * y * y + 2.0 * form[0, 1] * y * x + form[1, 1] * x * x
-    tail = np.mean(square ** (-1.0 - hurst) * radius ** (-2.0 * hurst)) / (2.0 * hurst) / (2.0 * np.pi)
+    radius = (2 * images + 1) * np.pi / np.maximum(np.abs(np.sin(angle)), np.abs(np.cos(angle)))
+    tail = np.mean(radius ** (-2.0 * hurst)) / (2.0 * hurst) / (2.0 * np.pi)
     return np.asarray(total + tail)
 
 

@@ -198,3 +198,10 @@ def test_profile_spectrum_is_the_integral_across(hurst):
     whole = quad(lambda t: float(spectrum.profile_psd(np.exp(t))) * np.exp(t), np.log(low) - 25, np.log(high),
                  points=[np.log(low), np.log(corner)], epsrel=1e-9, limit=500)[0]  # fmt: skip
     assert whole / np.pi == pytest.approx(spectrum.moment(0), rel=1e-6)
+
+
+def test_aliased_density_of_a_lattice():
+    """The images of a power law, summed over many more of them."""
+    offsets = 2 * np.pi * np.arange(-300, 301)
+    near = np.sum(((1.0 + offsets[:, None]) ** 2 + (-2.0 + offsets) ** 2) ** (-1 - 0.6))
+    assert spectra.aliased_power_law((1.0, -2.0), 0.6) == pytest.approx(near, rel=2e-4)

@@ -7,7 +7,6 @@ from scipy.stats import binom
 import fractalcontact as fc
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.spectra import aliased_power_law
 from fractalcontact.dimensions import _rays, _scatter
 from fractalcontact.dimensions._faces import read_faces
 
@@ -281,16 +280,6 @@ def test_scatter_does_not_hang_on_where_the_sum_is_cut():
 def _pairs(shape, vectors):
     """Those of a complete face."""
     return _scatter.Pairs(shape, np.prod(np.array(shape) - 2.0 * np.abs(vectors), axis=1))
-
-
-def test_aliased_density_of_a_stretched_lattice():
-    """The images of a stretched form, summed over many more of them."""
-    form = np.array([[2.0, 0.5], [0.5, 1.0]])
-    offsets = 2 * np.pi * np.arange(-300, 301)
-    y, x = 1.0 + offsets[:, None], -2.0 + offsets
-    square = form[0, 0] * y * y + 2 * form[0, 1] * y * x + form[1, 1] * x * x
-    near = np.sum(square ** (-1 - 0.6))
-    assert aliased_power_law((1.0, -2.0), 0.6, form) == pytest.approx(near, rel=2e-4)
 
 
 @pytest.mark.slow
