@@ -123,12 +123,14 @@ class Face:
         """All observed heights lie on a plane, but for rounding."""
         if self._flat is None:
             heights = self.heights
+            # far from zero the numbers themselves are steps
+            least = max(ROUNDING, 4.0 * np.spacing(float(np.nanmax(np.abs(self.raw)))) / self.unit)
             # a few rows and columns that bend spare the search for a plane
             bends = [
                 np.diff(part, 2) for part in (heights[:: 1 + heights.shape[0] // 16], heights[:, ::64].T)
             ]
-            bent = any(np.nanmax(np.abs(bend), initial=0.0) > 1e3 * ROUNDING for bend in bends)
-            self._flat = not bent and self._departure() <= ROUNDING
+            bent = any(np.nanmax(np.abs(bend), initial=0.0) > 1e3 * least for bend in bends)
+            self._flat = not bent and self._departure() <= least
         return self._flat
 
     def _departure(self) -> float:

@@ -57,7 +57,8 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
         if scales is None
         else _ASKED,
     }
-    if not np.nansum(seconds) > 1e-22 * np.nansum(firsts):
+    steps = 0.0 if face.is_lazy else 4.0 * np.spacing(abs(float(face.raw[0, 0]))) / unit
+    if not np.nansum(seconds) > max(1e-22 * np.nansum(firsts), steps**2):
         return replace(plane(), **window)  # type: ignore[arg-type]
     found = _increments.closed_form(moments, face.steps, lags=lags)
     if not np.isfinite(found.hurst):

@@ -46,6 +46,6 @@ def quantum(heights: Array) -> tuple[float, float]:
 def told(share: float, what: str) -> str:
     """Return the note on rounded heights."""
     return (
-        f"heights are rounded to steps, which make {100.0 * share:.2g} % of the mean square second "
+        f"heights are rounded to steps, which make {100.0 * min(share, 1.0):.2g} % of the mean square second "
         f"difference: the interval also holds {what}"
     )

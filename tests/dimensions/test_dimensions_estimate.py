@@ -286,6 +286,16 @@ def test_planes_and_smooth_caps_are_the_limit_one():
     assert "smoother than a fractal" in cap.hurst.attrs["note"]
 
 
+@pytest.mark.parametrize("shape", [(40, 36), (60,)])
+def test_a_plane_far_from_zero_is_a_plane(shape):
+    """Its heights are rounded to 1e-7 m."""
+    heights = np.sum(np.indices(shape).T * np.array([0.1, 0.03])[: len(shape)], axis=-1).T + 1e9
+    face = fc.surfaces.from_array(heights, 1e-4)
+    found = fc.dimensions.estimate(face, ["likelihood", "increments", "second_variogram", "roughness_length"])
+    assert (found.hurst == 1.0).all()
+    assert found.ci_low.isnull().all()
+
+
 def test_constant_heights_have_no_exponent_but_a_covering_of_dimension_two():
     found = estimate(surface(np.full((16, 16), 1e6)), NAMES)
     covers = found.method.isin(["cube_counts", "covering"]).values
