@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import sys
 import warnings
@@ -20,10 +21,13 @@ from fractalcontact.base.memory import leave_dask
 from fractalcontact.base.stopping import Stopped, leaving
 
 WRONG_INPUT, STOPPED = 2, 128
+MADE = 10_000  # objects between two searches for cycles; with Python's 700 they take a twentieth of a study
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    if arguments is None:
+        gc.set_threshold(MADE)
     options = _parser().parse_args(arguments)
     if arguments is None and not getattr(options, "workers", 0):
         leave_dask()
