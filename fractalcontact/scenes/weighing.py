@@ -118,14 +118,18 @@ def footprint(scene: Scene | str | os.PathLike[str]) -> xr.Dataset:
 
 def lean_table(found: Mapping[str, xr.Dataset]) -> str:
     """Return one line for each scene, each figure beside the least one, and what is above the least."""
-    rows: list[tuple[str, ...]] = [
-        ("scene", "libraries", "kernels", "stages", "compiling", "memory", "arrays, faces", "written", "file")
-    ]
-    rows += [_row(name, one) for name, one in found.items()]
     extra = {name: waste(one) for name, one in found.items()}
     notes = [f"  {name}: not needed: {', '.join(more)}" for name, more in extra.items() if more]
     head = "each beside the least that the wanted results need"
-    return "\n".join([head, table(rows), *notes])
+    return "\n".join([head, table(lean_rows(found)), *notes])
+
+
+def lean_rows(found: Mapping[str, xr.Dataset]) -> list[tuple[str, ...]]:
+    """Return the head of the table, and one row for each scene."""
+    rows: list[tuple[str, ...]] = [
+        ("scene", "libraries", "kernels", "stages", "compiling", "memory", "arrays, faces", "written", "file")
+    ]
+    return rows + [_row(name, one) for name, one in found.items()]
 
 
 def waste(found: xr.Dataset) -> list[str]:

@@ -140,3 +140,18 @@ def test_a_scene_that_cannot_be_carried_out_is_told(tmp_path):
     face = {"generate": "fbm", "shape": [8, 8], "spacing": 1.0}
     with pytest.raises(FractalContactError, match="not carried out"):
         footprint(fc.scenes.Scene("wrong", {"surface": face}, tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rigid_sliding", "pressed_face", "jacksboro_fault", "concrete_crack"])
+def test_a_shipped_scene_takes_no_library_kernel_or_stage_beyond_the_least(name):
+    found = footprint(name)
+    assert waste(found) == []
+    assert found["warm_kernel_count"] == 0
+    assert found["file_size"] < 2 * found["result_size"] + 200_000 * (found["stage"].size + 1)
+    print(lean_table({name: found}))
+
+
+@pytest.mark.benchmark
+def test_the_solver_is_compiled_in_five_seconds(tmp_path):
+    assert footprint(scene(tmp_path, WORDS["joints/closure"]))["compile_time"] < 5.0
