@@ -23,13 +23,21 @@ F = TypeVar("F", bound=Callable[..., Any])
 prange = numba.prange
 
 # no kernel is called from C, so none gets the entry that C would need
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+def _compiled(function: F, **more: Any) -> F:
+    compiled: F
+    try:
+        compiled = numba.njit(cache=True, **_OPTIONS, **more)(function)
+    except RuntimeError:  # neither the package's folder nor the user's can be written: compiled in every run
+        compiled = numba.njit(**_OPTIONS, **more)(function)
+    return compiled
 
 
 def kernel(function: F) -> F:
     """Compile a serial loop; it holds no Python lock while it runs."""
-    compiled: F = numba.njit(**_OPTIONS)(function)
-    return compiled
+    return _compiled(function)
 
 
 def sum_kernel(function: F) -> F:
@@ -38,14 +46,12 @@ def sum_kernel(function: F) -> F:
     The order of the sums is then the compiler's, the same for every call and any number of threads. The
     arrays must be finite.
     """
-    compiled: F = numba.njit(**_OPTIONS, fastmath={"reassoc", "nsz", "nnan"})(function)
-    return compiled
+    return _compiled(function, fastmath={"reassoc", "nsz", "nnan"})
 
 
 def gap_sum_kernel(function: F) -> F:
     """Compile a `sum_kernel` whose arrays may hold NaN, which then reaches every sum that meets it."""
-    compiled: F = numba.njit(**_OPTIONS, fastmath={"reassoc", "nsz"})(function)
-    return compiled
+    return _compiled(function, fastmath={"reassoc", "nsz"})
 
 
 def parallel_kernel(function: F) -> F:
@@ -54,8 +60,7 @@ def parallel_kernel(function: F) -> F:
     The same source runs serially when one thread is asked for, and in plain Python when the compiler is
     switched off; the iterations of its `prange` must not share a sum.
     """
-    compiled: F = numba.njit(**_OPTIONS, parallel=True)(function)
-    return compiled
+    return _compiled(function, parallel=True)
 
 
 def use_threads() -> int:
