@@ -107,8 +107,8 @@ def _run(case: Case, name: str, probe: Probe) -> list[Finding]:
     findings = [_held(key, value, result, seconds) for key, value in wanted.items()]
     findings.append(_sane(name, result, seconds))
     if ERROR in result:
-        error = float(result[ERROR])
-        findings.append(Finding(f"{name}.{ERROR}", 0.0, error, error <= CLOSE, seconds, error))
+        away = float(result[ERROR])
+        findings.append(Finding(f"{name}.{ERROR}", 0.0, away, away <= CLOSE, seconds, away))
     if case.kind == "surface":
         findings.append(_in_units(name, probe, case, result))
     return [replace(one, ok=one.ok and (case.large or seconds < LONGEST)) for one in findings]

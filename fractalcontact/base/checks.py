@@ -10,7 +10,8 @@ Inside the block a value that failed its check is a harmless stand-in, never to 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextvars import ContextVar
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,32 @@ if TYPE_CHECKING:
 LARGEST_WHOLE = 1 << 53  # beyond it a double knows no neighbours
 
 
+_depth: ContextVar[int] = ContextVar("depth", default=0)  # of blocks inside blocks
+_rehearsing: ContextVar[bool] = ContextVar("rehearsing", default=False)
+
+
+class _Checked(BaseException):
+    """A call has passed its checks, and need go no further."""
+
+
+def rehearse(function: Callable[..., Any], *arguments: Any, **options: Any) -> None:
+    """Call a function as far as its checks and no further; raise what they raise.
+
+    Raises
+    ------
+    InvalidInput
+        What is wrong with the call.
+    """
+    inside, depth = _rehearsing.set(True), _depth.set(0)
+    try:
+        function(*arguments, **options)
+    except _Checked:
+        pass
+    finally:
+        _rehearsing.reset(inside)
+        _depth.reset(depth)
+
+
 class Problems:
     """Collects what is wrong with a call; raises it all on leaving the `with` block."""
 
@@ -34,16 +61,20 @@ class Problems:
         self.found: list[str] = []
 
     def __enter__(self) -> Problems:
+        _depth.set(_depth.get() + 1)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        _depth.set(_depth.get() - 1)
         if isinstance(value, InvalidInput):
             self.found.extend(p for p in value.problems if p not in self.found)
             raise self.error(self.where, self.found) from value
         if kind is None and self.found:
             raise self.error(self.where, self.found)
+        if kind is None and _rehearsing.get() and _depth.get() == 0:
+            raise _Checked
 
     def add(self, argument: str, expected: str, got: object) -> None:
         """Note that `argument` should have been `expected` and was `got`."""

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
-from fractalcontact.base.checks import Problems
+import numpy as np
+
+from fractalcontact.base.checks import Problems, rehearse
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.scenes import doubting
-from fractalcontact.scenes.given import crack_options, read_surface, stand_in
-from fractalcontact.scenes.planning import stages_of
+from fractalcontact.scenes.given import contact_options, crack_options, read_surface, stand_in
+from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
+from fractalcontact.scenes.planning import loads_of, stages_of
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from fractalcontact.joints import Crack
+
+
+PRESSING = ("closure", "elastic_dilatancy")
 
 
 def preflight(scene: Scene) -> None:
@@ -46,7 +53,63 @@ def preflight(scene: Scene) -> None:
             and not scene.wanted("contact")
         ):
             _preflight_joint(scene, faces, problems)
+        if not problems.found:
+            _rehearse(scene, faces["surface"], faces.get("upper"), problems)
     doubting.warn(doubting.of_the_given(scene, faces["surface"]))
+
+
+def _rehearse(scene: Scene, face: xr.DataArray, upper: xr.DataArray | None, problems: Problems) -> None:
+    """Call every function that will run as far as its checks; what an earlier stage would give is empty."""
+    flat = stand_in(scene.table("surface")) is not None  # what a load may be depends on the heights
+    crack = None
+    for stage in stages_of(scene):
+        room, _, name = stage.name.partition("/")
+        options = None
+        with _gather(problems, stage.name):
+            if stage.name == "dimensions":
+                options = dict(scene.table("dimensions"))
+                rehearse(_public(room, "estimate"), face, list(scene.wanted("dimensions")), **options)
+            elif stage.name == "contact" and not flat:
+                rehearse(_public(room, "press"), face, keep=stage.keep, **contact_options(scene))
+            elif room == "domains":
+                options = scene.options(room, name, stage_keys(room, name))
+                rehearse(_public(room, name), _empty_path(scene, face) > 0, **options)
+            elif name == "transmissivity":
+                options = scene.options("joint", name, stage_keys(room, name))
+                rehearse(_public(room, name), _empty_path(scene, face), **options)
+            elif room == "joints" and name in JOINT_STAGES and name != "friction":
+                if scene.table("joint").get("register", False) or (flat and name in PRESSING):
+                    continue
+                if crack is None:
+                    crack = _public(room, "Crack")(face, upper, **crack_options(scene))
+                rehearse(_public(room, JOINT_STAGES[name]), crack, **_joint_options(scene, name, stage.keep))
+
+
+def _public(room: str, name: str) -> Any:
+    return getattr(importlib.import_module(f"fractalcontact.{room}"), name)
+
+
+def _joint_options(scene: Scene, name: str, keep: tuple[str, ...]) -> dict[str, Any]:
+    options = scene.options("joint", name, stage_keys("joints", name))
+    if name == "closure":
+        load = loads_of(scene)[0]
+        options = {key: value for key, value in options.items() if key not in LOADS or key == load}
+        options["keep"] = keep
+    if name in PRESSING and "hardness" in scene.table("material"):
+        options.setdefault("hardness", scene.table("material")["hardness"])
+    return options
+
+
+def _empty_path(scene: Scene, face: xr.DataArray) -> xr.DataArray:
+    """Return zeros over two steps on what is pressed: the face, or the block if there is one."""
+    from fractalcontact import surfaces
+
+    whole = bool(scene.wanted("contact")) or "block" not in scene.table("joint")
+    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
+    edges = np.broadcast_to(scene.table("joint").get("block", 0.0), 2)
+    cells = face.shape if whole else tuple(np.rint(edges / steps).astype(int).tolist())
+    wraps = [whole and "period" in face[dim].attrs for dim in ("y", "x")]
+    return surfaces.from_array(np.zeros(cells), steps, periodic=wraps).expand_dims(step=2)
 
 
 def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable
@@ -79,11 +80,13 @@ def locate(path: str, folder: Path) -> Path:
 
 def stand_in(table: Table) -> xr.DataArray | None:
     """Return a flat face in place of a large one that is generated."""
-    if "generate" not in table or np.prod(np.broadcast_to(table["shape"], 2), dtype=float) < LARGE:
+    if "generate" not in table:
         return None
+    shape = table["shape"] if isinstance(table["shape"], list) else [table["shape"]] * 2
+    if not all(isinstance(n, int) for n in shape) or math.prod(shape) < LARGE:
+        return None  # one of a wrong shape is refused by its maker
     from fractalcontact import surfaces
 
-    shape = tuple(int(n) for n in np.broadcast_to(table["shape"], 2))
     return surfaces.from_array(np.zeros(shape), table["spacing"])
 
 

@@ -112,3 +112,15 @@ BOUNDS: Mapping[str, tuple[float | None, float | None, float | None]] = {
     "viscosity": (0.0, None, None),
     "spacing": (0.0, None, None),
 }
+
+# of those, what is one number and no path or pair
+SINGLE = (
+    "young",
+    "poisson",
+    "basic_friction_angle",
+    "hardness",
+    "contact_modulus",
+    "tolerance",
+    "smoothing",
+    "viscosity",
+)

@@ -123,7 +123,8 @@ def _check(scene: Scene, problems: Problems) -> None:
         "dimensions": ("dimensions", "estimate"),
     }.items():
         if name in scene.tables:
-            _known_keys(scene.table(name), grammar.arguments(room, function)[0], name, problems)
+            keys = [key for key in grammar.arguments(room, function)[0] if key != "methods"]  # of [want]
+            _known_keys(scene.table(name), keys, name, problems)
     if "joint" in scene.tables:
         _check_stages(scene.table("joint"), "joint", grammar.joint_keys(), grammar.JOINT_STAGES, problems)
     if "domains" in scene.tables:
@@ -152,6 +153,8 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         _known_keys(table, (*keys, "generate", "level"), name, problems)
         for key in sorted(required - set(table)):
             problems.add(f"{name}.{key}", f"a value for {generator}", "none")
+        if "members" in table:
+            problems.integer(f"{name}.members", table["members"], at_least=1)
     else:
         _known_keys(table, grammar.READING, name, problems)
         if ways == ["read"]:
@@ -210,8 +213,12 @@ def _check_wanted(scene: Scene, problems: Problems) -> None:
 
 def _check_numbers(table: Table, name: str, problems: Problems) -> None:
     for key, (above, at_least, below) in grammar.BOUNDS.items():
-        if key in table and not isinstance(table[key], dict):
-            problems.numbers(f"{name}.{key}", table[key], above=above, at_least=at_least, below=below)
+        if key not in table or (
+            name == "joint" and key in grammar.JOINT_STAGES and isinstance(table[key], dict)
+        ):
+            continue
+        check = problems.number if key in grammar.SINGLE else problems.numbers
+        check(f"{name}.{key}", table[key], above=above, at_least=at_least, below=below)
     if "direction" in table:
         from fractalcontact.joints._directions import several_directions
 

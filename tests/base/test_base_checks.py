@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fractalcontact.base.checks import Problems
+from fractalcontact.base.checks import Problems, rehearse
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 
 
@@ -80,3 +80,22 @@ def test_bad_input_errors_are_value_errors_and_a_missing_extra_names_itself():
     error = MissingExtra("reading instrument files", "SurfaceTopography", "io")
     assert isinstance(error, ImportError)
     assert "fractalcontact[io]" in str(error)
+
+
+def test_a_rehearsed_call_goes_as_far_as_its_checks():
+    reached = []
+
+    def call(value):
+        with Problems("call") as problems:
+            with Problems("inside") as inner:
+                inner.number("value", value, above=0)
+            problems.number("value", value, below=10)
+        reached.append(value)
+
+    rehearse(call, 1.0)
+    for wrong in (-1.0, 11.0):
+        with pytest.raises(InvalidInput, match="value"):
+            rehearse(call, wrong)
+    assert not reached
+    call(2.0)
+    assert reached == [2.0]

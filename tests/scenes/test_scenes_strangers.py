@@ -83,3 +83,51 @@ def test_the_command_tells_what_it_wrote_and_held(tmp_path):
     assert told, last
     assert float(told[1]) == pytest.approx(size / 1e6, rel=0.1)
     assert 50 < int(told[2]) < 1000
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ("[joint.decorrelation_length]\nshear = [1e-4, 2e-4]", "joints/decorrelation_length: shear"),
+        ("[joint.transmissivity]\naxis = 'z'", "joints/transmissivity: axis"),
+        ("[joint.transmissivity]\nperiodic = true", "joints/transmissivity: periodic"),
+        ("[joint.closure]\nmethod = 'magic'", "joints/closure: method"),
+        ("[joint.elastic_dilatancy]\ntolerance = [0.1, 0.2]", "joint.elastic_dilatancy.tolerance"),
+        ("[joint.closure]\nshear = { a = 1 }", "joint.closure.shear"),
+        ("[domains.lacunarity]\nbox_sizes = [0]", "domains/lacunarity: box_sizes"),
+        ("[domains.box_dimension]\ncover = 'cheap'", "domains/box_dimension: cover"),
+        ("[domains.evolution]\nwant = ['x']", "domains/evolution: want"),
+        ("[dimensions]\nscales = [3.0, 1.0]", "dimensions: scales"),
+        ("[dimensions]\nmethods = ['spectrum']", "dimensions.methods"),
+    ],
+)
+def test_what_a_late_stage_would_refuse_is_told_before_the_first_one_runs(tmp_path, monkeypatch, table, told):
+    from fractalcontact.scenes import stages
+
+    wanted = """[want]
+joints = ["closure", "elastic_dilatancy", "decorrelation_length", "transmissivity"]
+domains = ["lacunarity", "box_dimension", "evolution"]
+dimensions = ["default"]
+"""
+    shears = "shear = [0.0, 1e-4, 4e-4]"
+    scene = SOUND.partition("[want]")[0].replace("shear = [1e-4, 4e-4]", shears)
+    monkeypatch.setattr(stages, "_call", None)
+    (tmp_path / "study.toml").write_text(f"{scene}\n{table}\n{wanted}", encoding="utf-8")
+    with pytest.raises(InvalidInput, match=told):
+        fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("members", ['"x"', "[]", "0", "2.5"])
+def test_members_are_a_whole_number(tmp_path, members):
+    text = SOUND.replace("rng = 5", f"rng = 5\nmembers = {members}")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidInput, match="surface.members"):
+        fc.scenes.load(tmp_path / "study.toml")
+
+
+@pytest.mark.parametrize("shape", ['"x"', "[]", '[1, "a"]', "nan", "[3, 2, 1]", "1e300"])
+def test_a_wrong_shape_is_refused_in_words(tmp_path, shape):
+    (tmp_path / "study.toml").write_text(SOUND.replace("[48, 48]", shape), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="shape"):
+        fc.scenes.run(tmp_path / "study.toml", progress=False)
