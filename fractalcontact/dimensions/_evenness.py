@@ -83,7 +83,7 @@ def evenness(moments: Moments, steps: tuple[float, ...], hurst: float) -> Evenne
         weight = shares * np.exp(levels - levels.max())
         widening = max(1.0, float(np.sqrt(weight.size * np.sum(weight**2)) / np.sum(weight)))
         notes.append(
-            f"parts of the face are not equally rough: the interval is {widening:.2g} times as wide as that "
+            f"parts of the face are not equally rough: the interval is {widening:.2f} times as wide as that "
             "of a Gaussian face"
         )
     exponents = logs[whole] @ slope

@@ -90,6 +90,9 @@ def spectral(
     -----
     Closed forms of this spectrum, its moments, autocorrelation and profiles: `SelfAffine`. The Nyquist
     modes of an even grid carry the full density; they count with |q|^2 in the mean square gradient.
+    With two exponents the spectrum has them to its end. Increments show them less well, the smoother axis
+    above all, for the short waves across it that belong to them end at the grid: 512 x 512 points of
+    (0.5, 0.8) give 0.53 to 0.47 along y over lags of 2 to 32 points, and 0.92 to 0.73 along x.
     Memory: two arrays of n x n numbers.
     """
     with Problems("fractalcontact.surfaces.spectral") as problems:
