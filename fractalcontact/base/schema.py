@@ -76,6 +76,9 @@ QUANTITIES: dict[str, Quantity] = {
     "missing_points": Quantity("1", "number of missing points"),
     "mean_height": Quantity("m", "mean height"),
     "rms_height": Quantity("m", "root mean square height about the mean"),
+    "mean_absolute_height": Quantity("m", "mean distance of the heights from their mean"),
+    "peak_height": Quantity("m", "greatest height above the mean"),
+    "valley_depth": Quantity("m", "greatest depth below the mean"),
     "peak_to_valley": Quantity("m", "greatest less smallest height"),
     "skewness": Quantity("1", "skewness of the heights"),
     "kurtosis": Quantity("1", "kurtosis of the heights (3 for a Gaussian surface)"),
@@ -87,6 +90,7 @@ QUANTITIES: dict[str, Quantity] = {
     "rms_curvature": Quantity("m-1", "root mean square of the mean curvature"),
     "nayak_parameter": Quantity("1", "bandwidth parameter of Nayak, m0 m4 / m2^2"),
     "developed_area_ratio": Quantity("1", "area of the surface over the area of its plane"),
+    "developed_area_excess": Quantity("1", "area of the surface over the area of its plane, less one"),
     # dimensions
     "method": Quantity(None, "estimator"),
     "hurst": Quantity("1", "Hurst exponent"),

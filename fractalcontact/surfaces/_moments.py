@@ -13,7 +13,16 @@ from fractalcontact.base.polynomial import shifted, slopes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_OF_HEIGHTS = ("mean_height", "rms_height", "peak_to_valley", "skewness", "kurtosis")
+_OF_HEIGHTS = (
+    "mean_height",
+    "rms_height",
+    "mean_absolute_height",
+    "peak_height",
+    "valley_depth",
+    "peak_to_valley",
+    "skewness",
+    "kurtosis",
+)
 
 
 def statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> dict[str, float]:
@@ -42,7 +51,9 @@ def statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[bool
     for name, rms, slope in zip(("y", "x")[2 - heights.ndim :], along, mean, strict=True):
         result[f"rms_slope_{name}"] = rms * ratio
         result[f"mean_slope_{name}"] = slope
-    result["developed_area_ratio"] = _developed(values, [step / ratio for step in steps], periodic)
+    excess = _developed(values, [step / ratio for step in steps], periodic)
+    result["developed_area_ratio"] = 1.0 + excess
+    result["developed_area_excess"] = excess
     return result
 
 
@@ -52,7 +63,7 @@ def names(axes: int) -> list[str]:
 
 
 def _gradient_names(axes: int) -> list[str]:
-    names = ["rms_slope", "rms_curvature", "nayak_parameter", "developed_area_ratio"]
+    names = ["rms_slope", "rms_curvature", "nayak_parameter", "developed_area_ratio", "developed_area_excess"]
     return names + [f"{kind}_slope_{dim}" for dim in ("y", "x")[2 - axes :] for kind in ("rms", "mean")]
 
 
@@ -68,6 +79,9 @@ def _heights(heights: Array) -> dict[str, float]:
     variance = float(np.mean(values**2))
     result["mean_height"] = reference + scale * mean
     result["rms_height"] = scale * math.sqrt(variance)
+    result["mean_absolute_height"] = scale * float(np.mean(np.abs(values)))
+    result["peak_height"] = scale * float(values.max())
+    result["valley_depth"] = -scale * float(values.min())
     result["peak_to_valley"] = float(observed.max() - observed.min())
     if result["peak_to_valley"] > 0.0:
         result["skewness"] = float(np.mean(values**3)) / variance**1.5
@@ -111,15 +125,20 @@ def _mean_square(values: Array) -> float:
 
 
 def _developed(values: Array, steps: Sequence[float], periodic: Sequence[bool]) -> float:
-    """Return the mean of sqrt(1 + gradient^2): length of a profile, triangles of a plane cut both ways."""
+    """Return the mean of sqrt(1 + gradient^2) - 1: over chords, or over triangles cut both ways."""
     if values.ndim == 1:
         slope = _step(values, 0, periodic[0]) / steps[0]
-        ratio = np.sqrt(1.0 + slope**2)
-        return float(np.nanmean(ratio)) if np.isfinite(ratio).any() else math.nan
+        excess = _stretch(slope**2)
+        return float(np.nanmean(excess)) if np.isfinite(excess).any() else math.nan
     across = _step(values, 1, periodic[1]) / steps[1]
     along = _step(values, 0, periodic[0]) / steps[0]
     rows = (across, np.roll(across, -1, 0)) if periodic[0] else (across[:-1], across[1:])
     columns = (along, np.roll(along, -1, 1)) if periodic[1] else (along[:, :-1], along[:, 1:])
-    ratios = np.mean([np.sqrt(1.0 + row**2 + column**2) for row in rows for column in columns], axis=0)
-    there = ratios[np.isfinite(ratios)]
+    excess = np.mean([_stretch(row**2 + column**2) for row in rows for column in columns], axis=0)
+    there = excess[np.isfinite(excess)]
     return float(there.mean()) if there.size else math.nan
+
+
+def _stretch(square: Array) -> Array:
+    """Return sqrt(1 + square) - 1, which small slopes do not lose to rounding."""
+    return np.asarray(square / (1.0 + np.sqrt(1.0 + square)))

@@ -157,7 +157,8 @@ def read(
         Distance between points in metres; takes the place of what the file says.
     first_row : {"bottom", "top"}
         Whether the first row of an `.npy` file or a table is the smallest y, or the top of an image: then
-        it is flipped. Other formats know themselves.
+        it is flipped. An instrument's file stays as its reader hands it on, and is flipped too if "top" is
+        asked for. A NetCDF file knows itself.
 
     Returns
     -------
@@ -190,9 +191,9 @@ def read(
         problems.choice("first_row", first_row, ("bottom", "top"))
         suffix = _files.kind(source)
         table = suffix == ".npy" or (suffix in TABLES and spacing is not None)
-        if not table:
+        if suffix in NETCDF:
             problems.require(
-                first_row == "bottom", "first_row", "'bottom' for a file that knows itself", first_row
+                first_row == "bottom", "first_row", "'bottom' for a NetCDF file, which has its y", first_row
             )
     if suffix in NETCDF:
         surface, facts, microscope = _netcdf(source, channel, units, steps)
@@ -200,7 +201,7 @@ def read(
         surface, facts, microscope = (
             _table(source, suffix, channel, units, steps, first_row)
             if table
-            else _instrument(source, channel, units, steps)
+            else _instrument(source, channel, units, steps, first_row)
         )
     stated = facts["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
@@ -240,7 +241,7 @@ def _table(
     except ValueError as error:
         if isinstance(error, _files.NoTable) and not isinstance(error, _files.NoNumbers):
             with contextlib.suppress(UnreadableFile, MissingExtra):
-                found = _instrument(path, channel, units, spacing)
+                found = _instrument(path, channel, units, spacing, first_row)
                 # lists of points have a size too, whatever the lines are
                 if found[1]["stated_size"] is not None and found[1]["format"] != "xyz":
                     return found
@@ -266,12 +267,24 @@ def _table(
                 "a grid of heights, one row to a line",
                 "three columns, which look like x, y, z points",
             )
-    rows = values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
-    return from_array(rows, spacing or 1.0, units=units or "m"), {"stated_unit": None}, False
+    return (
+        from_array(_upwards(values, first_row), spacing or 1.0, units=units or "m"),
+        {"stated_unit": None},
+        False,
+    )
+
+
+def _upwards(values: Array, first_row: str) -> Array:
+    """Return heights with the first row at the smallest y."""
+    return values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
 
 
 def _instrument(
-    path: Path, channel: str | int | None, units: str | None, spacing: tuple[float, ...] | None
+    path: Path,
+    channel: str | int | None,
+    units: str | None,
+    spacing: tuple[float, ...] | None,
+    first_row: str,
 ) -> Read:
     from fractalcontact.surfaces.instruments import read_instrument
 
@@ -286,7 +299,7 @@ def _instrument(
         raise
     periodic = (reading.periodic,) * len(reading.spacing)
     return (
-        _arguments.heights_of(reading.heights, reading.spacing, periodic),
+        _arguments.heights_of(_upwards(reading.heights, first_row), reading.spacing, periodic),
         reading.facts,
         reading.microscope,
     )

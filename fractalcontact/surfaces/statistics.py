@@ -33,12 +33,14 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     Dataset
         Over the leading dims, if there are any:
 
-        - mean_height, rms_height (about the mean), peak_to_valley (m); skewness, kurtosis (3 if Gaussian)
-        - rms_slope (of the gradient, both components), rms_slope_x, rms_slope_y
+        - mean_height (m), and about it rms_height (Sq), mean_absolute_height (Sa), peak_height (Sp),
+          valley_depth (Sv), peak_to_valley (Sz); skewness (Ssk), kurtosis (Sku, 3 if Gaussian)
+        - rms_slope (Sdq: of the gradient, both components), rms_slope_x, rms_slope_y
         - mean_slope_x, mean_slope_y of the least-squares plane
         - rms_curvature (m-1) of the mean curvature, half the Laplacian (of z'' for a profile)
         - nayak_parameter, m0 m4 / m2^2 of the profiles of an isotropic surface
-        - developed_area_ratio, area over area of the plane (length over length for a profile)
+        - developed_area_ratio, area over area of the plane (length over length for a profile), and
+          developed_area_excess (Sdr), the same less one, which keeps its digits where slopes are small
         - missing_points, run_time
 
         A statistic that does not exist is NaN and says why in its attribute `reason`.
@@ -52,10 +54,13 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     -----
     A surface that is periodic and complete is differentiated by its Fourier modes: its slopes are the sums
     of q^2 C. Any other uses differences of neighbouring points, which see a little less of the shortest
-    wavelengths. The developed area is always that of triangles between neighbours.
+    wavelengths. The developed area is always that of triangles between neighbours. The symbols in brackets
+    are those of ISO 25178-2 (Rq, Ra ... for a profile), which levels and filters before: here that is left to
+    `level`.
 
     References
     ----------
+    ISO 25178-2 (2021), Surface texture: areal, terms, definitions and surface texture parameters.
     Nayak (1971), Random process model of rough surfaces, Journal of Lubrication Technology 93, 398-407.
     """
     import xarray as xr
@@ -92,6 +97,7 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
         title="Statistics of a surface",
         references=NAYAK,
         derivatives=method,
+        achieved_error="rounding, of the points as they are",
         run_time=elapsed,
     )
 

@@ -75,7 +75,12 @@ def test_against_plain_numpy_with_gaps():
     assert int(found.missing_points) == np.isnan(heights).sum()
     centred = heights - np.nanmean(heights)
     assert float(found.rms_height) == pytest.approx(np.sqrt(np.nanmean(centred**2)))
+    assert float(found.mean_absolute_height) == pytest.approx(np.nanmean(np.abs(centred)))
+    assert float(found.peak_height) == pytest.approx(np.nanmax(heights) - np.nanmean(heights))
+    assert float(found.valley_depth) == pytest.approx(np.nanmean(heights) - np.nanmin(heights))
+    assert float(found.peak_height + found.valley_depth) == pytest.approx(float(found.peak_to_valley))
     assert float(found.skewness) == pytest.approx(np.nanmean(centred**3) / np.nanmean(centred**2) ** 1.5)
+    assert float(found.kurtosis) == pytest.approx(np.nanmean(centred**4) / np.nanmean(centred**2) ** 2)
     assert float(found.rms_slope_x) == pytest.approx(
         np.sqrt(np.nanmean((np.diff(heights, axis=1) / 2.0) ** 2))
     )
@@ -86,6 +91,33 @@ def test_against_plain_numpy_with_gaps():
     laplacian = (heights[1:-1, 2:] - 2 * inner + heights[1:-1, :-2]) / 4.0
     laplacian += (heights[2:, 1:-1] - 2 * inner + heights[:-2, 1:-1]) / 0.25
     assert float(found.rms_curvature) == pytest.approx(0.5 * np.sqrt(np.nanmean(laplacian**2)))
+
+
+def test_developed_area_is_that_of_triangles_cut_both_ways():
+    rng = np.random.default_rng(5)
+    heights = rng.standard_normal((7, 9))
+    heights[2, 3] = np.nan
+    dy, dx = 0.5, 2.0
+    areas = []
+    for j in range(6):
+        for i in range(8):
+            corners = [np.array([a * dx, b * dy, heights[j + b, i + a]]) for b in (0, 1) for a in (0, 1)]
+            cuts = [(0, 1, 3), (0, 3, 2), (0, 1, 2), (1, 3, 2)]
+            halves = [
+                np.linalg.norm(np.cross(corners[q] - corners[p], corners[r] - corners[p])) for p, q, r in cuts
+            ]
+            areas.append(0.25 * sum(halves) / (dy * dx))
+    found = fc.surfaces.describe(fc.surfaces.from_array(heights, (dy, dx)))
+    assert float(found.developed_area_ratio) == pytest.approx(np.nanmean(areas), rel=1e-12)
+    assert float(found.developed_area_excess) == pytest.approx(np.nanmean(areas) - 1.0, rel=1e-12)
+
+
+def test_a_face_of_small_slopes_keeps_its_developed_area():
+    heights = np.random.default_rng(5).standard_normal((40, 40))
+    found = fc.surfaces.describe(fc.surfaces.from_array(1e-9 * heights, 1.0))
+    square = np.mean(np.diff(heights, axis=0) ** 2) + np.mean(np.diff(heights, axis=1) ** 2)
+    assert float(found.developed_area_excess) == pytest.approx(0.5e-18 * square, rel=0.05)
+    assert float(found.developed_area_ratio) == 1.0
 
 
 def test_mirrors_and_transposes():
@@ -108,7 +140,7 @@ def test_units_by_powers_of_two_change_no_bit(periodic):
         fc.surfaces.from_array(heights * 2.0**-40, (2.0**-20, 1.5 * 2.0**-20), periodic=periodic)
     )
     for name in base.data_vars:
-        if name in ("run_time", "developed_area_ratio"):
+        if name in ("run_time", "developed_area_ratio", "developed_area_excess"):
             continue
         units = QUANTITIES[name].units
         power = {"m": -40, "m-1": 0}.get(units, -20 if "slope" in name else 0)

@@ -288,6 +288,23 @@ def test_orientation_of_a_microscope_scan(measured):
     assert np.abs(surface.values - known.values.T).max() > 1e-8
 
 
+def test_an_instrument_file_is_flipped_on_request_alone(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    text = "# Channel: Height\n# Width: 4 um\n# Height: 3 um\n# Value units: nm\n"
+    (tmp_path / "a.asc").write_text(text + "1 2 3 4\n5 6 7 8\n9 10 11 13\n")
+    plain, flipped = (fc.surfaces.read(tmp_path / "a.asc", first_row=row) for row in ("bottom", "top"))
+    assert plain.shape == (3, 4)
+    np.testing.assert_array_equal(flipped.values, plain.values[::-1])
+    np.testing.assert_array_equal(flipped.y, plain.y)
+    assert provenance(flipped)["parameters"]["first_row"] == "top"
+
+
+def test_netcdf_is_never_flipped_for_it_has_its_y(tmp_path):
+    fc.save(fc.surfaces.from_array(HEIGHTS, 1e-5), tmp_path / "a.nc")
+    with pytest.raises(UnreadableFile, match="first_row: .*NetCDF"):
+        fc.surfaces.read(tmp_path / "a.nc", first_row="top")
+
+
 def test_channels_of_a_microscope_scan(measured):
     pytest.importorskip("SurfaceTopography")
     path = measured / "instruments" / "di-3.di"
