@@ -37,8 +37,8 @@ def weierstrass(
 
     The heights are a sum of plane waves: wavelengths L, L/ratio, L/ratio^2 ... from the longer edge L down to
     two of the coarser spacings, amplitudes as wavelength^hurst, `ridges` directions spread evenly over half a
-    turn for each wavelength, random phases. Its variogram follows r^(2 hurst) with ripples of period `ratio`
-    in log r, and its fractal dimension is 3 - hurst.
+    turn for each wavelength, random phases. With waves of all lengths its variogram would follow r^(2 hurst)
+    with ripples of period `ratio` in log r, and its fractal dimension would be 3 - hurst; see the notes.
 
     Parameters
     ----------
@@ -69,6 +69,12 @@ def weierstrass(
     ------
     InvalidInput
         An argument is out of range.
+
+    Notes
+    -----
+    The waves end at both sides, which a variogram feels: fitted over lags of 2 to 32 spacings on 256 x 256
+    points its slope is that of an exponent of .22, .50 and .76 for hurst = .1, .5 and .9, as the sum over the
+    waves, amplitude^2 (1 - J0(2 pi r / wavelength)), has it. The amplitudes themselves are exact.
     """
     with Problems("fractalcontact.surfaces.weierstrass") as problems:
         sizes = _arguments.plane_shape(problems, shape)
