@@ -139,7 +139,10 @@ def test_labels_file_and_round_trip(result, tmp_path, compliance):
     assert "provenance" in found.attrs, name
     path = fc.save(found, tmp_path / "result.nc")
     assert compliance(path) == [], name
-    assert "run time" in contents(path), name
+    told = contents(path)
+    assert "run time" in told, name
+    words = ("achieved error ", "residual:", "error:", "low:", "misfit:")
+    assert any(word in told for word in words), name
     xr.testing.assert_identical(fc.open(path), found)
     if isinstance(found, xr.Dataset):
         found.to_netcdf(tmp_path / "plain.nc")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.provenance import accounted
 from fractalcontact.base.scaling import local_slope
 from fractalcontact.dimensions import _measures
 from fractalcontact.dimensions._faces import read_faces
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[Any]]
 SPECTRA = ("power_spectral_density", "profile_power_spectral_density")
 ALL = ("local_slope", "run_time")  # what every curve has
+SUMMED = "rounding: a mean over all there are; what chance leaves in it is told by `estimate`"
 
 
+@accounted("relative standard error of each value sqrt(2 / mode_count), where no window mixes the modes")
 def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
     """Return the radially averaged power spectral density.
 
@@ -81,6 +84,7 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     )  # fmt: skip
 
 
+@accounted(SUMMED)
 def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the variogram: half the mean square height increment over all pairs of points at a lag.
 
@@ -114,6 +118,7 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
     return _lag_curve("variogram", surface, max_lag, _measures.variogram, {"variogram": "value"})
 
 
+@accounted(SUMMED)
 def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the madogram: half the mean absolute height increment, along both axes.
 
@@ -137,6 +142,7 @@ def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Datas
     return _lag_curve("madogram", surface, max_lag, _measures.madogram, {"madogram": "value"})
 
 
+@accounted(SUMMED)
 def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the mean square second difference of the heights, along both axes.
 
@@ -165,6 +171,7 @@ def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> 
     )
 
 
+@accounted(SUMMED)
 def roughness_length(surface: xr.DataArray) -> xr.Dataset:
     """Return the mean rms height inside square windows, each about a plane of its own.
 
@@ -188,6 +195,7 @@ def roughness_length(surface: xr.DataArray) -> xr.Dataset:
     )
 
 
+@accounted(SUMMED)
 def variation(surface: xr.DataArray) -> xr.Dataset:
     """Return the mean range of the heights over stretches of the rows and of the columns.
 
@@ -227,6 +235,7 @@ def variation(surface: xr.DataArray) -> xr.Dataset:
     )
 
 
+@accounted(SUMMED)
 def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range") -> xr.Dataset:
     """Count the cubes that meet the surface, on average over all positions of their grid.
 
@@ -271,6 +280,7 @@ def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range")
     )
 
 
+@accounted(SUMMED)
 def covering(surface: xr.DataArray, *, vertical_scale: float = 1.0) -> xr.Dataset:
     """Return the area of the triangulated surface against the edge of the triangles.
 

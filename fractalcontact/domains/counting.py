@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.scaling import local_slope
 from fractalcontact.domains import _covers, _dust
 from fractalcontact.domains._masks import Array, Planes, assemble, box_sizes, read_mask
@@ -117,6 +117,7 @@ def box_dimension(
     )
 
 
+@accounted("none: counted")
 def box_counts(
     mask: xr.DataArray,
     sizes: Any = None,

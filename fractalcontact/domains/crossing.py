@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.domains import _labels
 from fractalcontact.domains._masks import Array, Planes, assemble, read_mask
 from fractalcontact.domains.labelling import find
@@ -21,6 +21,7 @@ AXES = ("x", "y")
 SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (1994)"
 
 
+@accounted("none: counted")
 def percolation(
     mask: xr.DataArray,
     *,

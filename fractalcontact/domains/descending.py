@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.domains import _lineage
 from fractalcontact.domains._masks import Planes, assemble, read_mask
 from fractalcontact.domains.labelling import find
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998)"
 
 
+@accounted("none: counted")
 def lineage(
     mask: xr.DataArray,
     *,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.domains import _gliding
 from fractalcontact.domains._masks import Array, Planes, assemble, box_sizes, read_mask
 
@@ -21,6 +21,7 @@ SOURCE = (
 )
 
 
+@accounted("rounding: a mean over all boxes")
 def lacunarity(
     mask: xr.DataArray,
     box_sizes: Any = None,

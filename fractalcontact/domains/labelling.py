@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.domains import _labels
 from fractalcontact.domains._masks import Array, Planes, assemble, read_mask, together
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
 
+@accounted("none: counted")
 def islands(
     mask: xr.DataArray,
     *,

@@ -11,7 +11,7 @@ import numpy as np
 
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import UNIFORM
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.scaling import fit_line
 from fractalcontact.base.schema import label
 from fractalcontact.joints._checks import check_crack, check_shear
@@ -32,6 +32,7 @@ BEYOND = (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
+@accounted("not given: no interval of such a slope would be honest")
 def delta_dimension(
     crack: Crack,
     *,

@@ -99,7 +99,7 @@ def run(
 
 
 def achieved(result: xr.Dataset) -> dict[str, Any]:
-    """Return what a result says of its own accuracy: largest residual, whether all steps converged ..."""
+    """Return what a result says of its own accuracy: in numbers, or in words where it has none."""
     found: dict[str, Any] = {}
     if "residual" in result:
         found["residual"] = float(result["residual"].max())
@@ -110,7 +110,10 @@ def achieved(result: xr.Dataset) -> dict[str, Any]:
     if "standard_error" in result:
         errors = [f"{float(v):.4f}" for v in result["standard_error"].values.ravel() if np.isfinite(v)]
         found["standard error of H"] = " ".join(errors) or "none"
-    return found
+    if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
+        found["interpolation error (m)"] = float(result["interpolation_error"].max())
+    told = json.loads(result.attrs.get("provenance", "{}")).get("achieved_error")
+    return found if found or told is None else {"error": told}
 
 
 def _assembled(

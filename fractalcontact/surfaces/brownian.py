@@ -100,6 +100,7 @@ def fbm(
             "torus": embedding.torus,
             "smallest_eigenvalue": embedding.smallest,
             "clipped_fraction": embedding.clipped,
+            "achieved_error": f"{max(embedding.clipped, np.finfo(float).eps):.1e} of the covariances",
         }
         return heights.reshape(sizes), facts
 

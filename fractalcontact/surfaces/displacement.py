@@ -18,6 +18,8 @@ FOURNIER = (
     "Fournier, Fussell and Carpenter, Computer rendering of stochastic models, Communications of the ACM 25 "
     "(1982) 371-384; Saupe, Algorithms for random fractals, The Science of Fractal Images (Springer, 1988)"
 )
+# exponents, and the relative error of the mean square increments at 64 points that was measured there
+MEASURED = (0.1, 0.3, 0.5, 0.7, 0.9), (1.2, 0.1, 0.27, 0.38, 0.39)
 
 
 def midpoint(
@@ -95,7 +97,9 @@ def midpoint(
 
     def one(stream: np.random.Generator) -> _arguments.Made:
         heights = _midpoints.displaced(levels, scaled, exponent, stream, additions=additions)
-        return increment * heights[: sizes[0], : sizes[1]], {}
+        error = float(np.interp(exponent, *MEASURED))
+        told = f"of the method: about {error:.1g} of the mean square increments over 64 points"
+        return increment * heights[: sizes[0], : sizes[1]], {"achieved_error": told}
 
     return _arguments.make(
         one,

