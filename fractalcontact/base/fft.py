@@ -2,7 +2,8 @@
 
 scipy.fft does the work, or ducc0 where it is installed (extra `fast`): about twice as fast, and it
 writes into a buffer that is handed in. `FRACTALCONTACT_FFT=scipy` keeps to scipy. The transforms act on
-the last two axes (or the last one); the inverse carries the factor 1/n.
+the last two axes (or the last one); the inverse carries the factor 1/n. No bit depends on the number of
+threads.
 """
 
 from __future__ import annotations
@@ -14,9 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.threads import in_bands, thread_count
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+SMALL = 1 << 16  # elements up to which a transform is one call of ducc0
+GROUP = 16  # lines: a multiple of how many ducc0 takes side by side
 
 
 def library() -> str:
@@ -58,19 +62,10 @@ def irfft(modes: Array, n: int) -> Array:
     return _backward(modes, (-1,), (n,), None, False)
 
 
-def fft2(plane: Array) -> Array:
-    """Transform the last two axes of a complex array."""
-    if library() == "ducc0":
-        return _ducc0().c2c(plane, axes=_axes(plane, (-2, -1)), forward=True, nthreads=_ducc_threads())  # type: ignore[no-any-return]
-    return _scipy().fft2(plane, workers=thread_count())  # type: ignore[no-any-return]
-
-
 def ifft(modes: Array) -> Array:
     """Undo the complex transform of the last axis."""
     if library() == "ducc0":
-        return _ducc0().c2c(  # type: ignore[no-any-return]
-            modes, axes=_axes(modes, (-1,)), forward=False, inorm=2, nthreads=_ducc_threads()
-        )
+        return _along(_ducc0().c2c, modes, -1, np.empty_like(modes), forward=False, inorm=2)
     return _scipy().ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
 
 
@@ -80,11 +75,7 @@ def cosine(corner: Array, axes: tuple[int, ...]) -> Array:
     Given the n//2 + 1 points of a corner, the result is the real transform of all n (cosine transform of
     type 1). Each axis has at least 2 points.
     """
-    if library() == "ducc0":
-        return _ducc0().dct(  # type: ignore[no-any-return]
-            corner, axes=_axes(corner, axes), type=1, inorm=0, nthreads=_ducc_threads()
-        )
-    return _scipy().dctn(corner, type=1, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return dct(corner, 1, axes)
 
 
 def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
@@ -94,7 +85,7 @@ def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     2 a_j cos(pi k j / n); kind 3 is the transpose of kind 2 up to the factor of its first value.
     """
     if library() == "ducc0":
-        return _ducc0().dct(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
+        return _one_by_one(_ducc0().dct, array, axes, type=kind)
     return _scipy().dctn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
@@ -104,7 +95,7 @@ def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     Kind 1, with n - 1 values a_1 to a_{n-1}, sums 2 a_j sin(pi k j / n) for k = 1 to n - 1.
     """
     if library() == "ducc0":
-        return _ducc0().dst(array, axes=_axes(array, axes), type=kind, nthreads=_ducc_threads())  # type: ignore[no-any-return]
+        return _one_by_one(_ducc0().dst, array, axes, type=kind)
     return _scipy().dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
@@ -121,8 +112,8 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
             kind = np.result_type(plane.dtype, np.complex64)
             out = np.empty((padded[0], padded[1] // 2 + 1), dtype=kind)
         out[ny:] = 0
-        _ducc0().r2c(rows, axes=(1,), forward=True, nthreads=_ducc_threads(), out=out[:ny])
-        return _ducc0().c2c(out, axes=(0,), forward=True, nthreads=_ducc_threads(), out=out)  # type: ignore[no-any-return]
+        _along(_ducc0().r2c, rows, 1, out[:ny])
+        return _along(_ducc0().c2c, out, 0, out)
     threads = thread_count()
     modes = _scipy().rfft(plane, n=padded[1], axis=1, workers=threads)
     return _scipy().fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
@@ -132,11 +123,9 @@ def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]
     """Undo a transform of the padded plane (my, mx), keeping its corner (ny, nx); the modes are used up."""
     ny, nx = shape
     if library() == "ducc0":
-        threads = _ducc_threads()
-        _ducc0().c2c(modes, axes=(0,), forward=False, inorm=2, nthreads=threads, out=modes)
-        rows = _ducc0().c2r(
-            modes[:ny], axes=(1,), lastsize=padded[1], forward=False, inorm=2, nthreads=threads
-        )
+        _along(_ducc0().c2c, modes, 0, modes, forward=False, inorm=2)
+        rows = np.empty((ny, padded[1]), dtype=modes.real.dtype)
+        _along(_ducc0().c2r, modes[:ny], 1, rows, lastsize=padded[1], forward=False, inorm=2)
         return np.ascontiguousarray(rows[:, :nx])
     threads = thread_count()
     modes = _scipy().ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
@@ -172,20 +161,52 @@ def _ducc0() -> Any:
     return ducc0.fft
 
 
-def _ducc_threads() -> int:
-    # one thread takes another code path there, with other bits than two or more
-    return max(2, thread_count())
+def _along(call: Any, array: Array, axis: int, out: Array, **options: Any) -> Array:
+    """Have ducc0 transform all lines along one axis into `out`; its own threads would change bits.
+
+    It takes lines side by side in groups, and what is left over one by one, with other bits. So the lines of
+    a plane are cut between groups only, and each part is for one thread.
+    """
+    axis %= array.ndim
+    if array.ndim > 2 and axis > 0 and array.size > SMALL:
+        for plane, result in zip(array, out, strict=True):
+            _along(call, plane, axis - 1, result, **options)
+        return out
+    if array.ndim != 2 or array.size <= SMALL:
+        return call(array, axes=(axis,), out=out, nthreads=1, **options)  # type: ignore[no-any-return]
+    lines = array.shape[1 - axis]
+    groups = max(1, lines // GROUP)
+
+    def transform(start: int, stop: int) -> None:
+        part = slice(start * GROUP, stop * GROUP if stop < groups else lines)
+        cut = (part, slice(None)) if axis == 1 else (slice(None), part)
+        call(array[cut], axes=(axis,), out=out[cut], nthreads=1, **options)
+
+    in_bands(transform, groups, array.size // 2)
+    return out
 
 
-def _axes(array: Array, axes: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(axis % array.ndim for axis in axes)
+def _one_by_one(call: Any, array: Array, axes: tuple[int, ...], **options: Any) -> Array:
+    """Have ducc0 transform one axis after the other."""
+    if array.size <= SMALL:
+        axes = tuple(axis % array.ndim for axis in axes)
+        return call(array, axes=axes, nthreads=1, **options)  # type: ignore[no-any-return]
+    out = np.empty_like(array)
+    for axis in axes:
+        array = _along(call, array, axis, out, **options)
+    return array
 
 
 def _forward(array: Array, axes: tuple[int, ...], out: Array | None) -> Array:
     if library() == "ducc0":
-        return _ducc0().r2c(  # type: ignore[no-any-return]
-            array, axes=_axes(array, axes), forward=True, nthreads=_ducc_threads(), out=out
-        )
+        if array.size <= SMALL:
+            last = tuple(axis + array.ndim for axis in axes)
+            return _ducc0().r2c(array, axes=last, out=out, nthreads=1)  # type: ignore[no-any-return]
+        if out is None:
+            shape = (*array.shape[:-1], array.shape[-1] // 2 + 1)
+            out = np.empty(shape, dtype=np.result_type(array.dtype, np.complex64))
+        _along(_ducc0().r2c, array, -1, out)
+        return _along(_ducc0().c2c, out, -2, out) if len(axes) == 2 else out
     modes = _scipy().rfftn(array, axes=axes, workers=thread_count())
     if out is None:
         return modes  # type: ignore[no-any-return]
@@ -197,16 +218,23 @@ def _backward(
     modes: Array, axes: tuple[int, ...], shape: tuple[int, ...], out: Array | None, overwrite: bool
 ) -> Array:
     if library() == "ducc0":
-        return _ducc0().c2r(  # type: ignore[no-any-return]
-            modes,
-            axes=_axes(modes, axes),
-            lastsize=shape[-1],
-            forward=False,
-            inorm=2,
-            nthreads=_ducc_threads(),
-            out=out,
-            allow_overwriting_input=overwrite,
-        )
+        if modes.size <= SMALL:
+            return _ducc0().c2r(  # type: ignore[no-any-return]
+                modes,
+                axes=tuple(axis + modes.ndim for axis in axes),
+                lastsize=shape[-1],
+                forward=False,
+                inorm=2,
+                out=out,
+                nthreads=1,
+                allow_overwriting_input=overwrite,
+            )
+        if len(axes) == 2:
+            spare = modes if overwrite else np.empty_like(modes)
+            modes = _along(_ducc0().c2c, modes, -2, spare, forward=False, inorm=2)
+        if out is None:
+            out = np.empty((*modes.shape[:-1], shape[-1]), dtype=modes.real.dtype)
+        return _along(_ducc0().c2r, modes, -1, out, lastsize=shape[-1], forward=False, inorm=2)
     plane = _scipy().irfftn(modes, s=shape, axes=axes, workers=thread_count(), overwrite_x=overwrite)
     if out is None:
         return plane  # type: ignore[no-any-return]

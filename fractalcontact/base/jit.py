@@ -8,10 +8,7 @@ the kernel and added up serially, by the kernel or by its caller.
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import numba
@@ -68,35 +65,3 @@ def use_threads() -> int:
     threads = max(1, min(thread_count(), int(numba.config.NUMBA_NUM_THREADS)))
     numba.set_num_threads(threads)
     return threads
-
-
-def in_bands(function: Callable[..., None], count: int, work: int, *arguments: Any) -> None:
-    """Call a serial kernel as ``function(start, stop, *arguments)`` over bands of ``range(count)``.
-
-    The bands run on the threads of `base.threads` when there is enough `work` (elements) to share; which
-    band does what must not change a bit of the result, so that sums are kept per item and added up later.
-    Unlike a `prange` loop this may be called from several threads at once, and it compiles fast.
-    """
-    threads = min(thread_count(), count, max(1, work // SHARE))
-    if threads <= 1:
-        function(0, count, *arguments)
-        return
-    edges = [count * k // threads for k in range(threads + 1)]
-    pool = _pool(threads - 1)
-    others = [pool.submit(function, edges[k], edges[k + 1], *arguments) for k in range(1, threads)]
-    function(edges[0], edges[1], *arguments)
-    for other in others:
-        other.result()
-
-
-SHARE = 32768  # elements that are worth a thread
-_pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
-_lock = threading.Lock()
-
-
-def _pool(helpers: int) -> ThreadPoolExecutor:
-    key = (os.getpid(), helpers)  # threads do not survive a fork
-    with _lock:
-        if key not in _pools:
-            _pools[key] = ThreadPoolExecutor(helpers, thread_name_prefix="fractalcontact")
-        return _pools[key]

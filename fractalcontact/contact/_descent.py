@@ -35,7 +35,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import in_bands
+from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped import lowest, shifted
 from fractalcontact.contact._operator import Operator

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import in_bands
+from fractalcontact.base.threads import in_bands
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import in_bands
+from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._operator import Wavenumbers
 from fractalcontact.contact._problem import Body

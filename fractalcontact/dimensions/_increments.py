@@ -33,6 +33,7 @@ PARTS, _WIDE, _LONG = 4, 12, 48  # parts along an axis, their least edge; least 
 REACH = 2 * LAGS[-1]  # rows that a slab borrows from the next, in steps
 _UNLIKELY = (np.inf, 10.83, 13.82, 16.27)  # 99.9 % of chi square with 0 to 3 degrees of freedom
 _NODES = np.linspace(0.02, 0.98, 25)
+_LEAST = 0.02
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,9 @@ class ClosedForm:
     """Estimate of H with its standard error; `increment` is the rms first difference over one x spacing.
 
     `strain` is the factor by which the lags scatter about the line more than they should (Birge 1932), and 1
-    where chance gives as much once in a thousand times.
+    where chance gives as much once in a thousand times. `turn` is how far the curve turns from the line as
+    white noise turns it, in standard deviations, and `noisy` the estimate with such noise fitted, and its
+    standard error.
     """
 
     hurst: float
@@ -64,6 +67,19 @@ class ClosedForm:
     order: int
     increment: float
     strain: float
+    turn: float
+    noisy: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Line:
+    """What a straight line through the logarithms gives; see `ClosedForm`."""
+
+    hurst: float = np.nan
+    standard_error: float = np.nan
+    strain: float = np.nan
+    turn: float = 0.0
+    noisy: tuple[float, float] = (np.nan, np.nan)
 
 
 def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: int = 1) -> Moments:
@@ -78,7 +94,7 @@ def moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...], step: in
     step : int
         Shortest lag in spacings.
     """
-    from fractalcontact.base.jit import in_bands
+    from fractalcontact.base.threads import in_bands
     from fractalcontact.dimensions._kernels import increment_sums
 
     bands, edges = _cuts(shape, step)
@@ -141,20 +157,20 @@ def closed_form(
     error : bool
         Where points are missing, False saves the time for the standard error, and weighs as if complete.
     """
-    hurst, deviation, strain = _estimate(moments, steps, 2, 0.5, lags, error=False)
+    line = _estimate(moments, steps, 2, 0.5, lags, error=False)
     order = 2
-    if np.isfinite(hurst):
-        order = 1 if hurst < FIRST_BELOW else 2
-        hurst, deviation, strain = _estimate(moments, steps, order, hurst, lags, error=error)
-    reference = moments.means[0] if order == 1 else moments.means[3] / (4.0 - 4.0 ** min(hurst, 0.999))
-    increment = np.sqrt(reference) * float(moments.step) ** -hurst
-    return ClosedForm(hurst, deviation, order, float(increment), strain)
+    if np.isfinite(line.hurst):
+        order = 1 if line.hurst < FIRST_BELOW else 2
+        line = _estimate(moments, steps, order, line.hurst, lags, error=error)
+    reference = moments.means[0] if order == 1 else moments.means[3] / (4.0 - 4.0 ** min(line.hurst, 0.999))
+    increment = float(np.sqrt(reference) * float(moments.step) ** -line.hurst)
+    return ClosedForm(line.hurst, line.standard_error, order, increment, line.strain, line.turn, line.noisy)
 
 
 def _estimate(
     moments: Moments, steps: tuple[float, ...], order: int, near: float, lags: int, *, error: bool
-) -> tuple[float, float, float]:
-    """Return H, its standard error and the strain, weighing as for a face of exponent `near`."""
+) -> _Line:
+    """Fit the line, weighing as for a face of exponent `near`."""
     axes = len(steps)
     columns = np.array(
         [3 * (order - 1) + i + 6 * (axes == 2 and axis == 0) for axis in range(axes) for i in range(3)]
@@ -171,7 +187,7 @@ def _estimate(
         own = slice(3 * axis, 3 * axis + 3)
         usable[own] &= np.count_nonzero(usable[own]) > 1
     if not usable.any():
-        return np.nan, np.nan, np.nan
+        return _Line()
     if moments.observed is None or not error:
         covariance = complete_covariance(near, moments.shape, steps, order, moments.step)
     else:
@@ -180,17 +196,30 @@ def _estimate(
     return _slope(design[usable], np.log(means[usable]), covariance[np.ix_(usable, usable)])
 
 
-def _slope(design: Array, values: Array, covariance: Array) -> tuple[float, float, float]:
-    """Return the last coefficient by generalised least squares, its standard error, and the strain."""
+def _slope(design: Array, values: Array, covariance: Array) -> _Line:
+    """Fit the line by generalised least squares; the last column of the design is that of H."""
     design = design[:, np.any(design != 0, axis=0)]
+    coefficients, inverse, square = _least_squares(design, values, covariance)
+    freedom = values.size - design.shape[1]
+    strain = np.sqrt(square / freedom) if square > _UNLIKELY[freedom] else 1.0
+    hurst, error = float(coefficients[-1]), float(np.sqrt(inverse[-1, -1]))
+    if freedom <= design.shape[1] - 2:  # no axis has three lags
+        return _Line(hurst, error, float(strain))
+    # white noise adds as much to every lag; where H is 0 it is no other than the level
+    noise = np.exp(-max(hurst, _LEAST) * design[:, -1])
+    coefficients, inverse, _ = _least_squares(np.column_stack([noise, design]), values, covariance)
+    turn = float(coefficients[0] / np.sqrt(inverse[0, 0]))
+    noisy = float(coefficients[-1]), float(np.sqrt(inverse[-1, -1]))
+    return _Line(hurst, error, float(strain), turn, noisy)
+
+
+def _least_squares(design: Array, values: Array, covariance: Array) -> tuple[Array, Array, float]:
+    """Return the coefficients, their covariance, and the square of what is left over."""
     weighted = np.linalg.solve(covariance, design)
     inverse = np.linalg.inv(design.T @ weighted)
     coefficients = inverse @ (weighted.T @ values)
     rest = values - design @ coefficients
-    freedom = values.size - design.shape[1]
-    square = float(rest @ np.linalg.solve(covariance, rest))
-    strain = np.sqrt(square / freedom) if square > _UNLIKELY[freedom] else 1.0
-    return float(coefficients[-1]), float(np.sqrt(inverse[-1, -1])), float(strain)
+    return coefficients, inverse, float(rest @ np.linalg.solve(covariance, rest))
 
 
 def complete_covariance(
