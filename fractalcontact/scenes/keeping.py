@@ -12,6 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fractalcontact.base import netcdf, provenance
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.scenes.given import contact_options, locate
@@ -40,7 +42,8 @@ class Store:
             found: Any = netcdf.open(self.folder / f"{key}.nc")
         except InvalidInput:
             found = None
-        if found is None or found.attrs.pop(_KEY, "") != key:
+        mark = None if found is None else found.attrs.pop(_KEY, None)
+        if mark is None or mark != f"{key} {_checksum(found)}":
             told = f"{FOLDER}/{key}.nc is damaged or of another origin; that part is computed again"
             warnings.warn(told, FractalContactWarning, stacklevel=2)
             return None
@@ -49,7 +52,8 @@ class Store:
     def put(self, key: str, result: xr.Dataset) -> None:
         """Keep a result."""
         if self.folder is not None:
-            netcdf.save(result.assign_attrs({_KEY: key}), self.folder / f"{key}.nc")
+            mark = f"{key} {_checksum(result)}"
+            netcdf.save(result.assign_attrs({_KEY: mark}), self.folder / f"{key}.nc")
 
     def kept(self, digests: Iterable[str]) -> dict[str, xr.Dataset]:
         """Return what was kept of some stages, by name."""
@@ -129,6 +133,17 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
 def _hashed(facts: Any) -> str:
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _checksum(result: xr.Dataset) -> str:
+    """Return a digest of all numbers and words: the file format sees no flipped bit in a small variable."""
+    whole = hashlib.blake2b(digest_size=16)
+    for name, variable in sorted(result.variables.items(), key=lambda item: str(item[0])):
+        values = variable.values
+        words = values.dtype.kind not in "biuf"
+        whole.update(f"{name} {variable.dims} {variable.shape} {words}".encode())
+        whole.update("\0".join(map(str, values.flat)).encode() if words else np.ascontiguousarray(values))
+    return whole.hexdigest()
 
 
 def _version() -> str:

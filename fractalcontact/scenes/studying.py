@@ -111,8 +111,8 @@ class Study:
         dropped = self._dropped(stage)
         follow = tuple(stages.measure(reader, self.scene) for reader in readers)
         names = [stage.name, *(reader.name for reader in readers)]
-        if stage.name == "surfaces" and "generate" in self.scene.table("surface"):
-            names = []  # sooner made again than read
+        if _sooner_again(stage, self.scene):
+            names = []
         tasks = {}
         for number in missing:
             kept = self.parts[stage.name].get(number)
@@ -154,3 +154,11 @@ class Study:
     def seconds(self) -> dict[str, float]:
         """What the finished stages took in this run."""
         return {name: self.spent[name] for name in self.results}
+
+
+def _sooner_again(stage: Stage, scene: Scene) -> bool:
+    """Whether a face is made, or read from its own file, as soon as from a kept one."""
+    table = scene.table("surface" if stage.name == "surfaces" else "upper")
+    registers = stage.name == "joints/faces" and scene.table("joint").get("register")
+    is_face = stage.name in ("surfaces", "joints/faces")
+    return is_face and not (registers or table.get("despike") or table.get("fill"))

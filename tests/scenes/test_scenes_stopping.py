@@ -150,11 +150,33 @@ def damaged(folder, how):
             path.write_bytes(path.read_bytes()[:-200])
         elif how == "foreign":
             fc.save(fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1), path)
+        elif how == "changed":
+            with netCDF4.Dataset(path, "a") as file:
+                for variable in file.variables.values():
+                    if variable.dtype == float and variable.size:
+                        variable[...] = np.nextafter(np.asarray(variable[...]), np.inf)
         else:
             path.write_text("not a NetCDF file", encoding="utf-8")
 
 
-@pytest.mark.parametrize("how", ["truncated", "foreign", "text"])
+def test_a_face_that_is_only_read_is_not_kept_beside_its_file(whole, tmp_path, monkeypatch):
+    face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
+    fc.save(face, tmp_path / "face.nc")
+    text = SOUND.partition("[material]")[2]
+    (tmp_path / "read.toml").write_text(f'[surface]\nread = "face.nc"\n[material]{text}', encoding="utf-8")
+    original, kept = stages._call, []
+
+    def told(*arguments, **options):
+        kept.extend(path.name for path in (tmp_path / "out" / ".stages").glob("*.nc"))
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(stages, "_call", told)
+    fc.scenes.run(tmp_path / "read.toml", out=tmp_path / "out", progress=False)
+    assert kept
+    assert not [name for name in kept if name.startswith("surfaces")]
+
+
+@pytest.mark.parametrize("how", ["truncated", "foreign", "changed", "text"])
 def test_a_damaged_kept_part_is_told_and_computed_again(whole, tmp_path, monkeypatch, how):
     original = stages._call
 
