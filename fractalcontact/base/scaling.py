@@ -54,7 +54,7 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
     slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
     residual = y - y_mean - slope * (x - x_mean)
     error = np.sqrt(float(w @ residual**2) / spread / (x.size - 2)) if x.size > 2 else np.nan
-    intercept = y_mean - slope * x_mean + (y_unit - slope * x_unit) * np.log(2.0)
+    intercept = y_mean - slope * x_mean + (y_unit.item() - slope * x_unit.item()) * np.log(2.0)
     return Line(slope, float(intercept), float(error), int(x.size))
 
 
@@ -70,9 +70,12 @@ def local_slope(scale: Array, value: Array) -> Array:
     return np.asarray(np.gradient(np.where(np.isfinite(y), y, np.nan), logarithm(scale)[0], axis=-1))
 
 
-def logarithm(values: Array) -> tuple[Array, int]:
-    """Return ln (values / 2^k) and k, which takes the unit out: so no unit changes a bit of a slope."""
-    there = values[np.isfinite(values) & (values > 0)]
-    unit = int(np.frexp(there.min())[1]) if there.size else 0
+def logarithm(values: Array) -> tuple[Array, Array]:
+    """Return ln (values / 2^k) and k, which takes the unit out: so no unit changes a bit of a slope.
+
+    Each curve, along the last axis, has a unit of its own; k has shape (..., 1).
+    """
+    lowest = np.min(values, axis=-1, keepdims=True, initial=np.inf, where=np.isfinite(values) & (values > 0))
+    unit = np.frexp(np.where(np.isfinite(lowest), lowest, 0.5))[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.log(np.ldexp(values, -unit)), unit
