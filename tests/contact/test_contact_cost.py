@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import fft, jit
+from fractalcontact.base import fft, threads
 from fractalcontact.base.threads import limit
 from fractalcontact.contact import _fast, _plane
 from fractalcontact.contact._descent import Descent
@@ -48,7 +48,8 @@ def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
     library, monkeypatch, single, boundary, control, force
 ):
     monkeypatch.setattr(_plane, "SINGLE_FROM", 0 if single else 10**9)
-    monkeypatch.setattr(jit, "SHARE", 1000)  # so that small passes are shared among threads too
+    monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
+    monkeypatch.setattr(fft, "SMALL", 1000)
     surface, keep = rough(112), ("state", "pressure", "gap", "displacement")
     path = (
         {"nominal_pressure": MODULUS * np.array([1e-3, 4e-3, 2e-3])} if force else {"closure": [2e-5, 3e-5]}
@@ -56,8 +57,8 @@ def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
     cap = {"hardness": 0.05 * MODULUS} if control == "hardness" else {}
     with limit(1):
         ours = press(surface, boundary=boundary, keep=keep, **path, **cap)
-    for threads in (2, 3):
-        with limit(threads):
+    for count in (2, 3):
+        with limit(count):
             same_bits(
                 ours, press(surface, boundary=boundary, keep=keep, **path, **cap), dict.fromkeys(keep, 0)
             )
