@@ -46,7 +46,12 @@ class MissingExtra(FractalContactError, ImportError):
     """
 
     def __init__(self, purpose: str, library: str, extra: str) -> None:
-        super().__init__(f"{purpose} needs {library}: pip install 'fractalcontact[{extra}]'")
+        super().__init__(purpose, library, extra)  # all of them, for a copy is made from these
+
+    def __str__(self) -> str:
+        """Say what is missing, and how to come by it."""
+        purpose, library, extra = self.args
+        return f"{purpose} needs {library}: pip install 'fractalcontact[{extra}]'"
 
 
 class FractalContactWarning(UserWarning):

@@ -1,8 +1,11 @@
 """Checks collect every problem and raise once; errors are ValueErrors."""
 
+import pickle
+
 import numpy as np
 import pytest
 
+from fractalcontact.base import errors
 from fractalcontact.base.checks import Problems, rehearse
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 
@@ -80,6 +83,33 @@ def test_bad_input_errors_are_value_errors_and_a_missing_extra_names_itself():
     error = MissingExtra("reading instrument files", "SurfaceTopography", "io")
     assert isinstance(error, ImportError)
     assert "fractalcontact[io]" in str(error)
+
+
+def every_kind(base):
+    return [base, *(kind for derived in base.__subclasses__() for kind in every_kind(derived))]
+
+
+TOLD = {  # what the others are told is a message
+    InvalidInput: ("somewhere", ["young: expected a number > 0, got -3", "poisson: missing"]),
+    UnreadableFile: ("faces.xyz", ["no heights"]),
+    MissingExtra: ("a study on several workers", "dask.distributed", "dask"),
+}
+RAISED = [
+    kind
+    for base in (errors.FractalContactError, errors.FractalContactWarning)
+    for kind in every_kind(base)
+    if kind.__module__ == errors.__name__
+]
+
+
+@pytest.mark.parametrize("kind", RAISED)
+def test_an_error_arrives_from_another_process_as_it_was_raised(kind):
+    error = kind(*TOLD.get(kind, ("what is wrong",)))
+    arrived = pickle.loads(pickle.dumps(error))
+    assert type(arrived) is kind
+    assert str(arrived) == str(error) != ""
+    assert arrived.args == error.args
+    assert vars(arrived) == vars(error)
 
 
 def test_a_rehearsed_call_goes_as_far_as_its_checks():
