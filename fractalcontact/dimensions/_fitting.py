@@ -112,7 +112,10 @@ class FreeModes:
             _whittle.fit(self.power, model, hurst, noise=level, gaps=gaps, white_excess=white)
             for hurst, level in ((0.7, 0.05), (0.3, 0.02))
         ]
-        settled = [fit for fit in fits if fit.converged] or fits
+        # a search that ended outside its range may have left powers below zero
+        settled = [fit for fit in fits if fit.converged and fit.total.min() > 0.0]
+        if not settled:
+            return fits[0]
         return min(settled, key=lambda fit: float(np.sum(np.log(fit.amplitude * fit.total))))
 
     def error(self, fit: _whittle.WhittleFit) -> float:
@@ -204,9 +207,13 @@ def fitted(modes: Modes, start: float, noise: bool) -> tuple[_whittle.WhittleFit
     if abs(fit.misfit) > STRANGE:
         middle = float(np.median(modes.order))
         interval = _holding(interval, modes, modes.order > middle, fit.hurst, noise)
+        told = ""
+        if not noise and (loud := modes.fit(start, True)).converged:
+            interval = _widened(interval, modes, loud)
+            told = ", and that of a fit with white noise"
         notes.append(
             f"the exponent changes with scale ({fit.misfit:+.1f} standard deviations): "
-            "the interval holds that of the longer and of the shorter half of the modes"
+            f"the interval holds that of the longer and of the shorter half of the modes{told}"
         )
     scatter = modes.scatter(fit)
     if scatter < -_UNEVEN:
@@ -223,12 +230,15 @@ def _holding(
     interval: tuple[float, float], modes: Modes, groups: Array, start: float, noise: bool
 ) -> tuple[float, float]:
     """Widen an interval until it holds those of groups of modes, each fitted alone."""
-    low, high = interval
     for group in np.unique(groups):
         kept = groups == group
         if np.count_nonzero(kept) >= LEAST_MODES:
             part = modes.part(kept)
-            alone = part.fit(start, noise)
-            ends = normal_interval(alone.hurst, part.error(alone))
-            low, high = min(low, ends[0]), max(high, ends[1])
-    return low, high
+            interval = _widened(interval, part, part.fit(start, noise))
+    return interval
+
+
+def _widened(interval: tuple[float, float], modes: Modes, fit: _whittle.WhittleFit) -> tuple[float, float]:
+    """Widen an interval until it holds that of another fit."""
+    low, high = normal_interval(fit.hurst, modes.error(fit))
+    return min(interval[0], low), max(interval[1], high)

@@ -13,6 +13,7 @@ from fractalcontact.dimensions import _covers, _increments, _measures
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
 from fractalcontact.dimensions._evenness import Evenness, evenness
 from fractalcontact.dimensions._faces import LEAST, MOST, Face
+from fractalcontact.dimensions._fitting import STRANGE
 from fractalcontact.dimensions._likelihood import Scales, likelihood
 from fractalcontact.dimensions._pairs import LAGS
 from fractalcontact.dimensions._rounding import quantum, told
@@ -69,6 +70,14 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
     error = np.nan if reason else found.standard_error * found.strain
     parts = Evenness() if reason else evenness(moments, face.steps, found.hurst)
     low, high = parts.applied(found.hurst, *normal_interval(found.hurst, error))
+    turned = ""
+    if not reason and abs(found.turn) > STRANGE:
+        ends = normal_interval(*found.noisy)
+        low, high = min(low, ends[0]), max(high, ends[1])
+        turned = (
+            f"the exponent changes with the lag ({found.turn:+.1f} standard deviations of white noise): "
+            f"the interval also holds that of increments less such noise, {found.noisy[0]:.2f}"
+        )
     rounded = ""
     if not reason and not face.is_lazy:
         quiet, rounded = _without_rounding(face, moments, unit, lags, error)
@@ -84,7 +93,7 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
         increment=found.increment * unit,
         not_given=reason,
         note="; ".join(
-            part for part in (strained if found.strain > 1.0 else "", parts.note, rounded) if part
+            part for part in (strained if found.strain > 1.0 else "", turned, parts.note, rounded) if part
         ),
         **window,  # type: ignore[arg-type]
     )

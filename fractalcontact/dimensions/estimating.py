@@ -76,7 +76,7 @@ def estimate(
         noise_height : rms of the white noise (m), if it was fitted.
         misfit : how far the spectrum departs from the family, in standard deviations (likelihood). Beyond 3.3
         the exponent depends on scale, and the interval then holds what the longer and the shorter half of
-        the modes give alone.
+        the modes give alone, and a fit with white noise.
         run_time : of each method (s).
         The attribute `note` tells whatever else a value needs, as JSON by method; `default_method` tells what
         "default" stands for.
@@ -105,8 +105,14 @@ def estimate(
     once in a thousand faces: an exponent that changes with scale; a few waves that hold more than their
     share (a lay, a step, a pattern); parts of the face that are not equally rough (patches, worn tops,
     spikes), which count for fewer points; heights that were rounded to steps. The interval is then widened
-    until it holds what the scales, azimuths or parts give alone, or what is left without the rounding, and
-    `note` says so.
+    until it holds what the scales, azimuths or parts give alone, or what is left without noise or rounding,
+    and `note` says so.
+
+    What is weaker than chance is not seen. White noise with a variance of a tenth of half the mean square
+    increment over one spacing lowers the exponent by .02, .08 and .2 where it is .3, .7 and .9. Where `noise`
+    is not asked for, 0, 80 and 100 % of such faces of 128 x 128 points were told by "likelihood", 0, 30 and
+    100 % by "increments", and of 256 x 256 points all with H = .7 by both: those intervals hold the exponent,
+    the others are false. Ask for `noise` if a surface may have any.
     """
     from fractalcontact.dimensions._methods import DEFAULT, METHODS
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import fractalcontact as fc
 from fractalcontact.base import threads
 from fractalcontact.dimensions import _increments, _pairs
 
@@ -149,3 +150,36 @@ def test_lags_that_disagree_widen_the_interval():
     means[[5, 11]] *= 1.5  # as if noise or smoothing had changed the longest lag
     bent = _increments.closed_form(_increments.Moments(means, counts, (64, 64), 1, None), (1.0, 1.0))
     assert bent.strain > 3.0
+
+
+@pytest.mark.parametrize(("steps", "shape"), [((1.0, 1.0), (128, 128)), ((1.0,), (4096,))])
+@pytest.mark.parametrize("noise", [1e-3, -1e-3])
+def test_noise_in_exact_mean_squares_is_found(steps, shape, noise):
+    means, hurst = np.full(12, np.nan), 0.7
+    for axis in range(len(steps)):
+        for order, level in ((1, 1.0), (2, 4.0 - 4.0**hurst)):
+            lags = np.array([1.0, 2.0, 4.0])
+            place = 6 * axis + 3 * (order - 1)
+            means[place : place + 3] = level * lags ** (2 * hurst) + (2.0 if order == 1 else 6.0) * noise
+    counts = np.full(12, 10000)
+    found = _increments.closed_form(_increments.Moments(means, counts, shape, 1, None), steps)
+    assert np.sign(found.turn) == np.sign(noise)
+    assert abs(found.hurst - hurst) > 5e-4
+    assert found.noisy[0] == pytest.approx(hurst, abs=2e-5)
+    assert found.noisy[1] > 2 * found.standard_error
+
+
+@pytest.mark.parametrize("lags", [2, 3])
+def test_white_noise_cannot_be_told_from_two_lags(lags):
+    heights = np.random.default_rng(3).standard_normal((40, 40)).cumsum(0).cumsum(1)
+    found = _increments.closed_form(_increments.moments([(heights, 40)], (40, 40)), (1.0, 1.0), lags=lags)
+    assert (found.turn == 0.0) is (lags == 2)
+    assert np.isnan(found.noisy[0]) == (lags == 2)
+
+
+def test_the_turn_of_a_family_face_is_a_normal_number():
+    faces = fc.surfaces.fbm((48, 48), 1.0, hurst=0.7, rms_increment=1.0, rng=8, members=300).values
+    moments = (_increments.moments([(face, 48)], (48, 48)) for face in faces)
+    turns = [_increments.closed_form(one, (1.0, 1.0)).turn for one in moments]
+    assert abs(np.mean(turns)) < 0.25
+    assert np.std(turns) == pytest.approx(1.0, abs=0.13)

@@ -152,3 +152,15 @@ def test_noise_that_was_asked_for_explains_the_rounding():
     _, low, high, note = of(rounded(brownian(0.9, 12), 255), "likelihood", noise=True)
     assert low < 0.9 < high
     assert "rounded" not in note
+
+
+@pytest.mark.parametrize("method", ["increments", "likelihood"])
+@pytest.mark.parametrize("rng", [1, 2, 3])
+def test_noise_that_nobody_asked_for_is_told_and_the_interval_holds_what_is_under_it(method, rng):
+    heights = brownian(0.9, rng, (128, 128))
+    noise = np.random.default_rng(rng).standard_normal(heights.shape)
+    hurst, low, high, note = of(heights + np.sqrt(0.05) * STEP * noise, method)
+    assert "changes with" in note
+    assert "white noise" in note
+    assert hurst < 0.85
+    assert low < 0.9 < high
