@@ -169,12 +169,12 @@ def _note_stop(run: str) -> None:
 
 
 def _within_reach(folder: Path, client: Any) -> bool:
-    """Whether all workers see a folder."""
+    """Whether all workers see a folder; of one that is lost while it is asked, nobody knows."""
     folder.mkdir(parents=True, exist_ok=True)
     mark = folder / f".{uuid.uuid4().hex}"
     mark.touch()
     try:
-        seen = client.run(Path.is_file, mark)
+        seen = client.run(Path.is_file, mark, on_error="return")
     finally:
         mark.unlink()
-    return bool(seen) and all(seen.values())
+    return bool(seen) and all(answer is True for answer in seen.values())

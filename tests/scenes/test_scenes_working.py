@@ -1,8 +1,11 @@
 """Work on workers that are far away, lost, stopped or not there."""
 
 import importlib.util
+import os
 import pickle
 import signal
+import threading
+import time
 from concurrent.futures import Future
 
 import netCDF4
@@ -146,3 +149,29 @@ def test_the_command_with_workers_writes_the_same_bytes(whole, tmp_path):
     done = command("run", whole[0], "-o", tmp_path, "--workers", 2, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
     assert contents(tmp_path / "result.nc") == whole[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("once_there_is", ["*", "*.nc"])
+def test_a_worker_killed_as_it_is_asked_or_at_its_work_changes_no_byte(whole, tmp_path, once_there_is):
+    """A real one: another takes its place, and what it had done and not handed over is done again."""
+    distributed = pytest.importorskip("distributed")
+    killed = []
+
+    def kill_one(cluster):
+        while not list((tmp_path / ".stages").glob(once_there_is)):
+            time.sleep(0.005)
+        killed.append(next(iter(cluster.workers.values())).pid)
+        os.kill(killed[0], signal.SIGKILL)
+
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        killer = threading.Thread(target=kill_one, args=(cluster,), daemon=True)
+        killer.start()
+        fc.scenes.run(whole[0], out=tmp_path, progress=False, client=client)
+        killer.join(5)
+    assert killed
+    assert contents(tmp_path / "result.nc") == whole[1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
