@@ -135,6 +135,11 @@ def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Datas
         `madogram` (m), `pair_count` and `local_slope`, which is H for a self-affine surface. Five lags or so
         for each doubling.
 
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or the longest lag is below one spacing.
+
     References
     ----------
     Gneiting, Sevcikova and Percival (2012), Statistical Science 27.
@@ -162,6 +167,11 @@ def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> 
         `second_variogram` (m2), `pair_count` (of triples) and `local_slope`, which is 2 H for a self-affine
         surface.
 
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or the longest lag is below one spacing.
+
     References
     ----------
     Chan and Wood (2000), Annals of Statistics 28; Zhu and Stein (2002), J. Agric. Biol. Environ. Stat. 7.
@@ -185,6 +195,11 @@ def roughness_length(surface: xr.DataArray) -> xr.Dataset:
     Dataset over `window_size` (m)
         `roughness` (m), `pair_count` (of windows) and `local_slope`, which is H for a self-affine surface.
         Windows overlap by half; their edge grows by sqrt 2 from 4 points to a quarter of the face.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or an axis has fewer than 5 points.
 
     References
     ----------
@@ -257,6 +272,11 @@ def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range")
         surface, and `vertical_scale`, the factor on the heights. Edges double from one spacing to half the
         face.
 
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or `vertical_scale` is not positive.
+
     Notes
     -----
     How much the unit matters: a fractional Brownian face of 512 x 512 points with H = 0.6 and an rms
@@ -298,6 +318,11 @@ def covering(surface: xr.DataArray, *, vertical_scale: float = 1.0) -> xr.Datase
     Dataset over `cube_size` (m)
         `covering_area` (m2, of the nominal area; `covering_length`, m, of a profile), `local_slope`, which
         is 2 - D (1 - D of a profile), and `vertical_scale`. Edges double from one spacing to half the face.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or `vertical_scale` is not positive.
 
     References
     ----------

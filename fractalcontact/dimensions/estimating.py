@@ -113,6 +113,11 @@ def estimate(
     is not asked for, 0, 80 and 100 % of such faces of 128 x 128 points were told by "likelihood", 0, 30 and
     100 % by "increments", and of 256 x 256 points all with H = .7 by both: those intervals hold the exponent,
     the others are false. Ask for `noise` if a surface may have any.
+
+    References
+    ----------
+    Whittle (1957), J. R. Stat. Soc. B 19, 38-63; Sykulski, Olhede, Guillaumin, Lilly and Early (2019), The
+    debiased Whittle likelihood, Biometrika 106, 251-266.
     """
     from fractalcontact.dimensions._methods import DEFAULT, METHODS
 
@@ -149,8 +154,11 @@ def estimate(
 def methods() -> dict[str, str]:
     """Return the methods of `estimate`: name, and one line on what it does and for which surfaces.
 
-    The first is the default. "95 % interval" at the end of a line means that the interval is honest: it
-    holds the true exponent in 95 of 100 surfaces of the family that is named.
+    Returns
+    -------
+    dict
+        From name to line; the first is the default. "95 % interval" at the end of a line means that the
+        interval is honest: it holds the true exponent in 95 of 100 surfaces of the family that is named.
     """
     from fractalcontact.dimensions._methods import METHODS
 

@@ -76,6 +76,11 @@ def fbm(
     of n x n points that is 2.42 n or 3.83 n. Memory: about 5 (R = 1) or 9 (R = 2) arrays of n x n numbers.
     A torus side counts the diagonal in spacings of its own axis, so unequal spacings or a slender shape
     cost more; what does not fit into the memory of the machine is refused.
+
+    References
+    ----------
+    Stein (2002), Fast and exact simulation of fractional Brownian surfaces, Journal of Computational and
+    Graphical Statistics 11, 587-599.
     """
     with Problems("fractalcontact.surfaces.fbm") as problems:
         sizes = _arguments.plane_shape(problems, shape)

@@ -84,6 +84,11 @@ def midpoint(
     The increments differ from place to place too: at hurst = .9 their mean square at lag 1 is between .4
     and 6 times the exact one, with creases along the first subdivisions. `fbm` has neither error (1e-15).
     With unequal spacings all errors are larger.
+
+    References
+    ----------
+    Fournier, Fussell and Carpenter (1982), Communications of the ACM 25, 371-384; with additions: Saupe
+    (1988), in The Science of Fractal Images (Springer).
     """
     with Problems("fractalcontact.surfaces.midpoint") as problems:
         sizes = _arguments.plane_shape(problems, shape, profile=False)

@@ -56,7 +56,7 @@ def spectral(
     hurst : float, or (y, x)
         Hurst exponent, .01 to 1. Two exponents make a surface that is self-affine with one of them along
         y and the other along x: the density is that of their harmonic mean H in the effective wavenumber
-        q0 ((q_x/q0)^(2 H_x/H) (+) (q_y/q0)^(2 H_y/H))^(1/2), q0 that of the roll-off.
+        q0 ((q_x/q0)^(2 H_x/H) + (q_y/q0)^(2 H_y/H))^(1/2), q0 that of the roll-off.
     rms_height, rms_slope : float
         Exactly one: the root mean square height (m), or that of the gradient with both its components,
         which is the sum of |q|^2 C over all modes.
@@ -94,6 +94,10 @@ def spectral(
     above all, for the short waves across it that belong to them end at the grid: 512 x 512 points of
     (0.5, 0.8) give 0.53 to 0.47 along y over lags of 2 to 32 points, and 0.92 to 0.73 along x.
     Memory: two arrays of n x n numbers.
+
+    References
+    ----------
+    Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
     """
     with Problems("fractalcontact.surfaces.spectral") as problems:
         sizes = _arguments.plane_shape(problems, shape)

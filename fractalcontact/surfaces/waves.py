@@ -75,6 +75,11 @@ def weierstrass(
     The waves end at both sides, which a variogram feels: fitted over lags of 2 to 32 spacings on 256 x 256
     points its slope is that of an exponent of .22, .50 and .76 for hurst = .1, .5 and .9, as the sum over the
     waves, amplitude^2 (1 - J0(2 pi r / wavelength)), has it. The amplitudes themselves are exact.
+
+    References
+    ----------
+    Ausloos and Berman (1985), A multivariate Weierstrass-Mandelbrot function, Proceedings of the Royal
+    Society of London A 400, 331-350.
     """
     with Problems("fractalcontact.surfaces.weierstrass") as problems:
         sizes = _arguments.plane_shape(problems, shape)
