@@ -18,7 +18,7 @@ from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.memory import leave_dask
-from fractalcontact.base.stopping import Stopped, leaving
+from fractalcontact.base.stopping import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
 MADE = 10_000  # objects between two searches for cycles; with Python's 700 they take a twentieth of a study
@@ -176,7 +176,7 @@ def _told(line: str, problems: Sequence[str]) -> bool:
 
 def _accuracy(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
-    from fractalcontact.accuracy.reporting import cases_dataset, cases_table, curves_table
+    from fractalcontact.accuracy.reporting import curves_table
 
     _check_accuracy(options)
     if options.out is not None:
@@ -184,24 +184,15 @@ def _accuracy(options: argparse.Namespace) -> int:
 
         writable(options.out)  # before the measuring, not after it
     if options.extreme:
-        from fractalcontact.accuracy.watching import examine_apart
-
-        cases = accuracy.cases.items()
-        findings = examine_apart([name for name, case in cases if options.large or not case.large])
-        print(cases_table(findings))
-        if options.out is not None:
-            from fractalcontact.base.netcdf import save
-
-            file = save(cases_dataset(findings), Path(options.out) / "extremes.nc")
-            print(f"\nwritten to {options.out}: {file.name}")
-        return 0 if all(one.ok for found in findings.values() for one in found) else 1
+        return _extremes(options)
     if options.lean:
         return _lean(options)
     if options.parts == ["estimators"]:
         return _estimators(options)
-    result = accuracy.measure(options.parts or None, budget=options.budget)
+    with noted() as stop:
+        result = accuracy.measure(options.parts or None, budget=options.budget, progress=True, stop=stop)
     print(curves_table(result))
-    if options.curves is not None:
+    if options.curves is not None and not stop:
         from fractalcontact.accuracy.curves import write
 
         write(result, options.curves)
@@ -215,7 +206,31 @@ def _accuracy(options: argparse.Namespace) -> int:
             written.append(f"{name}.png")
             error_against_time(part.to_dataset()).savefig(folder / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
+    return _ended(stop)
+
+
+def _ended(stop: Stop) -> int:
+    """Return the exit code; raise if the work was cut short."""
+    if stop:
+        raise Stopped(stop.number, "what was measured by then is told")
     return 0
+
+
+def _extremes(options: argparse.Namespace) -> int:
+    from fractalcontact import accuracy
+    from fractalcontact.accuracy.reporting import cases_dataset, cases_table
+    from fractalcontact.accuracy.watching import examine_apart
+
+    names = [name for name, case in accuracy.cases.items() if options.large or not case.large]
+    with noted() as stop:
+        findings = examine_apart(names, progress=True, stop=stop)
+    print(cases_table(findings))
+    if findings and options.out is not None:
+        from fractalcontact.base.netcdf import save
+
+        file = save(cases_dataset(findings), Path(options.out) / "extremes.nc")
+        print(f"\nwritten to {options.out}: {file.name}")
+    return _ended(stop) or int(not all(one.ok for found in findings.values() for one in found))
 
 
 def _check_accuracy(options: argparse.Namespace) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from fractalcontact.accuracy.trials.trial import Contest, Experiment
+    from fractalcontact.base.stopping import Stop
 
 WHERE = "fractalcontact.accuracy.measure"
 PARTS = ("surfaces", "dimensions", "contact", "domains", "joints")
@@ -29,7 +31,13 @@ MEASURED = ("error", "run_time", "first_run_time", "memory")
 Found = dict[float, dict[str, float]]
 
 
-def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -> xr.DataTree:
+def measure(
+    parts: Sequence[str] | str | None = None,
+    *,
+    budget: float = 60.0,
+    progress: bool = False,
+    stop: Stop | None = None,
+) -> xr.DataTree:
     """Measure true error against run time and memory.
 
     Parameters
@@ -40,6 +48,11 @@ def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -
         Seconds for the whole. What is left is shared evenly by the methods still to come, and a method is
         turned up until its share is spent, so that a larger budget shows more of each curve. Every method is
         measured at one setting at least, and the time of compiling is not counted.
+    progress : bool
+        Show a bar.
+    stop : Stop, optional
+        Asked before each setting (`fractalcontact.base.stopping.noted`): once it is true, what there is by
+        then is returned, and the attribute `completeness` names the methods that are missing.
 
     Returns
     -------
@@ -70,19 +83,26 @@ def measure(parts: Sequence[str] | str | None = None, *, budget: float = 60.0) -
     end = time.perf_counter() + budget
     sets = {name: contests(name) for name in names}
     left = sum(len(one.experiments) for part in sets.values() for one in part)
+    every = [(name, one) for name, part in sets.items() for contest in part for one in contest.experiments]
+    found: dict[str, dict[str, Found]] = {name: {} for name in sets}
+    for name, experiment in track(every, progress, "accuracy", unit="method"):
+        if stop:
+            break
+        share = (end - time.perf_counter()) / left
+        compiled = time.perf_counter()
+        found[name][experiment.method], idle = _turned_up(experiment, share, stop)
+        end += min(idle, time.perf_counter() - compiled)
+        left -= 1
     tree = xr.DataTree()
     for name, part in sets.items():
-        found: dict[str, Found] = {}
-        for experiment in (one for contest in part for one in contest.experiments):
-            share = (end - time.perf_counter()) / left
-            compiled = time.perf_counter()
-            found[experiment.method], idle = _turned_up(experiment, share)
-            end += min(idle, time.perf_counter() - compiled)
-            left -= 1
-        tree[name] = xr.DataTree(_labelled(name, part, found))
+        if found[name]:
+            tree[name] = xr.DataTree(_labelled(name, part, found[name]))
     tree.attrs = stamp(
         xr.Dataset(), WHERE, {"parts": list(names), "budget": budget}, title="Error against run time"
     ).attrs
+    if left:
+        missing = [one.method for name, one in every if one.method not in found[name]]
+        tree.attrs["completeness"] = f"partial: the run was stopped; missing: {'; '.join(missing)}"
     return tree
 
 
@@ -92,12 +112,12 @@ def contests(part: str) -> tuple[Contest, ...]:
     return found
 
 
-def _turned_up(experiment: Experiment, share: float) -> tuple[Found, float]:
+def _turned_up(experiment: Experiment, share: float, stop: Stop | None) -> tuple[Found, float]:
     """Return what was measured at every knob that fits into the share of seconds, and that of compiling."""
     found: Found = {}
     spent, expected, idle = 0.0, 0.0, 0.0
     for knob in experiment.knobs:
-        if found and spent + expected > share:
+        if found and (stop or spent + expected > share):
             break
         start = time.perf_counter()
         told = _measured(experiment, knob, share - spent)
@@ -146,7 +166,7 @@ def _peak(experiment: Experiment, case: Any) -> float:
 def _labelled(name: str, part: tuple[Contest, ...], found: dict[str, Found]) -> xr.Dataset:
     import xarray as xr
 
-    entries = [(contest, one) for contest in part for one in contest.experiments]
+    entries = [(contest, one) for contest in part for one in contest.experiments if one.method in found]
     methods = [one.method for _, one in entries]
     width = max(len(one) for one in found.values())
     columns = {key: np.full((len(methods), width), np.nan) for key in (*MEASURED, "knob")}

@@ -12,21 +12,33 @@ from typing import Any, TypeVar
 
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import LONGEST, Finding, examine
+from fractalcontact.base.progress import track
+from fractalcontact.base.stopping import Stop
 
 K = TypeVar("K")
 V = TypeVar("V")
 LONGEST_LARGE = 15 * LONGEST
 
 
-def examine_apart(names: list[str]) -> dict[str, list[Finding]]:
-    """Examine cases of the catalogue; one that hangs, or ends the process, is a finding and not the end."""
+def examine_apart(
+    names: list[str], *, progress: bool = False, stop: Stop | None = None
+) -> dict[str, list[Finding]]:
+    """Examine cases of the catalogue; one that hangs, or ends the process, is a finding and not the end.
+
+    Once `stop` is true, the cases that were done by then are returned.
+    """
     limits = {name: LONGEST_LARGE if cases[name].large else 2 * LONGEST for name in names}
-    return {
-        name: [Finding("the whole case", None, str(got), False, limits[name])]
-        if isinstance(got, Lost)
-        else got
-        for name, got in watched(examine_named, limits)
-    }
+    found: dict[str, list[Finding]] = {}
+    for name, got in track(
+        watched(examine_named, limits), progress, "extremes", unit="case", total=len(names)
+    ):
+        if not isinstance(got, Lost):
+            found[name] = got
+        elif not stop:  # a signal from the terminal ends the other process too
+            found[name] = [Finding("the whole case", None, str(got), False, limits[name])]
+        if stop:
+            break
+    return found
 
 
 def examine_named(name: str) -> list[Finding]:

@@ -1,5 +1,7 @@
 """Error against run time: what is measured is true error, and the budget is kept."""
 
+import dataclasses
+import signal
 import time
 
 import numpy as np
@@ -10,6 +12,7 @@ from fractalcontact.accuracy import measuring
 from fractalcontact.accuracy.reporting import choice_table, curves_table
 from fractalcontact.accuracy.trials.trial import Contest, Experiment
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.stopping import Stop
 
 
 @pytest.mark.parametrize("part", list(measuring.PARTS))
@@ -108,6 +111,28 @@ def test_frontier_memory_and_choice_of_known_methods(monkeypatch):
     assert "slow" in lines[0]
 
 
+def test_a_stopped_measuring_gives_what_it_has_and_says_what_is_missing(monkeypatch):
+    stop = Stop()
+
+    def last(_, knob):
+        stop.number = signal.SIGINT
+        return 0.1 / (knob + 1)
+
+    one = stub("one", [0.01], [0.1])
+    two = dataclasses.replace(stub("two", [0.01, 0.01], [0.1, 0.1]), error=last)
+    part = (
+        Contest("a", "of it", "known", (one, two)),
+        Contest("b", "of it", "known", (stub("c", [0], [1]),)),
+    )
+    monkeypatch.setattr(measuring, "contests", lambda name: part)
+    tree = fc.accuracy.measure(["contact", "joints"], budget=20, stop=stop)
+    assert tree.attrs["completeness"] == "partial: the run was stopped; missing: c; one; two; c"
+    assert list(tree.children) == ["contact"]
+    assert tree["contact"]["method"].values.tolist() == ["one", "two"]
+    assert tree["contact"]["error"].shape == (2, 1)
+    assert "two" in curves_table(tree)
+
+
 def test_what_is_given_is_compared_at_the_same_size_only():
     error = np.array([[0.4, 0.2, 0.1], [0.5, 0.3, np.nan]])
     seconds = np.array([[1.0, 2.0, 3.0], [2.5, 9.0, np.nan]])
@@ -120,16 +145,16 @@ def test_what_is_given_is_compared_at_the_same_size_only():
 
 
 def test_the_error_of_the_solver_falls_with_the_spacing():
-    data = fc.accuracy.measure("contact", budget=12)["contact"].to_dataset()
-    square = data["error"].sel({"method": "fast, square"}).dropna("setting")
-    assert square.values[-1] < 0.5 * square.values[0]
-    paper, fast = (
-        data.sel({"method": name}).dropna("setting") for name in ("elimination, disc", "fast, disc")
-    )
-    common = np.intersect1d(paper["knob"], fast["knob"])
-    assert common.size
-    both = [one["error"].values[np.isin(one["knob"], common)] for one in (paper, fast)]
-    np.testing.assert_allclose(*both, atol=1e-6)
+    methods = {one.method: one for c in measuring.contests("contact") for one in c.experiments}
+
+    def errors(name):
+        one = methods[name]
+        return [one.error(one.solve(one.prepare(knob)), knob) for knob in one.knobs[:2]]
+
+    coarse, fine = errors("fast, square")
+    assert fine < 0.5 * coarse
+    assert methods["elimination, disc"].knobs[:2] == methods["fast, disc"].knobs[:2]
+    np.testing.assert_allclose(errors("elimination, disc"), errors("fast, disc"), atol=1e-6)
 
 
 def test_a_file_of_all_is_clean(tmp_path, compliance):

@@ -1,6 +1,7 @@
 """A call that hangs, or takes its process down, is cut off; the others go on."""
 
 import os
+import signal
 import time
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from fractalcontact import cli
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import examine
 from fractalcontact.accuracy.watching import Lost, examine_apart, watched
+from fractalcontact.base.stopping import Stop
 
 
 def test_what_hangs_is_ended_and_the_next_is_served():
@@ -31,6 +33,12 @@ def test_what_ends_its_process_is_told():
 def test_a_case_is_examined_apart_as_here(name):
     (apart,) = examine_apart([name]).values()
     assert [(one.name, one.ok) for one in apart] == [(one.name, one.ok) for one in examine(cases[name])]
+
+
+def test_a_stop_keeps_the_cases_that_are_done():
+    stop = Stop()
+    stop.number = signal.SIGINT
+    assert list(examine_apart(["empty mask", "one cell"], stop=stop)) == ["empty mask"]
 
 
 def test_the_findings_are_written_where_they_are_asked_for(tmp_path, monkeypatch, capsys, compliance):
