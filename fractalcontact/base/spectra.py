@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.checks import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -244,11 +245,16 @@ class SelfAffine:
     Attributes
     ----------
     hurst : float
-        Between 0 and 1.
+        0 to 1.
     long_cutoff, rolloff, short_cutoff : float
         Wavelengths in metres, long_cutoff >= rolloff >= short_cutoff.
     plateau : float
         C at the roll-off, in m4.
+
+    Raises
+    ------
+    InvalidInput
+        An attribute is out of range, or the wavelengths are in another order.
 
     References
     ----------
@@ -260,6 +266,17 @@ class SelfAffine:
     rolloff: float
     short_cutoff: float
     plateau: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the attributes."""
+        with Problems("fractalcontact.surfaces.SelfAffine") as problems:
+            problems.number("hurst", self.hurst, at_least=0, at_most=1)
+            problems.number("plateau", self.plateau, at_least=0)
+            names = ("long_cutoff", "rolloff", "short_cutoff")
+            lengths = [problems.number(name, getattr(self, name), above=0) for name in names]
+            if not problems.found:
+                expected = "long_cutoff >= rolloff >= short_cutoff"
+                problems.require(lengths[0] >= lengths[1] >= lengths[2], "wavelengths", expected, lengths)
 
     @classmethod
     def scaled(

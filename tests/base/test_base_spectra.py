@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from fractalcontact.base import fft, spectra
+from fractalcontact.base.errors import InvalidInput
 
 
 def plane(shape, seed=0):
@@ -205,3 +206,19 @@ def test_aliased_density_of_a_lattice():
     offsets = 2 * np.pi * np.arange(-300, 301)
     near = np.sum(((1.0 + offsets[:, None]) ** 2 + (-2.0 + offsets) ** 2) ** (-1 - 0.6))
     assert spectra.aliased_power_law((1.0, -2.0), 0.6) == pytest.approx(near, rel=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ((2.0, 1e-3, 1e-4, 1e-5), "hurst"),
+        ((0.5, -1.0, 1e-4, 1e-5), "long_cutoff"),
+        ((0.5, np.inf, 1e-4, 1e-5), "long_cutoff"),
+        ((0.5, 1e-3, 1e-2, 1e-5), "long_cutoff >= rolloff"),
+        ((0.5, 1e-3, 1e-4, 1e-3), "rolloff >= short_cutoff"),
+        (("rough", 1e-3, 1e-4, 0.0), "short_cutoff"),
+    ],
+)
+def test_a_spectrum_that_cannot_be_is_refused(given, named):
+    with pytest.raises(InvalidInput, match=named):
+        spectra.SelfAffine.scaled(*given, rms_height=1e-6)
