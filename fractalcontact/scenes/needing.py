@@ -58,7 +58,8 @@ NEEDS: Mapping[str, Need] = {
     "dimensions/covering": _SUMS,
     "dimensions/variation": Need((FFT,)),
     "contact": _PRESSED,
-    "joints/register": Need((FFT, "skimage.registration", "scipy.ndimage")),
+    # the registration of scikit-image has scipy's transforms of its own
+    "joints/register": Need((FFT, "skimage.registration", "scipy.ndimage", "scipy.fft")),
     "joints/closure": _PRESSED,
     "joints/elastic_dilatancy": _PRESSED,
     "joints/transmissivity": Need(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
