@@ -124,9 +124,8 @@ def filtered_modes(
     across, along = np.zeros(ny), np.zeros(ny)
     own = np.zeros((ny, len(mirrored)))
     scratch = np.empty((max(1, BLOCK // reach_x), 2 * reach_x))
-    for rows, amplitude in _rows(band, waves_y, waves_x[:reach_x], nyquist, reach_y, len(scratch)):
-        own[rows] = amplitude[:, mirrored]
-        doubled = np.repeat(amplitude, 2, axis=1)
+    for rows, doubled in _rows(band, waves_y, waves_x[:reach_x], nyquist, reach_y, len(scratch)):
+        own[rows] = doubled[:, [2 * column for column in mirrored]]
         noise = rng.standard_normal(out=scratch[: len(doubled)])
         drawn = np.multiply(noise, doubled, out=numbers[rows, : 2 * reach_x])
         square = np.square(doubled if expected else drawn, out=noise)
@@ -145,20 +144,24 @@ def filtered_modes(
 def _rows(
     band: Band, waves_y: Array, waves_x: Array, nyquist: tuple[float, float], reach: int, size: int
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield blocks of rows with their amplitudes, each block followed by its mirror."""
+    """Yield blocks of rows with their amplitudes, each twice, each block followed by its mirror."""
+
+    def amplitudes(rows: slice) -> Array:
+        return np.repeat(band.grid_amplitude(waves_y[rows, None], waves_x, nyquist), 2, axis=1)
+
     ny = waves_y.size
     for start in range(0, reach, size):
         rows = slice(start, min(start + size, reach))
-        amplitude = band.grid_amplitude(waves_y[rows, None], waves_x, nyquist)
-        yield rows, amplitude
+        doubled = amplitudes(rows)
+        yield rows, doubled
         first, last = max(rows.start, 1), min(rows.stop - 1, (ny - 1) // 2)
         if first > last:
             continue
         mirror = slice(ny - last, ny - first + 1)
         if band.stretch == 1.0:
-            yield mirror, amplitude[first - rows.start : last - rows.start + 1][::-1]
+            yield mirror, doubled[first - rows.start : last - rows.start + 1][::-1]
         else:
-            yield mirror, band.grid_amplitude(waves_y[mirror, None], waves_x, nyquist)
+            yield mirror, amplitudes(mirror)
 
 
 def _hermitian(column: Array) -> Array:

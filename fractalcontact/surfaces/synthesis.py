@@ -13,7 +13,7 @@ from fractalcontact.base.checks import Problems
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import SelfAffine as SelfAffine
 from fractalcontact.surfaces import _arguments
-from fractalcontact.surfaces._filtering import Band, filtered_modes
+from fractalcontact.surfaces._filtering import BLOCK, Band, filtered_modes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,8 +127,9 @@ def spectral(
             (plane[0], plane[1]), scaled, band, stream, slope=target == "rms_slope", expected=expected
         )
         heights = fft.irfft2(modes, (plane[0], plane[1]), overwrite=True)
-        heights *= rms / math.sqrt(energy) * (unit if target == "rms_slope" else 1.0)
-        return heights.reshape(sizes), {"achieved_error": _error(heights, rms, target, expected)}
+        mean_square = _scale(heights, rms / math.sqrt(energy) * (unit if target == "rms_slope" else 1.0))
+        facts = {"achieved_error": _error(math.sqrt(mean_square / energy), target, expected)}
+        return heights.reshape(sizes), facts
 
     return _arguments.make(
         one,
@@ -154,13 +155,26 @@ def spectral(
     )
 
 
-def _error(heights: np.ndarray[Any, np.dtype[Any]], rms: float, target: str, expected: bool) -> str:
-    """Return in words how far the rms is from the one asked for; that of the slope is summed over modes."""
+def _scale(heights: np.ndarray[Any, np.dtype[Any]], factor: float) -> float:
+    """Multiply heights in place, rows that fit into the cache at a time; return their mean square before."""
+    squares = np.empty(len(heights))
+    rows = max(1, BLOCK // heights.shape[1])
+    for start in range(0, len(heights), rows):
+        block = heights[start : start + rows]
+        np.einsum("ij,ij->i", block, block, out=squares[start : start + rows])
+        block *= factor
+    return float(squares.sum()) / heights.size
+
+
+def _error(found: float, target: str, expected: bool) -> str:
+    """Return in words how far the rms, found in units of the one asked for, is from it.
+
+    That of the slope is summed over modes.
+    """
     words = target.replace("_", " ")
     note = ", by chance: the mean square over all surfaces is as asked" if expected else ""
     if target == "rms_slope":
         return f"that of the {words}{note}" if expected else f"rounding, in the {words}"
-    found = math.sqrt(sum(float(np.mean((row / rms) ** 2)) for row in heights) / len(heights))
     return f"{max(abs(found - 1.0), np.finfo(float).eps):.1e} of the {words}{note}"
 
 
