@@ -47,10 +47,11 @@ SHORT = {
     "cube_size": "edge of the cubes",
     "variation": "height variation",
     "power_spectral_density": "spectral density",
-    "profile_power_spectral_density": "spectral density of the profile",
+    "profile_power_spectral_density": "profile density",
     "cube_count": "number of cubes",
     "roughness": "rms height in a window",
-    "covering_area": "area of the covering triangles",
+    "covering_area": "area of the triangles",
+    "covering_length": "length of the polygon",
 }
 PERCENT = frozenset({"contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage"})
 

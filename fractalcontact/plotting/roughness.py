@@ -30,6 +30,7 @@ CURVES = {
     "roughness": (1.0, 0.0, 0.0),
     "variation": (1.0, 0.0, 0.0),
     "covering_area": (1.0, 0.0, -1.0),
+    "covering_length": (1.0, 0.0, -1.0),
 }
 COLUMNS = 3
 CLIPPED = 10  # per cent of the local slopes at either end that may lie beyond the axis
@@ -141,6 +142,8 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     lower.set_xlim(upper.get_xlim())
     lower.set_xlabel(axis_label(curve[scale], along))
     lower.set_ylabel("local slope")
+    for ax in (upper, lower):
+        _style.plain_ticks(ax)
     if not np.isfinite(y).any():
         _style.say(upper, "no curve")
 

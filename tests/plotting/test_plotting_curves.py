@@ -1,11 +1,13 @@
 """What stands on the axes is what stands in the Dataset, in the unit that the label names."""
 
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import xarray as xr
 
+import fractalcontact as fc
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.plotting.roughness import CURVES
@@ -215,6 +217,21 @@ def test_dimension_curves_show_curve_window_and_slope(made):
         assert name.replace("_", " ") == ax.get_title(loc="left")
 
 
+def test_every_curve_of_a_profile_has_its_panel_and_numbers_apart():
+    profile = fc.surfaces.fbm(200, 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+    names = ("spectrum", "variogram", "roughness_length", "variation", "cube_counts", "covering")
+    curves = {name: getattr(fc.dimensions, name)(profile) for name in names}
+    figure = plotting.dimension_curves(curves, fc.dimensions.estimate(profile, list(names)))
+    titles = {ax.get_title(loc="left") for ax in figure.axes}
+    assert titles >= {name.replace("_", " ") for name in names}
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        edge = ax.get_window_extent()
+        boxes = [text.get_window_extent() for text in ax.get_xticklabels(which="both") if text.get_text()]
+        shown = sorted((box.x0, box.x1) for box in boxes if edge.x0 <= 0.5 * (box.x0 + box.x1) <= edge.x1)
+        assert all(left[1] < right[0] for left, right in pairwise(shown))
+
+
 @pytest.mark.parametrize("hurst", [0.3, 0.8])
 @pytest.mark.parametrize("name", list(CURVES))
 def test_the_slope_of_each_curve_is_that_of_the_surface_it_is_measured_on(name, hurst):
@@ -230,6 +247,7 @@ def test_the_slope_of_each_curve_is_that_of_the_surface_it_is_measured_on(name, 
         "roughness": 3 - dimension,
         "variation": 3 - dimension,
         "covering_area": 2 - dimension,
+        "covering_length": 2 - dimension,  # one less of both, area and dimension
     }
     assert np.dot(CURVES[name], (hurst, 3.0, 1.0)) == pytest.approx(of_surfaces[name])
 
