@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-MARKERS = "osD^vP*"
+MARKERS = "osD^vP*X<>h"  # more than there are colours, so that no two of many curves look alike
 MEGABYTE = 1e6
+NARROW = 2.0  # ratio of costs
 
 
 @_style.styled
@@ -102,6 +103,9 @@ def _curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
         ax.plot(cost[row][known & best[row]], errors[row][known & best[row]], **look, ls="")
         entries.append(_style.line_entry(name.replace("_", " "), **look))
     _style.log_scale(ax, x=cost, y=errors)
+    least, most = np.nanmin(cost), np.nanmax(cost)
+    if least > 0 and most < NARROW * least:  # what hardly differs is not drawn as if it did
+        ax.set_xlim(least / NARROW, most * NARROW)
     _style.plain_ticks(ax)
     return entries
 

@@ -171,6 +171,17 @@ def test_error_against_time_shows_what_was_measured(made):
                 assert np.array_equal(filled.get_ydata(), best.error.values)
 
 
+def test_no_two_of_many_methods_look_alike_and_equal_costs_look_equal(made):
+    one = made.accuracy()["contact"].to_dataset().isel(method=[0] * 10)
+    one["method"] = [f"method {k}" for k in range(10)]
+    one["memory"] = one["memory"] * 0 + 1e6 * (1 + 1e-5 * np.arange(one.sizes["setting"]))
+    _, right = plotting.error_against_time(one).axes
+    looks = {(line.get_color(), line.get_marker()) for line in right.lines[::2]}
+    assert len(looks) == 10
+    low, high = right.get_xlim()
+    assert high > 2 * low
+
+
 def test_lacunarity_shows_every_step_and_its_dust(made, closed):
     result = made.lacunarity(closed)
     by_load, by_shear = plotting.lacunarity(result, shear=8e-3).axes
