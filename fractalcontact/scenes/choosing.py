@@ -169,7 +169,8 @@ def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[tuple[str, str, f
         kind = table.get("boundary", "periodic" if generated else "free")
         steps = max((len(value) for value in table.values() if isinstance(value, list)), default=1)
         hard = hard or (" with a hardness" if "hardness" in table else "")
-        yield "contact", f"rough, {kind} body{hard}", 1.0 + WARM * (steps - 1), float(np.prod(shape))
+        led = hard or (", closure imposed" if "closure" in table else "")
+        yield "contact", f"rough, {kind} body{led}", 1.0 + WARM * (steps - 1), float(np.prod(shape))
     solves = 0.0
     stages = {"closure": ("closure",), "elastic_dilatancy": ("elastic_dilatancy", "friction")}
     wanted = set(scene.wanted("joints"))

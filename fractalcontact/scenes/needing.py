@@ -64,10 +64,11 @@ NEEDS: Mapping[str, Need] = {
     "joints/elastic_dilatancy": _PRESSED,
     "joints/transmissivity": Need(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "domains/box_dimension": Need(_SPECIAL, _COVERS),
-    "domains/box_counts": Need(_SPECIAL, _COVERS),
+    "domains/box_counts": Need(_SPECIAL, ("domains._mean_kernels",)),
+    "domains/box_counts/minimum": Need((), ("domains._kernels",)),
     "domains/minkowski_dimension": Need(_SPECIAL, ("domains._near_kernels",)),
     "domains/correlation_dimension": Need((FFT, *_SPECIAL)),
-    "domains/generalised_dimensions": Need(_SPECIAL, _COVERS),
+    "domains/generalised_dimensions": Need(_SPECIAL),
     "domains/boundary_dimension": Need(_SPECIAL, ("domains._edge_kernels",)),
     "domains/lacunarity": Need((), ("domains._gliding_kernels",)),
     "domains/islands": Need(_LABELS, ("domains._island_kernels",)),
@@ -122,5 +123,7 @@ def _words(scene: Scene) -> Iterator[str]:
         yield from (f"prepare/{key}" for key in ("despike", "fill") if table.get(key))
     yield from (f"dimensions/{word}" for word in scene.wanted("dimensions"))
     yield from least_stages(scene)
+    if "box_counts" in scene.wanted("domains"):
+        yield f"domains/box_counts/{scene.table('domains').get('box_counts', {}).get('cover')}"
     if scene.table("joint").get("register"):
         yield "joints/register"

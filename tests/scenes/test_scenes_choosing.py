@@ -60,6 +60,17 @@ def test_the_error_asked_for_is_kept_and_less_costs_less(tmp_path, kind):
     assert transforms[-1] < int(exact["transforms"].sum())
 
 
+@pytest.mark.parametrize(("load", "contest"), [("nominal_pressure", ""), ("closure", ", closure imposed")])
+def test_the_curve_is_that_of_the_load(tmp_path, load, contest):
+    text = PRESSED.format(top="error = 1e-4", generator=FACES["free"][0], amplitude=FACES["free"][1],
+                          boundary='boundary = "free"').replace("nominal_pressure", load)  # fmt: skip
+    (tmp_path / "pressed.toml").write_text(text, encoding="utf-8")
+    _, (picked,) = choose(fc.scenes.load(tmp_path / "pressed.toml"))
+    (curve,) = curves.shipped()[f"rough, free body{contest}"].values()
+    at = curve.knob.index(picked.option.value)
+    assert picked.option.error == pytest.approx(3 * max(curve.error[at:]))
+
+
 def scene(tmp_path, top, **changes):
     text = top + SOUND.replace(
         "joints = [", 'dimensions = ["default", "spectrum"]\ndomains = ["box_dimension"]\njoints = ['

@@ -71,25 +71,34 @@ def test_a_word_alone_is_planned_with_what_it_needs(tmp_path, word):
 
 
 CHAIN = """
-import importlib, json, pickle, sys
+import gc, importlib, json, pickle, sys
 from fractalcontact.base.memory import leave_dask
 leave_dask()
 from fractalcontact import scenes
 from fractalcontact.scenes import needing, probing
+
+def forgotten():
+    "Let every kernel be taken from the cache again when it is called next."
+    dispatcher = getattr(sys.modules.get("numba.core.dispatcher"), "Dispatcher", ())
+    for one in gc.get_objects():
+        if isinstance(one, dispatcher) and one.overloads:
+            one._reset_overloads()
+
 found = {}
 for word, scene in pickle.loads(sys.stdin.buffer.read()):
     need = needing.least(scene)
     for name in need.libraries:
         importlib.import_module(name)
-    libraries, kernels = set(probing.libraries()), set(dict(probing.kernels()))
+    libraries = set(probing.libraries())
+    forgotten()
     scenes.run(scene, progress=False)
-    after = dict(probing.kernels())
+    kernels = dict(probing.kernels())
+    files = {name.rpartition(".")[0] for name in kernels}
     found[word] = {
         "libraries": sorted(set(probing.libraries()) - libraries),
-        "kernels": [
-            name for name in set(after) - kernels if name.rpartition(".")[0] not in need.kernels
-        ],
-        "forms": [name for name, (forms, _) in after.items() if forms != 1],
+        "kernels": sorted(files - set(need.kernels)),
+        "idle": sorted(set(need.kernels) - files),
+        "forms": [name for name, (forms, _) in kernels.items() if forms != 1],
     }
 print(json.dumps(found))
 """
