@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
 CONSTANT = "a constant height has no Hurst exponent"
 _NOISE = 1e-9  # rounding of a slope
 NORMAL = 1.959963984540054  # 97.5 % of the normal distribution

@@ -9,12 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from fractalcontact.dimensions import _modes, _periodic, _whittle
-from fractalcontact.dimensions._estimates import Estimate, normal_interval
+from fractalcontact.dimensions._estimates import STRANGE, Estimate, normal_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LEAST_MODES = 12
-STRANGE = 3.3  # departure from the model, in standard deviations, beyond which the interval is widened
 _UNEVEN = 4.0  # the same for the scatter of the modes about their expected power
 _FEW_PROBES, _MANY_POINTS = 3, 1 << 18
 _FEW_POINTS = 1 << 14

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.dimensions._estimates import STRANGE, normal_interval
 from fractalcontact.dimensions._pairs import (
     LAGS,
     Overlap,
@@ -69,6 +70,17 @@ class ClosedForm:
     strain: float
     turn: float
     noisy: tuple[float, float]
+
+    def quieted(self, low: float, high: float) -> tuple[float, float, str]:
+        """Widen an interval to hold that of the fit with noise, where the lags ask for it; with a note."""
+        if abs(self.turn) <= STRANGE:
+            return low, high, ""
+        ends = normal_interval(*self.noisy)
+        note = (
+            f"the exponent changes with the lag ({self.turn:+.1f} standard deviations of white noise): "
+            f"the interval also holds that of increments less such noise, {self.noisy[0]:.2f}"
+        )
+        return min(low, ends[0]), max(high, ends[1]), note
 
 
 @dataclass(frozen=True)
@@ -192,6 +204,7 @@ def _estimate(
         covariance = complete_covariance(near, moments.shape, steps, order, moments.step)
     else:
         overlap = gapped_overlap(moments.observed, order, axes, moments.step)
+        near = float(np.clip(near, _NODES[0], _NODES[-1]))  # a smooth or a white face has none of its own
         covariance = covariance_of_logs(near, steps, order, overlap, moments.step)
     return _slope(design[usable], np.log(means[usable]), covariance[np.ix_(usable, usable)])
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.dimensions import _exact, _increments, _modes, _periodic, _plateaus, _whittle
-from fractalcontact.dimensions._estimates import CONSTANT, Estimate, plane, undefined
+from fractalcontact.dimensions._estimates import CONSTANT, STRANGE, Estimate, plane, undefined
 from fractalcontact.dimensions._evenness import evenness
 from fractalcontact.dimensions._faces import Face
-from fractalcontact.dimensions._fitting import LEAST_MODES, STRANGE, FreeModes, PeriodicModes, fitted
+from fractalcontact.dimensions._fitting import LEAST_MODES, FreeModes, PeriodicModes, fitted
 from fractalcontact.dimensions._rounding import quantum, told
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -154,6 +154,9 @@ def _profile(face: Face, scales: Scales, noise: bool) -> Estimate:
     moments = _increments.moments([(heights[None], 1)], (heights.size,))
     parts = evenness(moments, (1.0,), fit.hurst)
     low, high = parts.applied(fit.hurst, fit.low, fit.high)
+    turned = ""
+    if not noise:
+        low, high, turned = _increments.closed_form(moments, (1.0,)).quieted(low, high)
     rounded = "" if noise else _rounded(heights[None], fit.standard_error)
     if rounded:
         loud = _exact.fit_profile(heights, noise=True, chunk=chunk)
@@ -165,7 +168,7 @@ def _profile(face: Face, scales: Scales, noise: bool) -> Estimate:
         increment=fit.increment * float(every) ** -fit.hurst * face.unit,
         noise=float(np.sqrt(fit.noise)) * face.unit if noise else np.nan,
         window="exact likelihood of all increments" if scales is None else _ASKED,
-        note="; ".join(part for part in (parts.note, rounded) if part),
+        note="; ".join(part for part in (turned, parts.note, rounded) if part),
     )  # fmt: skip
 
 

@@ -13,7 +13,6 @@ from fractalcontact.dimensions import _covers, _increments, _measures
 from fractalcontact.dimensions._estimates import CONSTANT, Estimate, normal_interval, plane, undefined
 from fractalcontact.dimensions._evenness import Evenness, evenness
 from fractalcontact.dimensions._faces import LEAST, MOST, Face
-from fractalcontact.dimensions._fitting import STRANGE
 from fractalcontact.dimensions._likelihood import Scales, likelihood
 from fractalcontact.dimensions._pairs import LAGS
 from fractalcontact.dimensions._rounding import quantum, told
@@ -70,15 +69,9 @@ def increments(face: Face, scales: Scales, noise: bool) -> Estimate:
     error = np.nan if reason else found.standard_error * found.strain
     parts = Evenness() if reason else evenness(moments, face.steps, found.hurst)
     low, high = parts.applied(found.hurst, *normal_interval(found.hurst, error))
-    turned = ""
-    if not reason and abs(found.turn) > STRANGE:
-        ends = normal_interval(*found.noisy)
-        low, high = min(low, ends[0]), max(high, ends[1])
-        turned = (
-            f"the exponent changes with the lag ({found.turn:+.1f} standard deviations of white noise): "
-            f"the interval also holds that of increments less such noise, {found.noisy[0]:.2f}"
-        )
-    rounded = ""
+    turned = rounded = ""
+    if not reason:
+        low, high, turned = found.quieted(low, high)
     if not reason and not face.is_lazy:
         quiet, rounded = _without_rounding(face, moments, unit, lags, error)
         low, high = float(np.fmin(low, quiet[0])), float(np.fmax(high, quiet[1]))

@@ -112,7 +112,9 @@ def estimate(
     increment over one spacing lowers the exponent by .02, .08 and .2 where it is .3, .7 and .9. Where `noise`
     is not asked for, 0, 80 and 100 % of such faces of 128 x 128 points were told by "likelihood", 0, 30 and
     100 % by "increments", and of 256 x 256 points all with H = .7 by both: those intervals hold the exponent,
-    the others are false. Ask for `noise` if a surface may have any.
+    the others are false. A profile shows it less: of 1024 points 0, 0 and 18 %, of 4096 points 0, 10 and 95 %
+    were told, and 25, 14 and 0 of 30 untold intervals of 1024 points held the exponent. Ask for `noise` if a
+    surface may have any.
 
     References
     ----------

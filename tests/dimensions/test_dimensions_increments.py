@@ -183,3 +183,17 @@ def test_the_turn_of_a_family_face_is_a_normal_number():
     turns = [_increments.closed_form(one, (1.0, 1.0)).turn for one in moments]
     assert abs(np.mean(turns)) < 0.25
     assert np.std(turns) == pytest.approx(1.0, abs=0.13)
+
+
+@pytest.mark.parametrize("shape", [(40, 40), (400,)])
+def test_smooth_and_white_faces_with_gaps_are_told_as_complete_ones_are(shape):
+    places = np.arange(shape[-1]) + 0.3 * np.arange(shape[0] if len(shape) > 1 else 1)[:, None]
+    smooth = np.sin(0.4 * places).reshape(shape)
+    white = np.random.default_rng(1).standard_normal(shape)
+    for heights, words in ((smooth, "no fractal"), (white, "")):
+        gapped = heights.copy()
+        gapped[..., 17] = np.nan
+        found = fc.dimensions.estimate(fc.surfaces.from_array(gapped, 1.0), "increments")
+        whole = fc.dimensions.estimate(fc.surfaces.from_array(heights, 1.0), "increments")
+        assert words in found.ci_low.attrs["not_given"]
+        assert bool(np.isfinite(found.ci_low)[0]) == bool(np.isfinite(whole.ci_low)[0])

@@ -164,3 +164,12 @@ def test_noise_that_nobody_asked_for_is_told_and_the_interval_holds_what_is_unde
     assert "white noise" in note
     assert hurst < 0.85
     assert low < 0.9 < high
+
+
+def test_noise_on_a_profile_is_told_too():
+    heights = brownian(0.9, 4, 4096)
+    noise = np.random.default_rng(4).standard_normal(heights.shape)
+    hurst, low, high, note = of(heights + np.sqrt(0.05) * STEP * noise, "likelihood")
+    assert "white noise" in note
+    assert hurst < 0.85
+    assert low < 0.9 < high
