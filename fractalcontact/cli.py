@@ -197,16 +197,25 @@ def _accuracy(options: argparse.Namespace) -> int:
 
         write(result, options.curves)
     if options.out is not None:
-        from fractalcontact.base.netcdf import save
-        from fractalcontact.plotting import error_against_time
+        written = [_kept(result, Path(options.out) / "accuracy.nc", stop)]
+        for name, part in () if stop else result.children.items():
+            from fractalcontact.plotting import error_against_time
 
-        folder = Path(options.out)
-        written = [save(result, folder / "accuracy.nc").name]
-        for name, part in result.children.items():
             written.append(f"{name}.png")
-            error_against_time(part.to_dataset()).savefig(folder / written[-1], dpi=150)
+            error_against_time(part.to_dataset()).savefig(Path(options.out) / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     return _ended(stop)
+
+
+def _kept(result: Any, target: Path, stop: Stop) -> str:
+    """Write a result and return the name of the file: another one where it is not whole."""
+    from fractalcontact.base.netcdf import save
+    from fractalcontact.scenes.running import UNFINISHED
+
+    if stop:
+        return save(result, target.with_name(UNFINISHED)).name
+    target.with_name(UNFINISHED).unlink(missing_ok=True)
+    return save(result, target).name
 
 
 def _ended(stop: Stop) -> int:
@@ -226,10 +235,11 @@ def _extremes(options: argparse.Namespace) -> int:
         findings = examine_apart(names, progress=True, stop=stop)
     print(cases_table(findings))
     if findings and options.out is not None:
-        from fractalcontact.base.netcdf import save
-
-        file = save(cases_dataset(findings), Path(options.out) / "extremes.nc")
-        print(f"\nwritten to {options.out}: {file.name}")
+        result = cases_dataset(findings)
+        if stop:
+            missing = "; ".join(name for name in names if name not in findings)
+            result.attrs["completeness"] = f"partial: the run was stopped; missing: {missing}"
+        print(f"\nwritten to {options.out}: {_kept(result, Path(options.out) / 'extremes.nc', stop)}")
     return _ended(stop) or int(not all(one.ok for found in findings.values() for one in found))
 
 

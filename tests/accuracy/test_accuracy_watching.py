@@ -9,6 +9,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact import cli
+from fractalcontact.accuracy import watching
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import examine
 from fractalcontact.accuracy.watching import Lost, examine_apart, watched
@@ -56,6 +57,22 @@ def test_the_findings_are_written_where_they_are_asked_for(tmp_path, monkeypatch
     assert found["expectation"].values[row] == "1024"
     assert f"{found.sizes['finding']} findings" in told
     assert not compliance(tmp_path / "out" / "extremes.nc")
+
+
+def test_a_stopped_command_writes_what_it_has_beside_an_earlier_whole(tmp_path, monkeypatch):
+    catalogue = {name: cases[name] for name in ("nothing observed", "one cell")}
+    monkeypatch.setattr(fc, "accuracy", SimpleNamespace(cases=catalogue))
+    done = {"nothing observed": examine(cases["nothing observed"])}
+
+    def stopped(names, *, progress, stop):
+        stop.number = signal.SIGINT
+        return done
+
+    (tmp_path / "extremes.nc").write_text("an earlier result", encoding="utf-8")
+    monkeypatch.setattr(watching, "examine_apart", stopped)
+    assert cli.main(["accuracy", "--extreme", "-o", str(tmp_path)]) == 128 + signal.SIGINT
+    assert fc.open(tmp_path / "partial.nc").attrs["completeness"].endswith("missing: one cell")
+    assert (tmp_path / "extremes.nc").read_text(encoding="utf-8") == "an earlier result"
 
 
 @pytest.mark.parametrize(
