@@ -95,7 +95,7 @@ def estimate(
     change when a plane, an offset of each row or an offset of each column is added. On a periodic face it
     is that of a power-law spectrum between cut-offs, which is another family. A profile has the exact
     likelihood of its increments; a periodic one that of a power law with a plateau whose corner is not known.
-    As measured on 200 to 500 periodic profiles each of 128, 512 and 2048 points with H = .1, .5 and .9, 93 to
+    As measured on 200 to 500 periodic profiles each of 128, 512 and 2048 points with H = .1, .5 and .9, 92 to
     98 % of the intervals held the exponent, with plateaus from a 3rd to a 20th of the extent on and with a
     short cut-off. A periodic profile with noise, and a periodic face with gaps, are given no interval.
     The standard error is that of the model: on fractional Brownian faces its
