@@ -9,7 +9,8 @@ the kernel and added up serially, by the kernel or by its caller.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from contextlib import suppress
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -28,8 +29,21 @@ def _compiled(function: F, **more: Any) -> F:
     try:
         compiled = numba.njit(cache=True, **_OPTIONS, **more)(function)
     except RuntimeError:  # neither the package's folder nor the user's can be written: compiled in every run
-        compiled = numba.njit(**_OPTIONS, **more)(function)
+        return cast("F", numba.njit(**_OPTIONS, **more)(function))
+    cache = getattr(compiled, "_cache", None)  # none where the compiler is switched off
+    if cache is not None:
+        cache.save_overload = _if_it_can(cache.save_overload)
     return compiled
+
+
+def _if_it_can(save: Callable[..., None]) -> Callable[..., None]:
+    """Return what keeps a compiled kernel; a full disk takes the next run the time of compiling, no more."""
+
+    def kept(*compiled: Any) -> None:
+        with suppress(OSError):
+            save(*compiled)
+
+    return kept
 
 
 def kernel(function: F) -> F:
