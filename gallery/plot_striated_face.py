@@ -46,5 +46,6 @@ for name, one in found.items():
         ax.plot(around, np.concatenate([quantity, quantity, quantity[:1]]), marker="o", ms=3, label=name)
 left.set_title("rms increment over 40 µm (µm)", fontsize=9)
 right.set_title("Hurst exponent", fontsize=9)
-right.set_ylim(0, 1)
+left.set_yticks([1, 2, 3])
+right.set_yticks([0.5, 1])
 right.legend(frameon=False, bbox_to_anchor=(1.05, 1.0), loc="upper left")
