@@ -69,20 +69,12 @@ def ifft(modes: Array) -> Array:
     return _scipy().ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
 
 
-def cosine(corner: Array, axes: tuple[int, ...]) -> Array:
-    """Transform an array that is even about the first and the last point of each of `axes`.
-
-    Given the n//2 + 1 points of a corner, the result is the real transform of all n (cosine transform of
-    type 1). Each axis has at least 2 points.
-    """
-    return dct(corner, 1, axes)
-
-
 def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
     """Cosine transform of kind 1, 2 or 3 along `axes`, without any normalisation.
 
     Kind 2 sums 2 a_j cos(pi k (j + 1/2) / n); kind 1, with n + 1 values, a_0 + (-1)^k a_n plus the sum of
-    2 a_j cos(pi k j / n); kind 3 is the transpose of kind 2 up to the factor of its first value.
+    2 a_j cos(pi k j / n), the real transform of all 2 n points of an even line; kind 3 is the transpose of
+    kind 2 up to the factor of its first value. For kind 1 each axis has at least 2 points.
     """
     if library() == "ducc0":
         return _one_by_one(_ducc0().dct, array, axes, type=kind)

@@ -93,7 +93,7 @@ class Embedding:
         Lags are in diagonals; an exact embedding gives 2 lag^(2H).
         """
         axes = tuple(axis for axis, n in enumerate(self.amplitude.shape) if n > 1)
-        covariance = fft.cosine(self.amplitude**2, axes) / np.prod(self.torus)
+        covariance = fft.dct(self.amplitude**2, 1, axes) / np.prod(self.torus)
         covariance = covariance.T[: self.shape[0], : self.shape[1]]
         y, x = (np.arange(n) * step for n, step in zip(self.shape, self.step, strict=True))
         square = y[:, None] ** 2 + x**2
@@ -115,7 +115,7 @@ def _embedded(shape: tuple[int, int], spacing: tuple[float, float], hurst: float
     torus = torus_of(shape, spacing, hurst)
     covariance = _covariance(model, torus, step)
     axes = tuple(axis for axis, n in enumerate(covariance.shape) if n > 1)
-    eigenvalues = fft.cosine(covariance, axes)
+    eigenvalues = fft.dct(covariance, 1, axes)
     largest, smallest = float(eigenvalues.max()), float(eigenvalues.min())
     if not smallest >= -ROUNDING * largest:
         raise FractalContactError(

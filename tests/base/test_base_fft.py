@@ -23,7 +23,7 @@ for shape, kind in itertools.product(SHAPES, (np.float32, np.float64)):
     plane = random.standard_normal(shape).astype(kind)
     axes = tuple(axis for axis, n in enumerate(shape) if n > 1)
     made = [fft.rfft(plane), fft.irfft(fft.rfft(plane), shape[-1]), fft.ifft(plane + 1j * plane)]
-    made += [fft.cosine(plane, axes), fft.dct(plane, 2, axes), fft.dct(plane, 3, axes[:1])]
+    made += [fft.dct(plane, 1, axes), fft.dct(plane, 2, axes), fft.dct(plane, 3, axes[:1])]
     made += [fft.dst(plane, 1, axes)]
     if len(shape) > 1:
         made += [fft.rfft2(plane), fft.irfft2(fft.rfft2(plane), shape[-2:])]
