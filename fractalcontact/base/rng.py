@@ -46,12 +46,9 @@ def record(rng: np.random.Generator) -> dict[str, Any]:
     told: dict[str, Any] = {"bit_generator": kind.__name__, "entropy": None, "spawn_key": []}
     if not isinstance(seed, np.random.SeedSequence):
         return told | {"state": _plain(bits.state)}
-    words: list[Any] = np.ravel(np.asarray(seed.entropy, dtype=object)).tolist()
-    told["entropy"] = (
-        str(int(words[0]))
-        if np.ndim(np.asarray(seed.entropy, dtype=object)) == 0
-        else [str(int(word)) for word in words]
-    )
+    entropy = np.asarray(seed.entropy, dtype=object)
+    words = [str(int(word)) for word in entropy.flat]
+    told["entropy"] = words if entropy.ndim else words[0]
     told["spawn_key"] = [int(key) for key in seed.spawn_key]
     told["children"] = int(seed.n_children_spawned)
     state = _plain(bits.state)
@@ -83,7 +80,7 @@ def _plain(state: Any) -> Any:
         return {key: _plain(value) for key, value in state.items()}
     if isinstance(state, np.ndarray):
         return [str(value) for value in state.tolist()]
-    return state if isinstance(state, str) and not state.isdigit() else str(int(state))
+    return state if isinstance(state, str) else str(int(state))
 
 
 def _numbers(state: Any) -> Any:
