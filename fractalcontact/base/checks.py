@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 LARGEST_WHOLE = 1 << 53  # beyond it a double knows no neighbours
 
 
-_depth: ContextVar[int] = ContextVar("depth", default=0)  # of blocks inside blocks
-_rehearsing: ContextVar[bool] = ContextVar("rehearsing", default=False)
+_depth: ContextVar[int | None] = ContextVar("depth", default=None)  # of blocks in what is rehearsed
 
 
 class _Checked(BaseException):
@@ -42,13 +41,12 @@ def rehearse(function: Callable[..., Any], *arguments: Any, **options: Any) -> N
     InvalidInput
         What is wrong with the call.
     """
-    inside, depth = _rehearsing.set(True), _depth.set(0)
+    depth = _depth.set(0)
     try:
         function(*arguments, **options)
     except _Checked:
         pass
     finally:
-        _rehearsing.reset(inside)
         _depth.reset(depth)
 
 
@@ -61,19 +59,21 @@ class Problems:
         self.found: list[str] = []
 
     def __enter__(self) -> Problems:
-        _depth.set(_depth.get() + 1)
+        if (depth := _depth.get()) is not None:
+            _depth.set(depth + 1)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        _depth.set(_depth.get() - 1)
+        if (depth := _depth.get()) is not None:
+            _depth.set(depth - 1)
         if isinstance(value, InvalidInput):
             self.found.extend(p for p in value.problems if p not in self.found)
             raise self.error(self.where, self.found) from value
         if kind is None and self.found:
             raise self.error(self.where, self.found)
-        if kind is None and _rehearsing.get() and _depth.get() == 0:
+        if kind is None and depth == 1:
             raise _Checked
 
     def add(self, argument: str, expected: str, got: object) -> None:
