@@ -108,7 +108,7 @@ def spectral(
         rms = 1.0 if wanted is None else _arguments.length(problems, target, wanted)
         cutoffs = _cutoffs(problems, sizes, steps, long_cutoff, rolloff, short_cutoff)
         problems.choice("normalise", normalise, ("realisation", "expectation"))
-        ratio = problems.number("stretch", stretch, above=0, at_least=1e-6, at_most=1e6)
+        ratio = problems.number("stretch", stretch, at_least=1e-6, at_most=1e6)
         azimuth = problems.number("rotation", rotation)
         if ratio != 1.0:
             problems.require(exponents[0] == exponents[1], "stretch", "1 with two Hurst exponents", stretch)
