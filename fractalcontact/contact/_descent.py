@@ -39,7 +39,7 @@ from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped import lowest, shifted
 from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._problem import Control, Solution
+from fractalcontact.contact._problem import Control, Solution, serial_sum
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -141,6 +141,10 @@ class Run:
         in_bands(function, self.blocks, self.size, self.pre.rows, *arguments, self.sums)
         return np.asarray(self.sums.sum(axis=0))
 
+    def over_rows(self, function: Any, *arguments: Any) -> None:
+        """Run a pass that sums nothing over all rows."""
+        in_bands(function, self.gap.shape[0], self.size, *arguments)
+
     def solve(self, tolerance: float, certify: bool) -> Solution:
         """Iterate."""
         self.begin()
@@ -213,11 +217,11 @@ class Run:
         """Scale the pressures below the cap until their sum is what is wanted."""
         wanted = self.control.value
         for _ in range(CAPPINGS):
-            force = sum_in_double(self.p)
+            force = serial_sum(self.p)
             if abs(force - wanted) <= self.precise * wanted:
                 return
             below = self.p < self.cap
-            bearing = sum_in_double(np.where(below, self.p, 0)) if self.cap < np.inf else force
+            bearing = serial_sum(np.where(below, self.p, 0)) if self.cap < np.inf else force
             if bearing <= 0 or force - bearing >= wanted:
                 break
             factor = self.kind((wanted - (force - bearing)) / bearing)
@@ -332,8 +336,8 @@ class Run:
         if self.clipped:
             self.cut(force)
         else:
-            self.run(move, self.p, self.t, step)
-            self.run(move, self.u, self.spare, step)
+            self.over_rows(move, self.p, self.t, step)
+            self.over_rows(move, self.u, self.spare, step)
             self.fresh = False
 
     def cut(self, force: float) -> None:
@@ -346,7 +350,7 @@ class Run:
         else:
             missed = self.forced and abs(force - wanted) > self.precise * wanted
             factor = self.kind(wanted / force if missed else 1.0)
-            self.run(cut, self.p, self.t, self.kind(self.step), factor, self.cap, self.spare)
+            self.over_rows(cut, self.p, self.t, self.kind(self.step), factor, self.cap, self.spare)
         self.p, self.spare = self.spare, self.p
         self.refresh()
 
@@ -355,7 +359,7 @@ class Run:
         free = self.pre.mask[: self.gap.shape[0], : self.gap.shape[1]]
         np.copyto(self.spare, self.p)
         values = self.p[free] - self.step * self.t[free].astype(np.float64)
-        rest = sum_in_double(np.where(free, 0, self.p))
+        rest = serial_sum(np.where(free, 0, self.p))
         self.spare[free] = shifted(values, wanted - rest, float(self.cap))
 
     def halve(self) -> None:
@@ -367,33 +371,17 @@ class Run:
         self.cut(self.run(_kernels.survey, self.p, self.t, self.kind(self.step), self.cap)[1])
 
 
-def sum_in_double(plane: Array) -> float:
-    """Sum by rows, then over the rows, whatever the precision of the plane."""
-    return float(np.sum(np.sum(plane, axis=1, dtype=np.float64)))
-
-
-def move(start: int, stop: int, rows: int, x: Array, t: Array, step: Any, out: Array) -> None:  # noqa: ARG001
+def move(start: int, stop: int, x: Array, t: Array, step: Any) -> None:
     """Step along -t, over bands of rows that fit the caches."""
     with np.errstate(all="ignore"):  # as the compiled loops
-        for part in strips(start * rows, min(stop * rows, x.shape[0])):
+        for part in strips(start, stop):
             x[part] -= step * t[part]
 
 
-def cut(
-    start: int,
-    stop: int,
-    rows: int,
-    p: Array,
-    t: Array,
-    step: Any,
-    factor: Any,
-    cap: Any,
-    new: Array,
-    out: Array,  # noqa: ARG001
-) -> None:
+def cut(start: int, stop: int, p: Array, t: Array, step: Any, factor: Any, cap: Any, new: Array) -> None:
     """Step along -t, cut to 0, times `factor`, cut to the cap."""
     with np.errstate(all="ignore"):  # as the compiled loops
-        for part in strips(start * rows, min(stop * rows, p.shape[0])):
+        for part in strips(start, stop):
             band = new[part]
             np.multiply(t[part], step, out=band)
             np.subtract(p[part], band, out=band)

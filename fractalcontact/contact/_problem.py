@@ -90,8 +90,8 @@ class Solution:
 
 
 def serial_sum(plane: Array) -> float:
-    """Sum by rows, then over the rows: the same bits for any number of threads."""
-    return float(np.sum(np.sum(plane, axis=-1)))
+    """Sum by rows, then over the rows, in double: the same bits for any number of threads."""
+    return float(np.sum(np.sum(plane, axis=-1, dtype=np.float64)))
 
 
 def serial_mean(plane: Array) -> float:
