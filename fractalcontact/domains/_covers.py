@@ -124,21 +124,20 @@ def every_position(cells: Array, largest: int, periodic: Sequence[bool]) -> tupl
     """
     from fractalcontact.domains._mean_kernels import nearest_ahead
 
-    (ny, nx), (wrap_y, wrap_x) = cells.shape, periodic
+    ny, nx = cells.shape
     ahead = [(0, largest if wraps else 0) for wraps in periodic]
     distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
     histogram = np.zeros(largest + 2, np.int64)
     nearest_ahead(np.pad(cells, ahead, mode="wrap"), ny, nx, distance, histogram)
     whole = np.cumsum(histogram)[: largest + 1]  # with the boxes that hang over the far edges
     folded = whole.copy()
-    for axis, wrap, along in ((0, wrap_y, wrap_x), (1, wrap_x, wrap_y)):
-        if not wrap:
-            low, high = _from_edges(cells, axis, largest)
-            hanging = _over_edge(np.stack([low, high, np.minimum(low, high)]), largest, along)
-            whole += hanging[0]
-            folded += hanging[2] - hanging[1]
-    if not wrap_y and not wrap_x:
-        left, right = _from_edges(cells, 1, largest)
+    free = {axis: _from_edges(cells, axis, largest) for axis in (0, 1) if not periodic[axis]}
+    for axis, (low, high) in free.items():
+        hanging = _over_edge(np.stack([low, high, np.minimum(low, high)]), largest, periodic[1 - axis])
+        whole += hanging[0]
+        folded += hanging[2] - hanging[1]
+    if len(free) == 2:
+        left, right = free[1]
         nearer = np.minimum(left, right)
         nearer = np.minimum(nearer, nearer[::-1])
         corners = _over_corner(np.stack([left, right, left[::-1], right[::-1], nearer]), largest)

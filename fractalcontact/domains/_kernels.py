@@ -37,10 +37,9 @@ def cover(
     boxes cut in x and their area in cells.
 
     The others are zeros to work in, for the band and, where it is cut in y, for it with those beside it:
-    `held` (2, 2) the rows summed up, `columns` (3, nx) the cells of the set in each column
-    (and, last, none), `prefix` (2, at
-    least nx + 1) how many columns left of each position hold any, or hold more than in the band; it goes
-    round where longer.
+    `held` (2, 2) the rows summed up, `columns` (3, nx) the cells of the set in each column (and, last,
+    none), `prefix` (2, at least nx + 1) how many columns left of each position hold any, or hold more than
+    in the band; it goes round where longer.
     """
     ny, nx = mask.shape
     ahead = np.uint32(size)  # unsigned: no test for negatives
