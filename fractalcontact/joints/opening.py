@@ -107,23 +107,18 @@ def dilatancy(
         towards = several_directions(direction, problems)
         shears = check_shear(shear, crack, towards, problems)
         path = None
+        solver = {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
+        solver |= {"tolerance": tolerance, "method": method}
         if normal_force is not None:
             from fractalcontact.joints import _elastic
 
-            solver = {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
-            solver |= {"tolerance": tolerance, "method": method}
             loads = {"normal_force": normal_force}
             path = _elastic.check_load(problems, crack, loads, bulk, keep, solver)
             if normal_stiffness is not None:
                 problems.number("normal_stiffness", normal_stiffness, above=0)
         else:
-            given = {
-                "keep": () if is_nothing(keep) else keep,
-                "normal_stiffness": normal_stiffness,
-                "bulk": bulk,
-            }
-            given |= {"influence": influence, "disc_radius": disc_radius, "hardness": hardness}
-            given |= {"tolerance": tolerance, "method": method}
+            kept = () if is_nothing(keep) else keep
+            given = {"keep": kept, "normal_stiffness": normal_stiffness, "bulk": bulk, **solver}
             for name, value in given.items():
                 usual = (dilatancy.__kwdefaults__ or {})[name]
                 unused = value is usual or (isinstance(value, type(usual)) and value == usual)
