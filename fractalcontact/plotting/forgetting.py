@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._reading import result_of, table, words
+from fractalcontact.plotting._reading import result_of, table
 from fractalcontact.plotting._units import axis_label, scale_of
-from fractalcontact.plotting.sliding import direction_look, direction_word
+from fractalcontact.plotting.sliding import directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,15 +48,14 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     lengths = data.isel(shear=0)
     ends = [table(lengths, f"decorrelation_length{end}", ("direction",)) for end in ("_low", "", "_high")]
     entries = []
-    for i, name in enumerate(words(data["direction"]) if "direction" in data.coords else [""]):
-        look = direction_look(name, i)
+    for i, (word, look) in enumerate(directions(data)):
         ax.plot(along(data["shear"].values), values[i], **look)
         low, length, high = (float(end[i]) for end in ends)
         if np.isfinite(length):
             ax.axvline(float(along(length)), color=look["color"], lw=0.7, ls=":")
         if np.isfinite(low) and np.isfinite(high):
             ax.axvspan(float(along(low)), float(along(high)), color=look["color"], alpha=0.12, lw=0)
-        entries.append(_style.line_entry(direction_word(name), **look))
+        entries.append(_style.line_entry(word, **look))
     ax.axhline(0.0, color="0.6", lw=0.6)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("correlation of the faces")

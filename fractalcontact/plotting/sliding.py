@@ -52,20 +52,18 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
     opening = table(data, "rigid_dilatancy", ("direction", "shear"))
     shear = np.atleast_1d(data["shear"].values).astype(float)
     across, along = scale_of(data["rigid_dilatancy"]), scale_of(data["shear"])
-    names = words(data["direction"]) if "direction" in data.coords else [""]
-    entries = []
+    entries, looks = [], directions(data)
     dot = "o" if shear.size == 1 else ""
-    for i, name in enumerate(names):
-        look = direction_look(name, i)
+    for i, (word, look) in enumerate(looks):
         ax.plot(along(shear), across(opening[i]), marker=dot, **look)
-        entries.append(_style.line_entry(direction_word(name), **look))
+        entries.append(_style.line_entry(word, **look))
         if "mean_slope" in data:
             slope = float(table(data, "mean_slope", ("direction",))[i])
             end = np.array([0.0, np.nanmax(shear)])
             ax.plot(along(end), across(slope * end), color=look["color"], lw=0.7, ls=":")
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel(axis_label(data["rigid_dilatancy"], across))
-    if any(names):
+    if any(word for word, _ in looks):
         _style.beside(ax, entries, title="block slides")
     if "mean_slope" in data:
         _style.beside(ax, [_style.line_entry("mean slope", lw=0.7, ls=":")], low=True)
@@ -215,10 +213,7 @@ def _friction_key(data: xr.Dataset, over: str) -> tuple[list[Any], str]:
         title, texts = load_words(data)
         colours = _style.family(len(texts))
         return [_style.line_entry(t, color=c) for t, c in zip(texts, colours, strict=True)], title
-    names = words(data["direction"]) if "direction" in data.coords else [""]
-    return [
-        _style.line_entry(direction_word(n), **direction_look(n, i)) for i, n in enumerate(names)
-    ], "block slides"
+    return [_style.line_entry(word, **look) for word, look in directions(data)], "block slides"
 
 
 def within(data: xr.Dataset, reach: float | None) -> xr.Dataset:
@@ -237,6 +232,12 @@ def one_direction(data: Any, direction: str | None) -> xr.Dataset:
     with Problems("fc.plotting") as problems:
         problems.choice("direction", direction, names)
     return dataset.isel(direction=names.index(direction)) if "direction" in dataset.dims else dataset
+
+
+def directions(data: xr.Dataset) -> list[tuple[str, dict[str, Any]]]:
+    """Return word and look of every direction of a result; of one without a name where it has none."""
+    names = words(data["direction"]) if "direction" in data.coords else [""]
+    return [(direction_word(name), direction_look(name, i)) for i, name in enumerate(names)]
 
 
 def direction_look(name: str, number: int) -> dict[str, Any]:
