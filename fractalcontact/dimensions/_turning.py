@@ -41,7 +41,8 @@ def turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] | 
         one = undefined(CONSTANT) if face.is_constant else plane()
         return Turned([one.limited() if np.isfinite(one.hurst) else one] * len(rays), None, one.note)
     means, owner = _rays.Means.of(face, rays, scales)
-    around = _compared(face, scales)
+    every = _rays.rays(None, face.plane_steps)
+    around = _compared(face, means if list(rays) == every else _rays.Means.of(face, every, scales)[0])
     level = _UNVARIED * max(means.means.max(initial=0.0), around.means.max(initial=0.0))
     varied, smooth = around.part(around.means > level), bool((around.means <= level).any())
     enough = np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > _rays.LEAST_LAGS
@@ -65,9 +66,8 @@ def turned(face: Face, rays: Sequence[_rays.Ray], scales: tuple[float, float] | 
     return Turned(estimates, *_known(isotropy, note))
 
 
-def _compared(face: Face, scales: tuple[float, float] | None) -> _rays.Means:
-    """Measure the lags by which directions are compared: differences span a third of the face at most."""
-    means, _ = _rays.Means.of(face, _rays.rays(None, face.plane_steps), scales)
+def _compared(face: Face, means: _rays.Means) -> _rays.Means:
+    """Keep the lags by which directions are compared: differences span a third of the face at most."""
     inside = np.all(2 * np.abs(means.vectors) < _COMPARED * np.array(face.shape), axis=1)
     return means.part(inside)
 
