@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,18 +9,24 @@ import numpy as np
 from fractalcontact.base.checks import Problems, rehearse
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.scenes import doubting
-from fractalcontact.scenes.given import contact_options, crack_options, read_surface, stand_in
-from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
-from fractalcontact.scenes.planning import loads_of, stages_of
+from fractalcontact.scenes.given import (
+    PRESSING,
+    contact_options,
+    crack_options,
+    joint_options,
+    read_surface,
+    stand_in,
+    steps,
+)
+from fractalcontact.scenes.grammar import JOINT_STAGES, public
+from fractalcontact.scenes.planning import stages_of
 from fractalcontact.scenes.scene import Scene
+from fractalcontact.scenes.stages import map_read, measure
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from fractalcontact.joints import Crack
-
-
-PRESSING = ("closure", "elastic_dilatancy")
 
 
 def preflight(scene: Scene) -> None:
@@ -64,40 +69,22 @@ def _rehearse(scene: Scene, face: xr.DataArray, upper: xr.DataArray | None, prob
     crack = None
     for stage in stages_of(scene):
         room, _, name = stage.name.partition("/")
-        options = None
         with _gather(problems, stage.name):
             if stage.name == "dimensions":
                 options = dict(scene.table("dimensions"))
-                rehearse(_public(room, "estimate"), face, list(scene.wanted("dimensions")), **options)
+                rehearse(public(room, "estimate"), face, list(scene.wanted("dimensions")), **options)
             elif stage.name == "contact" and not flat:
-                rehearse(_public(room, "press"), face, keep=stage.keep, **contact_options(scene))
-            elif room == "domains":
-                options = scene.options(room, name, stage_keys(room, name))
-                rehearse(_public(room, name), _empty_path(scene, face) > 0, **options)
-            elif name == "transmissivity":
-                options = scene.options("joint", name, stage_keys(room, name))
-                rehearse(_public(room, name), _empty_path(scene, face), **options)
+                rehearse(public(room, "press"), face, keep=stage.keep, **contact_options(scene))
+            elif map_read(stage):
+                one, gap = measure(stage, scene), _empty_path(scene, face)
+                rehearse(public(one.room, one.function), gap if room == "joints" else gap > 0, **one.options)
             elif room == "joints" and name in JOINT_STAGES and name != "friction":
-                if scene.table("joint").get("register", False) or (flat and name in PRESSING):
+                if scene.registers or (flat and name in PRESSING):
                     continue
                 if crack is None:
-                    crack = _public(room, "Crack")(face, upper, **crack_options(scene))
-                rehearse(_public(room, JOINT_STAGES[name]), crack, **_joint_options(scene, name, stage.keep))
-
-
-def _public(room: str, name: str) -> Any:
-    return getattr(importlib.import_module(f"fractalcontact.{room}"), name)
-
-
-def _joint_options(scene: Scene, name: str, keep: tuple[str, ...]) -> dict[str, Any]:
-    options = scene.options("joint", name, stage_keys("joints", name))
-    if name == "closure":
-        load = loads_of(scene)[0]
-        options = {key: value for key, value in options.items() if key not in LOADS or key == load}
-        options["keep"] = keep
-    if name in PRESSING and "hardness" in scene.table("material"):
-        options.setdefault("hardness", scene.table("material")["hardness"])
-    return options
+                    crack = public(room, "Crack")(face, upper, **crack_options(scene))
+                options = joint_options(scene, name) | ({"keep": stage.keep} if name == "closure" else {})
+                rehearse(public(room, JOINT_STAGES[name]), crack, **options)
 
 
 def _empty_path(scene: Scene, face: xr.DataArray) -> xr.DataArray:
@@ -105,11 +92,11 @@ def _empty_path(scene: Scene, face: xr.DataArray) -> xr.DataArray:
     from fractalcontact import surfaces
 
     whole = bool(scene.wanted("contact")) or "block" not in scene.table("joint")
-    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
+    spacing = steps(face)
     edges = np.broadcast_to(scene.table("joint").get("block", 0.0), 2)
-    cells = face.shape if whole else tuple(np.rint(edges / steps).astype(int).tolist())
+    cells = face.shape if whole else tuple(np.rint(edges / spacing).astype(int).tolist())
     wraps = [whole and "period" in face[dim].attrs for dim in ("y", "x")]
-    return surfaces.from_array(np.zeros(cells), steps, periodic=wraps).expand_dims(step=2)
+    return surfaces.from_array(np.zeros(cells), spacing, periodic=wraps).expand_dims(step=2)
 
 
 def _preflight_joint(scene: Scene, faces: dict[str, xr.DataArray], problems: Problems) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.errors import ScaleWarning
-from fractalcontact.scenes.given import contact_options
+from fractalcontact.scenes.given import contact_options, steps
 from fractalcontact.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ def warn(told: Iterable[str]) -> None:
 
 def of_the_given(scene: Scene, face: xr.DataArray) -> Iterator[str]:
     """Yield what is hardly meant in a scene and its face."""
-    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
-    squares = [np.nanmean((np.diff(face.values, axis=axis) / steps[axis]) ** 2) for axis in (0, 1)]
+    spacing = steps(face)
+    squares = [np.nanmean((np.diff(face.values, axis=axis) / spacing[axis]) ** 2) for axis in (0, 1)]
     slope = float(np.sqrt(np.sum(squares)))
     if slope > STEEP:
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
-    edges = [size * step for size, step in zip(face.shape, steps, strict=True)]
+    edges = [size * step for size, step in zip(face.shape, spacing, strict=True)]
     if scene.wanted("contact"):
         options = contact_options(scene)
         yield from _pressures("contact", options, float(np.prod(edges)), float(options["contact_modulus"]))

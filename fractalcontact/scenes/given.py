@@ -13,6 +13,8 @@ import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.scenes.grammar import LOADS, stage_keys
+from fractalcontact.scenes.planning import loads_of
 from fractalcontact.scenes.scene import Scene, Table
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 LARGE = 1 << 18  # nodes of a face that is not made twice
+PRESSING = ("closure", "elastic_dilatancy")  # stages of a joint that solve a contact
 
 
 def read_surface(table: Table, folder: Path) -> xr.DataArray:
@@ -52,8 +55,13 @@ def face_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
         shape, spacing = np.broadcast_to(table["shape"], 2), np.broadcast_to(table["spacing"], 2)
         return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
     face = read_surface(table, scene.folder)
-    steps = [float(face[dim][1] - face[dim][0]) for dim in ("y", "x")]
-    return (face.sizes["y"], face.sizes["x"]), (steps[0], steps[1])
+    return (face.sizes["y"], face.sizes["x"]), steps(face)
+
+
+def steps(face: xr.DataArray) -> tuple[float, float]:
+    """Return the spacings (y, x; m) of a face."""
+    y, x = (float(face[dim][1] - face[dim][0]) for dim in ("y", "x"))
+    return y, x
 
 
 def locate(path: str, folder: Path) -> Path:
@@ -107,3 +115,14 @@ def crack_options(scene: Scene) -> dict[str, Any]:
     material, joint = scene.table("material"), scene.table("joint")
     options = {key: material[key] for key in ("young", "poisson", "basic_friction_angle") if key in material}
     return options | ({"block": joint["block"]} if "block" in joint else {})
+
+
+def joint_options(scene: Scene, name: str) -> dict[str, Any]:
+    """Return the arguments of a stage of the joint but for its crack: a closure has one load."""
+    options = scene.options("joint", name, stage_keys("joints", name))
+    if name == "closure":
+        load = loads_of(scene)[0]
+        options = {key: value for key, value in options.items() if key not in LOADS or key == load}
+    if name in PRESSING and "hardness" in scene.table("material"):
+        options.setdefault("hardness", scene.table("material")["hardness"])
+    return options

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 READING = ("read", "sample", "channel", "units", "spacing", "level", "despike", "fill")
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
@@ -50,9 +51,15 @@ _GIVEN = {"surface", "crack", "mask", "valid", "gap", "dilatancy", "keep", "prog
 _RIGID = ("shear", "direction")
 
 
+def public(room: str, function: str) -> Callable[..., Any]:
+    """Return a public function of a room, by name."""
+    found: Callable[..., Any] = getattr(importlib.import_module(f"fractalcontact.{room}"), function)
+    return found
+
+
 def arguments(room: str, function: str) -> tuple[list[str], set[str]]:
     """Return the arguments of a public function that a scene may give, and those that it must."""
-    signature = inspect.signature(getattr(importlib.import_module(f"fractalcontact.{room}"), function))
+    signature = inspect.signature(public(room, function))
     known = {key: value for key, value in signature.parameters.items() if key not in _GIVEN}
     return list(known), {key for key, value in known.items() if value.default is value.empty}
 

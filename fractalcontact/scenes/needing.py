@@ -125,5 +125,5 @@ def _words(scene: Scene) -> Iterator[str]:
     yield from least_stages(scene)
     if "box_counts" in scene.wanted("domains"):
         yield f"domains/box_counts/{scene.table('domains').get('box_counts', {}).get('cover')}"
-    if scene.table("joint").get("register"):
+    if scene.registers:
         yield "joints/register"

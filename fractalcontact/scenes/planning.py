@@ -154,8 +154,7 @@ def _joint_stages(scene: Scene) -> list[Stage]:
     faces: tuple[str, ...] = ("surfaces",)
     stages = []
     if "upper" in scene.tables:
-        registers = bool(scene.table("joint").get("register", False))
-        reason = "an upper face is given" + (" and is to be registered" if registers else "")
+        reason = "an upper face is given" + (" and is to be registered" if scene.registers else "")
         stages.append(Stage("joints/faces", faces, reason))
         faces = ("surfaces", "joints/faces")
     needs = {

@@ -42,6 +42,11 @@ class Scene:
         """Whether figures are wanted."""
         return bool(self.table("want").get("figures", False))
 
+    @property
+    def registers(self) -> bool:
+        """Whether the faces of the joint are to be brought into mated position."""
+        return bool(self.table("joint").get("register", False))
+
     def options(self, table: str, stage: str, keys: Iterable[str]) -> dict[str, Any]:
         """Return the values of `keys` from a table, those of its sub-table `stage` first."""
         whole = self.table(table)

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.netcdf import as_dataset
-from fractalcontact.scenes.given import contact_options, crack_options, read_surface
-from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, stage_keys
-from fractalcontact.scenes.planning import loads_of
+from fractalcontact.scenes.given import contact_options, crack_options, joint_options, read_surface
+from fractalcontact.scenes.grammar import JOINT_STAGES, LOADS, public, stage_keys
 from fractalcontact.scenes.scene import Scene, Table
 
 if TYPE_CHECKING:
@@ -136,8 +135,7 @@ def work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, Work]
     """Return what is to be done for a stage, given the results and the work of those it needs."""
     room, _, name = stage.name.partition("/")
     if reads_part(stage):
-        source = works[stage.needs[0]]
-        return Work(source.parts, source.along, source.shape)
+        return works[stage.needs[0]]
     if map_read(stage):
         return Work((partial(measure(stage, scene), results[stage.needs[0]]),))
     if room == "surfaces":
@@ -220,23 +218,19 @@ def _chunks(path: Any, nodes: int, remembers: bool) -> list[Any]:
 
 def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work:
     if name == "faces":
-        registers = bool(scene.table("joint").get("register", False))
-        return Work(
-            (partial(_upper_face, scene.table("upper"), scene.folder, results["surfaces"], registers),)
-        )
-    options = scene.options("joint", name, stage_keys("joints", name))
+        part = partial(_upper_face, scene.table("upper"), scene.folder, results["surfaces"], scene.registers)
+        return Work((part,))
+    options = joint_options(scene, name)
     if name == "friction":
         own = scene.table("joint").get(name, {})
         if "nominal_pressure" not in own:  # in [joint] it is the load of the closure
             options.pop("nominal_pressure", None)
         return Work((partial(_call, "joints", name, results[stage.needs[0]], **options),))
     crack = _crack(scene, results)
-    if name in ("closure", "elastic_dilatancy") and "hardness" in scene.table("material"):
-        options.setdefault("hardness", scene.table("material")["hardness"])
     if name == "delta_surface" and name not in scene.wanted("joints"):
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
     if name == "closure":
-        return _closure_work(crack, options, loads_of(scene)[0], stage.keep)
+        return _closure_work(crack, options, stage.keep)
     if name == "elastic_dilatancy":
         directions = _several(options.pop("direction", ("E", "N", "W", "S")))
         shears = _several(options.pop("shear"))
@@ -249,8 +243,8 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Work
     return Work((partial(_call, "joints", JOINT_STAGES[name], crack, **options),))
 
 
-def _closure_work(crack: Crack, options: dict[str, Any], load: str, keep: tuple[str, ...]) -> Work:
-    options = {key: value for key, value in options.items() if key not in LOADS or key == load}
+def _closure_work(crack: Crack, options: dict[str, Any], keep: tuple[str, ...]) -> Work:
+    load = next(key for key in LOADS if key in options)
     shears, nodes = _several(options.pop("shear")), crack.layout.cells[0] * crack.layout.cells[1]
     paths = _chunks(options.pop(load), nodes, "hardness" in options)
     parts = (
@@ -285,11 +279,7 @@ def _height(results: Results) -> xr.DataArray:
 
 def _call(room: str, function: str, *arguments: Any, **options: Any) -> xr.Dataset:
     """Call a public function of a room, by name, so that a part can be sent to another process."""
-    import importlib
-
     import xarray as xr
 
-    public: Callable[..., xr.Dataset | xr.DataArray]
-    public = getattr(importlib.import_module(f"fractalcontact.{room}"), function)
-    result = public(*arguments, **options)
+    result: xr.Dataset | xr.DataArray = public(room, function)(*arguments, **options)
     return as_dataset(result) if isinstance(result, xr.DataArray) else result

@@ -159,6 +159,6 @@ class Study:
 def _sooner_again(stage: Stage, scene: Scene) -> bool:
     """Whether a face is made, or read from its own file, as soon as from a kept one."""
     table = scene.table("surface" if stage.name == "surfaces" else "upper")
-    registers = stage.name == "joints/faces" and scene.table("joint").get("register")
+    registers = stage.name == "joints/faces" and scene.registers
     is_face = stage.name in ("surfaces", "joints/faces")
     return is_face and not (registers or table.get("despike") or table.get("fill"))
