@@ -126,7 +126,7 @@ def cases_table(findings: Mapping[str, Sequence[Finding]]) -> str:
             (
                 name,
                 one.name,
-                "" if one.expected is None else _expectation(one.expected),
+                _expectation(one.expected),
                 _outcome(one)[:60],
                 "" if np.isnan(one.error) else f"{one.error:.1e}",
                 f"{one.run_time:.3f}",
@@ -150,7 +150,7 @@ def cases_dataset(findings: Mapping[str, Sequence[Finding]]) -> xr.Dataset:
     columns = {
         "case": [case for case, _ in all_of],
         "quantity": [one.name for _, one in all_of],
-        "expectation": ["" if one.expected is None else _expectation(one.expected) for _, one in all_of],
+        "expectation": [_expectation(one.expected) for _, one in all_of],
         "outcome": [_outcome(one) for _, one in all_of],
         "value": [np.nan if isinstance(one.got, str) else one.got for _, one in all_of],
         "error": [one.error for _, one in all_of],
@@ -169,7 +169,7 @@ def worst_rows(findings: Mapping[str, Sequence[Finding]]) -> list[tuple[str, ...
     for name, found in findings.items():
         worst = max(found, key=lambda one: (not one.ok, np.nan_to_num(one.error, nan=-1.0)))
         got = _outcome(worst)
-        expected = "finite or explained" if worst.expected is None else _expectation(worst.expected)
+        expected = _expectation(worst.expected) or "finite or explained"
         error = "" if np.isnan(worst.error) else f"{worst.error:.1e}"
         rows.append(
             (
@@ -189,6 +189,8 @@ def _outcome(finding: Finding) -> str:
 
 
 def _expectation(expected: object) -> str:
+    if expected is None:
+        return ""
     if isinstance(expected, tuple):
         return f"{expected[0]:g} ... {expected[1]:g}"
     return expected if isinstance(expected, str) else f"{expected:g}"

@@ -98,8 +98,9 @@ class Problems:
     ) -> float:
         """One finite real number inside the given bounds."""
         values = self.numbers(argument, value, above=above, at_least=at_least, below=below, at_most=at_most)
-        if values.size != 1 or np.ndim(value) > 0:
-            if np.ndim(value) > 0:
+        axes = axes_of(value)
+        if values.size != 1 or axes != 0:
+            if axes != 0:
                 self.add(argument, "one number", value)
             return 1.0
         return float(values[0])
@@ -162,7 +163,7 @@ class Problems:
         """One word or a sequence of words, each of them allowed, without repetition."""
         words = tuple(allowed)
         given = (value,) if isinstance(value, str) else value
-        if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) == 0:
+        if not isinstance(given, (Sequence, np.ndarray)) or axes_of(given) != 1:
             self.add(argument, f"a sequence out of {', '.join(map(repr, words))}", value)
             return words[:1]
         for word in given:
@@ -184,6 +185,14 @@ class Problems:
         missing = values.size - int(np.count_nonzero(np.isfinite(values)))
         expected = "finite values" + (f" ({remedy})" if remedy else "")
         return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
+
+
+def axes_of(value: Any) -> int | None:
+    """Return how many axes a value has, 0 for one alone; None for a sequence whose rows are not alike."""
+    try:
+        return np.ndim(value)
+    except ValueError:
+        return None
 
 
 def meant(word: object, words: Iterable[str]) -> str:

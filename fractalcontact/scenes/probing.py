@@ -30,13 +30,13 @@ def main(folder: Path) -> None:
     task = pickle.loads((folder / TASK).read_bytes())
     for name in task["libraries"]:
         importlib.import_module(name)
-    found = {"libraries": libraries(), "memory": most_memory() - held}
+    found = {}
     if task["scene"] is not None:
         leave_dask()
-        found |= _run(task["scene"], folder / "first")
-        found |= {"libraries": libraries(), "memory": most_memory() - held, "kernels": dict(kernels())}
-        if task["traced"]:
-            found["array_memory"] = _traced(task["scene"], folder / "second")
+        found = _run(task["scene"], folder / "first")
+    found |= {"libraries": libraries(), "memory": most_memory() - held, "kernels": dict(kernels())}
+    if task["traced"]:
+        found["array_memory"] = _traced(task["scene"], folder / "second")
     (folder / FOUND).write_text(json.dumps(found), encoding="utf-8")
 
 
@@ -74,13 +74,13 @@ def _run(scene: Any, out: Path) -> dict[str, Any]:
     tree = run(scene, out=out, progress=False)
     seconds, after = time.process_time() - start, written()
     variables = [
-        (node.path, str(name), variable)
+        (str(name), variable)
         for node in tree.subtree
         for name, variable in node.to_dataset(inherit=False).variables.items()
     ]
     seen: set[tuple[str, bytes]] = set()
     repeated = 0
-    for _, name, variable in variables:
+    for name, variable in variables:
         content = (name, variable.values.tobytes())
         repeated += variable.nbytes if content in seen else 0
         seen.add(content)
@@ -88,7 +88,7 @@ def _run(scene: Any, out: Path) -> dict[str, Any]:
         "cpu": seconds,
         "written": None if before is None or after is None else after - before,
         "files": sum(file.stat().st_size for file in out.rglob("*") if file.is_file()),
-        "result": sum(variable.nbytes for _, _, variable in variables),
+        "result": sum(variable.nbytes for _, variable in variables),
         "repeated": repeated,
         "stages": {
             name: facts["run_time"] for name, facts in json.loads(tree.attrs["provenance"])["stages"].items()

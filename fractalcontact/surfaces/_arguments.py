@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base import provenance, rng, schema
-from fractalcontact.base.checks import Problems
+from fractalcontact.base.checks import Problems, axes_of
 from fractalcontact.base.grid import plane_coords
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def plane_shape(
     if (
         not isinstance(sizes, (Sequence, np.ndarray))
         or isinstance(sizes, str)
-        or np.ndim(sizes) != 1
+        or axes_of(sizes) != 1
         or len(sizes) not in lengths
     ):
         problems.add("shape", "(ny, nx)" + (" or the length of a profile" if profile else ""), shape)

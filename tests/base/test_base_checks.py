@@ -85,6 +85,15 @@ def test_bad_input_errors_are_value_errors_and_a_missing_extra_names_itself():
     assert "fractalcontact[io]" in str(error)
 
 
+def test_a_sequence_of_unlike_rows_is_refused_in_words():
+    with pytest.raises(InvalidInput) as caught, Problems("somewhere") as problems:
+        problems.number("young", [1.0, [2.0]])
+        problems.numbers("loads", [1.0, [2.0]])
+        problems.words("keep", ["gap", ["state"]], ("gap", "state"))
+    told = "\n".join(caught.value.problems)
+    assert all(f"{name}: expected" in told for name in ("young", "loads", "keep"))
+
+
 def every_kind(base):
     return [base, *(kind for derived in base.__subclasses__() for kind in every_kind(derived))]
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from study import command
+from study import SOUND, command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError
@@ -14,29 +14,17 @@ from fractalcontact.scenes import grammar, needing
 from fractalcontact.scenes.planning import stages_of
 from fractalcontact.scenes.weighing import footprint, lean_table, waste
 
-GIVEN = """
-[surface]
-generate = "fbm"
-shape = [48, 48]
-spacing = 1e-4
-hurst = 0.8
-rms_increment = 4e-6
-rng = 5
+GIVEN = (
+    SOUND.partition("[want]")[0].replace("shear = [", "shear = [0.0, ")
+    + """
 [contact]
 nominal_pressure = [1e5, 1e6]
-[material]
-young = 30e9
-poisson = 0.2
-[joint]
-block = 2.4e-3
-direction = "W"
-shear = [0.0, 1e-4, 4e-4]
-normal_force = [1.0, 10.0]
 [domains.generalised_dimensions]
 q = [0.0, 2.0]
 [want]
 ROOM = ["WORD"]
 """
+)
 WORDS = {
     f"{room}/{word}": GIVEN.replace("ROOM", room).replace("WORD", word)
     for room, words in (

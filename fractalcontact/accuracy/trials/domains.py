@@ -166,12 +166,10 @@ def _dust_error(found: float, _: float) -> float:
 
 
 def _resolutions(n: float) -> list[xr.DataArray]:
-    import xarray as xr
-
     masks = []
     for size in (int(n) // 9, int(n) // 3, int(n)):
         places = (np.arange(size) + 0.5) / size
-        masks.append(xr.DataArray(_carpet(size).values, dims=("y", "x"), coords={"y": places, "x": places}))
+        masks.append(_carpet(size).assign_coords(y=places, x=places))
     return masks
 
 
