@@ -18,7 +18,7 @@ from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.memory import leave_dask
-from fractalcontact.base.stopping import Stop, Stopped, leaving, noted
+from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
 MADE = 10_000  # objects between two searches for cycles; with Python's 700 they take a twentieth of a study

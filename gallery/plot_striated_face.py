@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 import fractalcontact as fc
 
 
-def cut(stretch):
+def cut(anisotropy_ratio):
     """Every fourth point: the waves of a face without edges, shorter ones among them."""
     whole = fc.surfaces.spectral(
-        (1024, 1024), 1e-5, hurst=0.7, rms_height=2e-5, stretch=stretch, rotation=30.0, rng=1
+        (1024, 1024), 1e-5, hurst=0.7, rms_height=2e-5, anisotropy_ratio=anisotropy_ratio, azimuth=30.0, rng=1
     )
     return fc.surfaces.from_array(whole.values[:800:4, :800:4], 4e-5)
 
@@ -26,13 +26,13 @@ found = {name: fc.dimensions.directions(face) for name, face in faces.items()}
 print(found["stretched"])
 
 # %%
-# The test of isotropy, and the stretch with its interval.
+# The test of isotropy, and the anisotropy_ratio with its interval.
 
 for name, one in found.items():
     print(
-        f"{name}: p = {float(one.isotropy_p_value):.2g}, stretch {float(one.stretch):.2f} "
-        f"({float(one.stretch_low):.2f} to {float(one.stretch_high):.2f}) "
-        f"along {float(one.stretch_azimuth):.0f} degrees"
+        f"{name}: p = {float(one.isotropy_p_value):.2g}, anisotropy_ratio {float(one.anisotropy_ratio):.2f} "
+        f"({float(one.anisotropy_ratio_low):.2f} to {float(one.anisotropy_ratio_high):.2f}) "
+        f"along {float(one.anisotropy_azimuth):.0f} degrees"
     )
 
 # %%

@@ -30,9 +30,9 @@ for hurst in (0.8, 0.3):
     state = fc.contact.press(face(hurst), contact_modulus=MODULUS, nominal_pressure=pressure)["state"]
     every, small = (fc.domains.box_dimension(state, scales=2 ** np.arange(k)) for k in (9, 6))
     counted[hurst] = fc.domains.box_dimension(state)
-    columns = [every.coverage, every.box_dimension, every.dust_dimension, small.box_dimension]
+    columns = [every.coverage, every.box_dimension, every.null_dimension, small.box_dimension]
     print(f"H = {hurst}: coverage, all boxes, dust, boxes to 32 cells, dust")
-    print(np.array([*columns, small.dust_dimension]).T.round(3))
+    print(np.array([*columns, small.null_dimension]).T.round(3))
 
 print(counted[0.8])
 smooth = fc.plotting.box_dimension(counted[0.8])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from fractalcontact.accuracy.trials.trial import Contest, Experiment
-    from fractalcontact.base.stopping import Stop
+    from fractalcontact.base.signals import Stop
 
 WHERE = "fractalcontact.accuracy.measure"
 PARTS = ("surfaces", "dimensions", "contact", "domains", "joints")
@@ -51,7 +51,7 @@ def measure(
     progress : bool
         Show a bar.
     stop : Stop, optional
-        Asked before each setting (`fractalcontact.base.stopping.noted`): once it is true, what there is by
+        Asked before each setting (`fractalcontact.base.signals.noted`): once it is true, what there is by
         then is returned, and the attribute `completeness` names the methods that are missing.
 
     Returns

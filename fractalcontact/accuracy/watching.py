@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import LONGEST, Finding, examine
 from fractalcontact.base.progress import track
-from fractalcontact.base.stopping import Stop
+from fractalcontact.base.signals import Stop
 
 K = TypeVar("K")
 V = TypeVar("V")

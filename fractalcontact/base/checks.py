@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base import validation
 from fractalcontact.base.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def rehearse(function: Callable[..., Any], *arguments: Any, **options: Any) -> N
         _depth.reset(depth)
 
 
-class Problems:
+class Problems(validation.Problems):
     """Collects what is wrong with a call; raises it all on leaving the `with` block."""
 
     def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
@@ -86,7 +87,7 @@ class Problems:
             self.add(argument, expected, got)
         return bool(condition)
 
-    def number(
+    def number(  # type: ignore[override]
         self,
         argument: str,
         value: Any,
@@ -105,7 +106,7 @@ class Problems:
             return 1.0
         return float(values[0])
 
-    def numbers(
+    def numbers(  # type: ignore[override]
         self,
         argument: str,
         value: Any,
@@ -139,7 +140,7 @@ class Problems:
             self.add(argument, expected, values[~good][0] if values.size > 1 else values[0])
         return np.where(good, values, _stand_in(above, at_least, below, at_most))
 
-    def integer(
+    def integer(  # type: ignore[override]
         self, argument: str, value: Any, *, at_least: int | None = None, at_most: int | None = None
     ) -> int:
         """One whole number inside the given bounds."""
@@ -151,7 +152,7 @@ class Problems:
             return at_least if at_least is not None else 1
         return int(value)
 
-    def choice(self, argument: str, value: Any, allowed: Iterable[str]) -> Any:
+    def choice(self, argument: str, value: Any, allowed: Iterable[str]) -> Any:  # type: ignore[override]
         """One of the allowed words; the first of them stands in for a wrong one."""
         words = tuple(allowed)
         if not isinstance(value, str) or value not in words:
@@ -159,7 +160,7 @@ class Problems:
             return words[0]
         return value
 
-    def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> tuple[str, ...]:
+    def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> tuple[str, ...]:  # type: ignore[override]
         """One word or a sequence of words, each of them allowed, without repetition."""
         words = tuple(allowed)
         given = (value,) if isinstance(value, str) else value
@@ -171,7 +172,7 @@ class Problems:
             self.require(word in words, argument, allowed_words, word)
         return tuple(dict.fromkeys(str(word) for word in given if word in words))
 
-    def exactly_one(self, **options: object) -> str:
+    def exactly_one(self, **options: object) -> str:  # type: ignore[override]
         """Return the one option that is not None."""
         given = [name for name, value in options.items() if value is not None]
         if len(given) != 1:

@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fractalcontact.base.checks import Problems
+    from fractalcontact.base.validation import Problems
 
 UNIFORM = 1e-6  # largest departure of a centre from its place, in spacings
 DECADES = 100  # lengths between 1e-100 and 1e100 m have squares and cubes that are numbers
@@ -102,6 +102,32 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
         )
     wraps = period is not None and abs(float(period) - n * spacing) <= UNIFORM * float(period)
     return spacing, wraps
+
+
+def read_grid(array: xr.DataArray, dims: Sequence[str] = ("y", "x")) -> Grid:
+    """Return the grid of an array whose `dims` passed `Problems.surface` or `Problems.grid`."""
+    spacing, periodic = [], []
+    for dim in dims:
+        coordinate = array.coords[dim]
+        n, period = coordinate.size, coordinate.attrs.get("period")
+        if n < 2:  # one point along the axis: its extent is the period
+            spacing.append(float(period))
+            periodic.append(True)
+            continue
+        step = float(coordinate[-1] - coordinate[0]) / (n - 1)
+        spacing.append(step)
+        periodic.append(period is not None and abs(float(period) - n * step) <= UNIFORM * float(period))
+    return Grid(tuple(int(array.sizes[dim]) for dim in dims), tuple(spacing), tuple(periodic))
+
+
+def periodic_axes(given: bool | None, grid: Grid, *, whole: bool = False) -> tuple[bool, ...]:
+    """Return which axes wrap: as the axes say for None, otherwise as given (see `Problems.periodic`).
+
+    With `whole`, None means periodic only where all axes are.
+    """
+    if given is None:
+        return (all(grid.periodic),) * len(grid.shape) if whole else grid.periodic
+    return (bool(given),) * len(grid.shape)
 
 
 METRES = ("m", "meter", "metre", "meters", "metres")

@@ -108,11 +108,17 @@ QUANTITIES: dict[str, Quantity] = {
     "noise_height": Quantity("m", "root mean square height of white measurement noise"),
     "topothesy": Quantity("m", "topothesy: lag at which the rms increment equals the lag"),
     "isotropy_p_value": Quantity("1", "chance of an isotropic surface to differ as much between directions"),
-    "stretch": Quantity("1", "ratio of the lengths of correlation along and across the stretch"),
-    "stretch_low": Quantity("1", "lower end of the 95 % confidence interval of the stretch", _NO_INTERVAL),
-    "stretch_high": Quantity("1", "upper end of the 95 % confidence interval of the stretch", _NO_INTERVAL),
-    "stretch_azimuth": Quantity("degree", "azimuth of the longer correlation (E = 0, anticlockwise)"),
-    "stretch_p_value": Quantity("1", "chance of a stretched surface to differ as much beyond its stretch"),
+    "anisotropy_ratio": Quantity("1", "ratio of the longest to the shortest correlation length"),
+    "anisotropy_ratio_low": Quantity(
+        "1", "lower end of the 95 % confidence interval of the anisotropy ratio", _NO_INTERVAL
+    ),
+    "anisotropy_ratio_high": Quantity(
+        "1", "upper end of the 95 % confidence interval of the anisotropy ratio", _NO_INTERVAL
+    ),
+    "anisotropy_azimuth": Quantity("degree", "azimuth of the longer correlation (E = 0, anticlockwise)"),
+    "anisotropy_p_value": Quantity(
+        "1", "chance of an elliptic anisotropy to differ as much beyond its ratio"
+    ),
     "run_time": Quantity("s", "run time"),
     "wavenumber": Quantity("rad m-1", "wavenumber"),
     "wavelength": Quantity("m", "wavelength"),
@@ -227,15 +233,15 @@ QUANTITIES: dict[str, Quantity] = {
     "box_count": Quantity("1", "number of boxes that meet the set"),
     "box_measure": Quantity("1", "number of boxes that meet the set, by their part inside the mask"),
     "box_dimension": Quantity("1", "box dimension of the set"),
-    "dust_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
-    "dust_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
+    "null_dimension": Quantity("1", "box dimension of a random dust of equal coverage"),
+    "null_spread": Quantity("1", "standard deviation of the box dimension of the dust"),
     "box_local_slope": Quantity("1", "local box dimension, -d ln(box_measure)/d ln(box_size)"),
     "minkowski_local_slope": Quantity("1", "local Minkowski dimension, 2 - d ln(area)/d ln(radius)"),
     "correlation_local_slope": Quantity("1", "local correlation dimension, d ln(mean_mass)/d ln(box_size)"),
-    "minkowski_dust_dimension": Quantity("1", "Minkowski dimension of a random dust of equal coverage"),
-    "correlation_dust_dimension": Quantity("1", "correlation dimension of a random dust of equal coverage"),
-    "dust_count": Quantity("1", "number of boxes that meet a random dust of equal coverage"),
-    "differs_from_dust": Quantity("1", "the set differs from a random dust of equal coverage"),
+    "minkowski_null_dimension": Quantity("1", "Minkowski dimension of a random dust of equal coverage"),
+    "correlation_null_dimension": Quantity("1", "correlation dimension of a random dust of equal coverage"),
+    "null_count": Quantity("1", "number of boxes that meet a random dust of equal coverage"),
+    "differs_from_random": Quantity("1", "the set differs from a random dust of equal coverage"),
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
     "minkowski_dimension": Quantity("1", "Minkowski dimension of the set"),
     "minkowski_dimension_low": Quantity(
@@ -247,7 +253,7 @@ QUANTITIES: dict[str, Quantity] = {
     "radius": Quantity("1", "radius by which the set is grown, in cells"),
     "radius_length": Quantity("m", "radius by which the set is grown"),
     "grown_fraction": Quantity("1", "area within the radius of the set over that observed"),
-    "dust_fraction": Quantity("1", "area within the radius of a random dust over that observed"),
+    "null_fraction": Quantity("1", "area within the radius of a random dust over that observed"),
     "correlation_dimension": Quantity("1", "correlation dimension of the set"),
     "correlation_dimension_low": Quantity(
         "1", "lower end of the interval of the correlation dimension", _NO_INTERVAL
@@ -256,15 +262,15 @@ QUANTITIES: dict[str, Quantity] = {
         "1", "upper end of the interval of the correlation dimension", _NO_INTERVAL
     ),
     "mean_mass": Quantity("1", "mean number of cells of the set in a square about one of them"),
-    "dust_mass": Quantity("1", "mean number of cells of a random dust in a square about one of them"),
+    "null_mass": Quantity("1", "mean number of cells of a random dust in a square about one of them"),
     "lacunarity": Quantity("1", "gliding-box lacunarity"),
-    "dust_lacunarity": Quantity("1", "lacunarity of a random dust of equal coverage"),
+    "null_lacunarity": Quantity("1", "lacunarity of a random dust of equal coverage"),
     "relative_lacunarity": Quantity("1", "lacunarity over that of a random dust of equal coverage"),
     "normalised_lacunarity": Quantity("1", "lacunarity less 1 over that of single cells less 1"),
     "lacunarity_slope": Quantity("1", "slope of ln lacunarity over ln box size"),
     "lacunarity_area": Quantity("1", "integral of ln lacunarity over ln box size"),
-    "dust_lacunarity_slope": Quantity("1", "slope of ln lacunarity over ln box size of a random dust"),
-    "dust_lacunarity_area": Quantity("1", "integral of ln lacunarity over ln box size of a random dust"),
+    "null_lacunarity_slope": Quantity("1", "slope of ln lacunarity over ln box size of a random dust"),
+    "null_lacunarity_area": Quantity("1", "integral of ln lacunarity over ln box size of a random dust"),
     "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension", _NO_INTERVAL),
     "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension", _NO_INTERVAL),
     "boundary_dimension_low": Quantity(
@@ -383,7 +389,10 @@ QUANTITIES: dict[str, Quantity] = {
 T = TypeVar("T", "xr.Dataset", "xr.DataArray")
 
 
-def label(data: T) -> T:
+NOTES = ("long_name", "comment", "reason")
+
+
+def label(data: T, *, keep_notes: bool = False) -> T:
     """Return `data` with the labels of this table; nothing else is kept but the period of an axis.
 
     Parameters
@@ -391,6 +400,8 @@ def label(data: T) -> T:
     data : Dataset or DataArray
         Every variable and coordinate is known to the table; a DataArray by its `name`. The coordinate of a
         dim may have a name of the user's own: it keeps its own units and meaning.
+    keep_notes : bool
+        Keep the attributes `long_name`, `comment` and `reason` of the variables of a Dataset.
 
     Returns
     -------
@@ -410,7 +421,9 @@ def label(data: T) -> T:
             _label_variable(str(name), coordinate.variable, is_coordinate=True)
     if hasattr(data, "data_vars"):
         for name, variable in data.data_vars.items():
+            notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}
             _label_variable(str(name), variable.variable, is_coordinate=False)
+            variable.variable.attrs.update(notes)
     else:
         _label_variable(str(data.name), data.variable, is_coordinate=False)
     return data

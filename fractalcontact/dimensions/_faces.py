@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import Grid, check_surface
-from fractalcontact.base.inheritance import check_leading
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base import schema
-from fractalcontact.base.inheritance import leading_coords
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.provenance import PAPER, stamp
 from fractalcontact.dimensions._faces import Face
 from fractalcontact.dimensions._measures import Curve

@@ -12,7 +12,7 @@ import numpy as np
 
 from fractalcontact.base import schema
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.inheritance import leading_coords
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.dimensions._faces import Face, read_faces, read_scales
 

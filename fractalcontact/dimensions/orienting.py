@@ -10,7 +10,7 @@ import numpy as np
 
 from fractalcontact.base import schema
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.inheritance import leading_coords
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.dimensions import _rays
 from fractalcontact.dimensions._faces import read_faces, read_scales
@@ -60,13 +60,14 @@ def directions(
         and the lag at which it equals the lag (m).
         isotropy_p_value : how likely an isotropic surface shows as much of a difference between directions.
         Below .05 the face is told from an isotropic one, at that risk of an error.
-        stretch, stretch_low, stretch_high, stretch_azimuth : correlations are `stretch` times as long along
-        `stretch_azimuth` as across it (`fractalcontact.surfaces.spectral` names them so), with its 95 %
+        anisotropy_ratio, anisotropy_ratio_low, anisotropy_ratio_high, anisotropy_azimuth :
+        correlations are `anisotropy_ratio` times as long along
+        `anisotropy_azimuth` as across it (`fractalcontact.surfaces.spectral` names them so), with its 95 %
         interval; the azimuth means nothing where that begins at 1. NaN where the exponent (of a periodic
         face: one more) is below .05 or within three standard errors of 0, for heights without correlation
         have no stretch; where ridges run on (the azimuth is then theirs); and where a face is smoother than
         a fractal one.
-        stretch_p_value : how likely a stretch of an isotropic surface shows as much of a difference beyond
+        anisotropy_p_value : how likely a stretch of an isotropic surface shows as much of a difference beyond
         the stretch. A small one tells two exponents, ridges, or a sum f(x) + g(y).
         The attribute `reason` of each of these and of hurst, and the attribute `not_given` of ci_low and
         ci_high, say why a number is missing.
@@ -82,8 +83,8 @@ def directions(
     along each direction; `azimuth` is that of the nearest direction of the lattice, and the interval is that
     of a stretched fractional Brownian surface, edges and gaps counted. Where the exponent changes with the
     lag, the interval also holds those of the shorter and of the longer lags; where no stretch explains the
-    face (`stretch_p_value` below .001), or ridges run on, there is none. A periodic face is measured by the
-    waves of its band that run within 11 degrees of the direction: where two exponents H_x and H_y were built
+    face (`anisotropy_p_value` below .001), or ridges run on, there is none. A periodic face is measured by
+    the waves of its band that run within 11 degrees of the direction: where two exponents H_x and H_y were built
     in, with the harmonic mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
 
     Tests: of a periodic face, the modes over the mean of their ring of wavevectors are held against the
@@ -174,11 +175,11 @@ def directions(
 
 _OVERALL = {
     "isotropy_p_value": "p_value",
-    "stretch": "stretch",
-    "stretch_low": "low",
-    "stretch_high": "high",
-    "stretch_azimuth": "azimuth",
-    "stretch_p_value": "stretched_p_value",
+    "anisotropy_ratio": "stretch",
+    "anisotropy_ratio_low": "low",
+    "anisotropy_ratio_high": "high",
+    "anisotropy_azimuth": "azimuth",
+    "anisotropy_p_value": "stretched_p_value",
 }
 _RESULTS = (*_ALONG, *_OVERALL, "topothesy", "run_time", "azimuth", "increment_lag")
 

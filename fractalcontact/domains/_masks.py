@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, grid_of, resolve_periodic
-from fractalcontact.base.inheritance import leading_coords
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, label
 from fractalcontact.base.threads import thread_count
 

@@ -104,7 +104,7 @@ def _pairs(plane: Array, grid: Grid, reach: int) -> Array:
     return np.asarray(pairs[np.ix_(lags % shape[0], lags % shape[1])])
 
 
-def dust_mass(cells: float, observed: float, sizes: Array) -> Array:
+def null_mass(cells: float, observed: float, sizes: Array) -> Array:
     """Return the mean mass about a cell of a dust of as many cells; see `mean_mass`."""
     if cells < 1:
         return np.full(sizes.size, np.nan)
@@ -138,7 +138,7 @@ def notes(name: str, known: Array, scales: int, what: str) -> dict[str, dict[str
         "ci_high": {"long_name": f"upper end of the {interval}"},
         "scale_min": {"units": "1", "long_name": f"smallest {what} of the fit, in cells"},
         "scale_max": {"units": "1", "long_name": f"largest {what} of the fit, in cells"},
-        "dust_dimension": {"long_name": f"{words} of a random dust of equal coverage"},
+        "null_dimension": {"long_name": f"{words} of a random dust of equal coverage"},
     }
     if scales < 2:
         found[name] = {"comment": "NaN: one scale gives no slope"}

@@ -60,13 +60,13 @@ def box_dimension(
         sizes, and a part of what the fewest boxes and their mean differ by (NaN where fewer than two slopes
         speak); `scale_min`, `scale_max` (cells);
         `coverage`;
-        `dust_dimension`, the same fit to the expected counts of as many cells thrown at random, with the
-        standard deviation `dust_spread` from dust to dust; `differs_from_dust`, whether the mean counts at
+        `null_dimension`, the same fit to the expected counts of as many cells thrown at random, with the
+        standard deviation `null_spread` from dust to dust; `differs_from_random`, whether the mean counts at
         sizes 2 to 4 are out of reach for a dust. Over `box_size` (cells) too, with `box_length` (m, the
         side of a square as large as the box): `box_count`, of whole boxes; `box_measure`, where a box cut
         by the edge of the mask counts by its part inside if the set runs on into the next box, so that a
         full mask has exactly n/s boxes along an axis; `local_slope`, -d ln(box_measure)/d ln(box_size);
-        `dust_count`. Exactly 0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask.
+        `null_count`. Exactly 0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask.
 
     Raises
     ------
@@ -102,11 +102,11 @@ def box_dimension(
         "scale_min": planes.variable(np.where(known, sizes.min(), np.nan)),
         "scale_max": planes.variable(np.where(known, sizes.max(), np.nan)),
         "coverage": planes.variable(planes.coverage),
-        **{name: planes.variable(values) for name, values in null.items() if name != "dust_count"},
+        **{name: planes.variable(values) for name, values in null.items() if name != "null_count"},
         "box_count": planes.variable(found.count, "box_size"),
         "box_measure": planes.variable(found.measure, "box_size"),
         "local_slope": planes.variable(0.0 - local_slope(sizes, found.measure), "box_size"),
-        "dust_count": planes.variable(null["dust_count"], "box_size"),
+        "null_count": planes.variable(null["null_count"], "box_size"),
         "run_time": ((), time.perf_counter() - begin),
     }
     notes = _notes(known, sizes, chosen=scales is not None)
@@ -220,10 +220,10 @@ def _null(planes: Planes, sizes: Array, *, chosen: bool) -> dict[str, Array]:
         rows.append((fit.dimension, deviation, other))
     dimension, deviation, other = np.array(rows, float).T
     return {
-        "dust_count": np.array(counts),
-        "dust_dimension": dimension,
-        "dust_spread": deviation,
-        "differs_from_dust": other.astype(bool),
+        "null_count": np.array(counts),
+        "null_dimension": dimension,
+        "null_spread": deviation,
+        "differs_from_random": other.astype(bool),
     }
 
 

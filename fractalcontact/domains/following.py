@@ -67,9 +67,9 @@ def evolution(
         `hysteresis`, 1 less common over united area; `coverage_change`.
 
         `coverage`, and what else is wanted: the scalars of `describe`, and the curves `box_count`,
-        `box_measure`, `dust_count`, `box_local_slope`, `mean_mass`, `dust_mass`, `correlation_local_slope`,
-        `lacunarity`, `dust_lacunarity`, `relative_lacunarity`, `normalised_lacunarity` over `box_size`
-        (cells; the sizes of all of them, NaN where a curve has no value), `grown_fraction`, `dust_fraction`,
+        `box_measure`, `null_count`, `box_local_slope`, `mean_mass`, `null_mass`, `correlation_local_slope`,
+        `lacunarity`, `null_lacunarity`, `relative_lacunarity`, `normalised_lacunarity` over `box_size`
+        (cells; the sizes of all of them, NaN where a curve has no value), `grown_fraction`, `null_fraction`,
         `minkowski_local_slope` over `radius`. `lineage` tells the fate of every single island.
 
     Raises

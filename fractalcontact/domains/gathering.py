@@ -105,7 +105,7 @@ def _renamed(name: str, key: str) -> str:
     if key in ("ci_low", "ci_high"):
         return f"{name}_{key.removeprefix('ci_')}"
     kind = name.removesuffix("_dimension")
-    if key == "local_slope" or (key == "dust_dimension" and kind != "box"):
+    if key == "local_slope" or (key == "null_dimension" and kind != "box"):
         return f"{kind}_{key}"
     return key
 

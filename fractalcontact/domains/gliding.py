@@ -56,13 +56,13 @@ def lacunarity(
     -------
     Dataset
         Over the leading dims of the mask and `box_size` (cells; `box_length` in m, the side of a square as
-        large as the box): `lacunarity`; `dust_lacunarity`, 1 + (1 - p) / (p r^2) for cells set independently
+        large as the box): `lacunarity`; `null_lacunarity`, 1 + (1 - p) / (p r^2) for cells set independently
         with the coverage p as probability; `relative_lacunarity`, over that of the dust;
         `normalised_lacunarity`, (lacunarity - 1) p / (1 - p), which is 1 at one cell whatever the coverage.
         Over the leading dims: `coverage`, and the whole curve as one number: `lacunarity_slope`, the
         least-squares slope of ln lacunarity over ln r (D - 2 for a power law), `lacunarity_area`, the
-        integral of ln lacunarity over ln r (0 for an even set), with `dust_lacunarity_slope` and
-        `dust_lacunarity_area`.
+        integral of ln lacunarity over ln r (0 for an even set), with `null_lacunarity_slope` and
+        `null_lacunarity_area`.
 
     Raises
     ------
@@ -88,11 +88,11 @@ def lacunarity(
     variables = {
         "coverage": planes.variable(planes.coverage),
         "lacunarity": planes.variable(values, "box_size"),
-        "dust_lacunarity": planes.variable(dust, "box_size"),
+        "null_lacunarity": planes.variable(dust, "box_size"),
         "relative_lacunarity": planes.variable(values / dust, "box_size"),
         "normalised_lacunarity": planes.variable(_gliding.normalised(planes.coverage, values), "box_size"),
         **{f"lacunarity_{name}": planes.variable(one) for name, one in numbers},
-        **{f"dust_lacunarity_{name}": planes.variable(one) for name, one in null},
+        **{f"null_lacunarity_{name}": planes.variable(one) for name, one in null},
         "run_time": ((), time.perf_counter() - begin),
     }
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
@@ -128,5 +128,5 @@ def _notes(planes: Planes, values: Array, boxes: str) -> dict[str, dict[str, str
         notes["normalised_lacunarity"] = {"comment": "NaN where the set is full or empty: it has no odds"}
     if values.shape[-1] < 2:
         single = {"comment": "NaN: one size of box gives no curve"}
-        notes |= {f"{kind}lacunarity_{name}": single for kind in ("", "dust_") for name in ("slope", "area")}
+        notes |= {f"{kind}lacunarity_{name}": single for kind in ("", "null_") for name in ("slope", "area")}
     return notes

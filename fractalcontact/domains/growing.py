@@ -50,9 +50,9 @@ def minkowski_dimension(
         Over the leading dims of the mask: `minkowski_dimension`, 2 less the least-squares slope of ln area
         over ln radius, all radii alike; `ci_low` and `ci_high`, 2.5 standard deviations of the local slopes
         to either side (NaN for two radii); `scale_min`, `scale_max` (cells, the shortest and the longest
-        radius); `coverage`; `dust_dimension`, the same of as many cells thrown at random, far from any edge.
+        radius); `coverage`; `null_dimension`, the same of as many cells thrown at random, far from any edge.
         Over `radius` (cells; `radius_length` in m) too: `grown_fraction`, the area within the
-        radius over that observed; `local_slope`, 2 - d ln(area)/d ln(radius); `dust_fraction`.
+        radius over that observed; `local_slope`, 2 - d ln(area)/d ln(radius); `null_fraction`.
 
     Raises
     ------
@@ -93,10 +93,10 @@ def minkowski_dimension(
         "scale_min": planes.variable(np.where(known, chosen.min(), np.nan)),
         "scale_max": planes.variable(np.where(known, chosen.max(), np.nan)),
         "coverage": planes.variable(planes.coverage),
-        "dust_dimension": planes.variable(_neighbours.fit(chosen, dust, -1.0)[0]),
+        "null_dimension": planes.variable(_neighbours.fit(chosen, dust, -1.0)[0]),
         "grown_fraction": planes.variable(area / observed, "radius"),
         "local_slope": planes.variable(2.0 - local_slope(chosen, area), "radius"),
-        "dust_fraction": planes.variable(dust / observed, "radius"),
+        "null_fraction": planes.variable(dust / observed, "radius"),
         "run_time": ((), time.perf_counter() - begin),
     }
     coords = {"radius": ("radius", chosen), "radius_length": ("radius", chosen * planes.side)}

@@ -52,9 +52,9 @@ def correlation_dimension(
     Dataset
         Over the leading dims of the mask: `correlation_dimension`, the least-squares slope of ln mass over
         ln s, all sizes alike; `ci_low` and `ci_high`, 2.5 standard deviations of the local slopes to either
-        side (NaN for two sizes); `scale_min`, `scale_max` (cells); `coverage`; `dust_dimension`, the same of
+        side (NaN for two sizes); `scale_min`, `scale_max` (cells); `coverage`; `null_dimension`, the same of
         as many cells thrown at random. Over `box_size` (cells; `box_length` in m) too: `mean_mass`;
-        `local_slope`, d ln(mass)/d ln(box_size); `dust_mass`.
+        `local_slope`, d ln(mass)/d ln(box_size); `null_mass`.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def correlation_dimension(
         ]
     )
     pairs = zip(planes.occupied, planes.observed, strict=True)
-    dust = np.array([_neighbours.dust_mass(*pair, sizes) for pair in pairs])
+    dust = np.array([_neighbours.null_mass(*pair, sizes) for pair in pairs])
     dimension, half = _neighbours.fit(sizes, mass, 1.0)
     known = np.isfinite(dimension)
     variables = {
@@ -92,10 +92,10 @@ def correlation_dimension(
         "scale_min": planes.variable(np.where(known, sizes.min(), np.nan)),
         "scale_max": planes.variable(np.where(known, sizes.max(), np.nan)),
         "coverage": planes.variable(planes.coverage),
-        "dust_dimension": planes.variable(_neighbours.fit(sizes, dust, 1.0)[0]),
+        "null_dimension": planes.variable(_neighbours.fit(sizes, dust, 1.0)[0]),
         "mean_mass": planes.variable(mass, "box_size"),
         "local_slope": planes.variable(local_slope(sizes, mass), "box_size"),
-        "dust_mass": planes.variable(dust, "box_size"),
+        "null_mass": planes.variable(dust, "box_size"),
         "run_time": ((), time.perf_counter() - begin),
     }
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}

@@ -46,10 +46,10 @@ def describe(
         Over the leading dims of the mask: `coverage`; `total_perimeter` (m), along the sides of cells inside
         the extent; `n_islands`, `largest_cells`, `largest_island`, `mean_island_area` (m2), `largest_share`,
         `euler_number` (see `islands`); `percolates` over `axis` (see `percolation`); `box_dimension` with
-        `box_dimension_low` and `box_dimension_high`, `dust_dimension`, `dust_spread`, `differs_from_dust`
+        `box_dimension_low` and `box_dimension_high`, `null_dimension`, `null_spread`, `differs_from_random`
         (see `box_dimension`); `minkowski_dimension`, `correlation_dimension` and `boundary_dimension`, each
-        with its interval (`_low`, `_high`), the first two with that of a dust (`minkowski_dust_dimension`,
-        `correlation_dust_dimension`); `boundary_sides`; `lacunarity` and `dust_lacunarity` at the `box_size`
+        with its interval (`_low`, `_high`), the first two with that of a dust (`minkowski_null_dimension`,
+        `correlation_null_dimension`); `boundary_sides`; `lacunarity` and `null_lacunarity` at the `box_size`
         of 8 cells, or of the shorter side if that is less, and the whole curve as one number,
         `lacunarity_slope` and `lacunarity_area`, with those of a dust (see `lacunarity`).
 
@@ -71,7 +71,7 @@ def describe(
     variables: dict[str, Any] = {
         **gathered.scalars(),
         "percolates": gathered.variables["percolates"],
-        **{name: (planes.dims, gaps[name].values) for name in ("lacunarity", "dust_lacunarity")},
+        **{name: (planes.dims, gaps[name].values) for name in ("lacunarity", "null_lacunarity")},
         "run_time": ((), time.perf_counter() - begin),
     }
     coords = {"axis": gathered.coords["axis"], "box_size": ((), np.int64(size))}

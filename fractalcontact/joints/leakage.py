@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import check_surface, resolve_periodic
-from fractalcontact.base.inheritance import check_leading, leading_coords
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._flow import Flow, plane_flow

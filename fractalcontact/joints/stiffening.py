@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.inheritance import leading_coords
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints import _laws

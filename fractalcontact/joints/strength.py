@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.inheritance import familiar
+from fractalcontact.base.coords import familiar
 from fractalcontact.base.provenance import accounted, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.joints._slopes import fitted_slopes, neighbour_slopes

@@ -99,7 +99,7 @@ def _dimension_notes(data: xr.Dataset, name: str) -> list[Any]:
         if bool(_unsure(data, name).any()):
             label = f"interval wider\nthan {UNSURE:g}, or none"
             notes.append(_style.line_entry(label, ls="", marker="o", mfc="white"))
-    if "dust_dimension" in data:
+    if "null_dimension" in data:
         notes.append(_style.line_entry("random dust of\nequal coverage", **DUST))
     return notes
 
@@ -141,7 +141,7 @@ def lacunarity(
         A variable is missing, or the result runs over something else as well.
     """
     data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
-    return _families(data, shear, normal_force, figure, "lacunarity", "dust_lacunarity")
+    return _families(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")
 
 
 @_style.styled
@@ -179,13 +179,13 @@ def local_slopes(
         A variable is missing, or the result runs over something else as well.
     """
     data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
-    if "dust_count" in data or "dust_mass" in data:
-        curve, sign = ("dust_count", -1.0) if "dust_count" in data else ("dust_mass", 1.0)
+    if "null_count" in data or "null_mass" in data:
+        curve, sign = ("null_count", -1.0) if "null_count" in data else ("null_mass", 1.0)
         slope = sign * local_slope(data["box_size"].values, data[curve].values)
         data = data.assign(dust_slope=(data[curve].dims, slope))
-    elif "dust_fraction" in data:
-        slope = 2.0 - local_slope(data["radius"].values, data["dust_fraction"].values)
-        data = data.assign(dust_slope=(data["dust_fraction"].dims, slope))
+    elif "null_fraction" in data:
+        slope = 2.0 - local_slope(data["radius"].values, data["null_fraction"].values)
+        data = data.assign(dust_slope=(data["null_fraction"].dims, slope))
     return _families(data, shear, normal_force, figure, "local_slope", "dust_slope")
 
 
@@ -241,8 +241,8 @@ def _dimension_curve(ax: Axes, one: xr.Dataset, name: str, dim: str, colour: Any
     if values.size <= FEW:
         ax.plot(scale(places)[sure], values[sure], "o", color=colour)
         ax.plot(scale(places)[~sure], values[~sure], "o", mec=colour, mfc="white")
-    if "dust_dimension" in one:
-        ax.plot(scale(places), table(one, "dust_dimension", (dim,)), color=colour, **DUST)
+    if "null_dimension" in one:
+        ax.plot(scale(places), table(one, "null_dimension", (dim,)), color=colour, **DUST)
     wide_axis(ax, places)
     ax.set_xlabel(axis_label(one[against], scale) if known else against)
 

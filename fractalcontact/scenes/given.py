@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes.grammar import LOADS, stage_keys
 from fractalcontact.scenes.planning import loads_of
 from fractalcontact.scenes.scene import Scene, Table

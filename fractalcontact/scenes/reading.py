@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems, meant
+from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-from fractalcontact.base.shipped import datasets_folder
 from fractalcontact.scenes import grammar
 from fractalcontact.scenes.planning import check_loads
 from fractalcontact.scenes.scene import Scene, Table

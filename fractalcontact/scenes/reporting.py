@@ -329,8 +329,8 @@ def _domains(tree: xr.DataTree) -> str:
                 place,
                 f"{float(one['box_dimension']):.2f}",
                 f"{low:.2f} ... {high:.2f}" if np.isfinite(low) else "none",
-                f"{float(one['dust_dimension']):.2f}",
-                "yes" if bool(one["differs_from_dust"]) else "no",
+                f"{float(one['null_dimension']):.2f}",
+                "yes" if bool(one["differs_from_random"]) else "no",
             )
         )
     return table(rows)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base import netcdf, provenance, schema, stopping
+from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.scenes import doubting
 from fractalcontact.scenes.checking import preflight
@@ -76,7 +76,7 @@ def run(
     folder = None if out is None else writable(out)
     scene, picked = choose(scene)
     store = Store(folder)
-    with _held(folder), stopping.noted(folder is not None) as stop:
+    with _held(folder), signals.noted(folder is not None) as stop:
         scene = seeded(scene, store)
         of_scene = Sweep if "members" in scene.table("surface") else Study
         study: Study | Sweep = of_scene(scene, store, progress, client)
@@ -89,7 +89,7 @@ def run(
         if missing:
             netcdf.save(tree, folder / UNFINISHED)
             told = f"finished parts are in {UNFINISHED}, and the same run goes on from them"
-            raise stopping.Stopped(stop.number, told)
+            raise signals.Stopped(stop.number, told)
         if scene.figures:
             _draw(tree, folder, progress)
         netcdf.save(tree, folder / RESULT)

@@ -20,7 +20,7 @@ PAPER_SMALL, PAPER_PARTS = 8e-4, 2e-2  # m: shear of the plateau, edge of the bl
 LEVEL = 0.25  # greatest change, over that between the least shears, that counts as levelled
 HARDNESS = (0.1e9, 1e9)  # Pa: of cement paste and of hard aggregate, between which concrete yields
 FEW = 30  # cells in contact that resolve no spot
-STEEP = 0.3  # rms slope from which small-slope elasticity is a stretch
+STEEP = 0.3  # rms slope from which small-slope elasticity is a anisotropy_ratio
 
 
 class Statement(NamedTuple):
@@ -170,7 +170,7 @@ def _domains(tree: xr.DataTree) -> Iterator[Statement]:
     if found is None or "step" not in found.dims:
         return
     dimension = _values(found, "box_dimension")
-    dust = _values(found, "dust_dimension")
+    dust = _values(found, "null_dimension")
     rises = dimension[:, -1] > dimension[:, 0]
     yield Statement(
         "4",

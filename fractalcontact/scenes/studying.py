@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fractalcontact.base import stopping
+from fractalcontact.base import signals
 from fractalcontact.base.progress import track
 from fractalcontact.scenes import stages
 from fractalcontact.scenes.keeping import Store, digest
@@ -25,7 +25,7 @@ class _Part:
     part: stages.Followed
     keys: tuple[str, ...]
 
-    def __call__(self, store: Store, stop: stopping.Stop) -> tuple[list[xr.Dataset], list[float]] | None:
+    def __call__(self, store: Store, stop: signals.Stop) -> tuple[list[xr.Dataset], list[float]] | None:
         """Return the results and the seconds each took; once a stop was asked for, nothing is begun."""
         if stop:
             return None
@@ -59,7 +59,7 @@ class Study:
         for stage in self.plan:
             self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped(stage))
 
-    def carry_out(self, stop: stopping.Stop) -> list[str]:
+    def carry_out(self, stop: signals.Stop) -> list[str]:
         """Run the stages in order; return what is missing if a stop was asked for."""
         todo = [stage for stage in self.plan if stage.name != FIGURES]
         for number, stage in enumerate(track(todo, self.progress, self.scene.name, unit="stage")):
@@ -71,7 +71,7 @@ class Study:
                 return part + rest
         return []
 
-    def _stage(self, stage: Stage, stop: stopping.Stop) -> int:
+    def _stage(self, stage: Stage, stop: signals.Stop) -> int:
         """Run the parts of a stage that are missing; return how many there are by now."""
         readers = self._readers(stage)
         job = self.works[stage.name] = stages.work(stage, self.scene, self.results, self.works)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base import stopping
+from fractalcontact.base import signals
 from fractalcontact.base.progress import track
 from fractalcontact.base.schema import encoded, label
 from fractalcontact.scenes import stages
@@ -52,7 +52,7 @@ class _Batch:
         studies = [self._study(member, Store(None)) for member in self.members]
         return [digest for study in studies for digest in study.digests.values()]
 
-    def __call__(self, store: Store, stop: stopping.Stop) -> Found | None:
+    def __call__(self, store: Store, stop: signals.Stop) -> Found | None:
         """Return what the members gave that were not cut short by a stop, None if all were."""
         found = []
         for member in self.members:
@@ -76,7 +76,7 @@ class Sweep:
         self.scene, self.store, self.progress, self.client = scene, store, progress, client
         self.found = Found([], {}, {})
 
-    def carry_out(self, stop: stopping.Stop) -> list[str]:
+    def carry_out(self, stop: signals.Stop) -> list[str]:
         """Study all members; return what is missing if a stop was asked for."""
         count = int(self.scene.table("surface")["members"])
         slots = 0 if self.client is None else sum(self.client.nthreads().values())

@@ -19,12 +19,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fractalcontact.base import stopping, threads
+from fractalcontact.base import signals, threads
 from fractalcontact.base.errors import FractalContactError, MissingExtra
 from fractalcontact.scenes.keeping import Carried, Store
 
 R = TypeVar("R")
-Task = Callable[[Store, stopping.Stop], R | None]
+Task = Callable[[Store, signals.Stop], R | None]
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
 PAUSE = 0.2  # seconds between two looks at whether a stop was asked for
@@ -32,7 +32,7 @@ _stopped: set[str] = set()  # on a worker: the runs that are to stop
 
 
 def carried_out(
-    tasks: Mapping[int, Task[R]], store: Store, stop: stopping.Stop, client: Any = None
+    tasks: Mapping[int, Task[R]], store: Store, stop: signals.Stop, client: Any = None
 ) -> Iterator[tuple[int, R]]:
     """Yield number and result of every task as it is done; a task that a stop has cut short is left out."""
     if client is not None:
@@ -45,7 +45,7 @@ def carried_out(
 
 
 def _side_by_side(
-    tasks: Mapping[int, Task[R]], store: Store, stop: stopping.Stop, client: Any
+    tasks: Mapping[int, Task[R]], store: Store, stop: signals.Stop, client: Any
 ) -> Iterator[tuple[int, R]]:
     """Hand all tasks to the workers; once a stop is asked for they end what they are at and begin nothing."""
     run = uuid.uuid4().hex
@@ -107,7 +107,7 @@ def _keep_freed_memory() -> None:
             library.mallopt(option, size)
 
 
-class _StopAfar(stopping.Stop):
+class _StopAfar(signals.Stop):
     """Whether a stop was asked for where the run was started."""
 
     def __init__(self, run: str) -> None:

@@ -25,8 +25,8 @@ class Band:
         Along y and x.
     low, corner, high : float
         Wavenumbers of the long cut-off, the roll-off and the short cut-off; 0 and inf for none.
-    stretch, rotation : float
-        Correlations are `stretch` times as long along the azimuth `rotation` (radian) as across it.
+    anisotropy_ratio, azimuth : float
+        Correlations are `anisotropy_ratio` times as long along the azimuth `azimuth` (radian) as across it.
     axes : int
         1 for a profile: its spectrum falls with 1 + 2 hurst, not 2 + 2 hurst.
     """
@@ -35,8 +35,8 @@ class Band:
     low: float
     corner: float
     high: float
-    stretch: float = 1.0
-    rotation: float = 0.0
+    anisotropy_ratio: float = 1.0
+    azimuth: float = 0.0
     axes: int = 2
 
     @property
@@ -60,10 +60,10 @@ class Band:
 
     def _square(self, qy: Array, qx: Array) -> Array:
         """Return the square of the effective wavenumber."""
-        if self.stretch != 1.0:
-            cosine, sine = np.cos(self.rotation), np.sin(self.rotation)
-            along = np.sqrt(self.stretch) * (qx * cosine + qy * sine)
-            across = (qy * cosine - qx * sine) / np.sqrt(self.stretch)
+        if self.anisotropy_ratio != 1.0:
+            cosine, sine = np.cos(self.azimuth), np.sin(self.azimuth)
+            along = np.sqrt(self.anisotropy_ratio) * (qx * cosine + qy * sine)
+            across = (qy * cosine - qx * sine) / np.sqrt(self.anisotropy_ratio)
             return np.asarray(along**2 + across**2)
         if self.hurst[0] == self.hurst[1]:
             return np.asarray(qy**2 + qx**2)
@@ -76,7 +76,7 @@ class Band:
     def grid_amplitude(self, qy: Array, qx: Array, nyquist: tuple[float, float]) -> Array:
         """Return `amplitude` with the power of a Nyquist mode averaged over the two waves it stands for."""
         amplitude = self.amplitude(qy, qx)
-        if self.stretch == 1.0:
+        if self.anisotropy_ratio == 1.0:
             return amplitude
         mirrored = self.amplitude(-qy, qx)
         doubtful = np.isclose(np.abs(qy), nyquist[0], rtol=1e-9) | np.isclose(qx, nyquist[1], rtol=1e-9)
@@ -158,7 +158,7 @@ def _rows(
         if first > last:
             continue
         mirror = slice(ny - last, ny - first + 1)
-        if band.stretch == 1.0:
+        if band.anisotropy_ratio == 1.0:
             yield mirror, doubled[first - rows.start : last - rows.start + 1][::-1]
         else:
             yield mirror, amplitudes(mirror)
@@ -171,7 +171,7 @@ def _hermitian(column: Array) -> Array:
 
 def _reach(band: Band, waves_y: Array, waves_x: Array) -> tuple[int, int]:
     """Return how many rows (from either end) and columns can hold modes inside the band."""
-    if not np.isfinite(band.high) or band.stretch != 1.0 or band.hurst[0] != band.hurst[1]:
+    if not np.isfinite(band.high) or band.anisotropy_ratio != 1.0 or band.hurst[0] != band.hurst[1]:
         return waves_y.size // 2 + 1, waves_x.size
     high = band.high * (1.0 + EDGE)
     rows = np.count_nonzero(np.abs(waves_y[: waves_y.size // 2 + 1]) <= high)

@@ -8,8 +8,8 @@ import numpy as np
 
 from fractalcontact.base import polynomial, provenance, schema
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.coords import familiar
 from fractalcontact.base.grid import check_surface
-from fractalcontact.base.inheritance import familiar
 from fractalcontact.surfaces import _gaps
 
 if TYPE_CHECKING:

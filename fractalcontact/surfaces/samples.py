@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.checks import Problems
-from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.base.datasets import datasets_folder
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,8 +9,8 @@ import numpy as np
 
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.checks import Problems
+from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import check_surface
-from fractalcontact.base.inheritance import check_leading, leading_coords
 from fractalcontact.surfaces import _moments
 
 if TYPE_CHECKING:

@@ -35,8 +35,8 @@ def spectral(
     rolloff: float | None = None,
     short_cutoff: float | None = None,
     normalise: str = "realisation",
-    stretch: float = 1.0,
-    rotation: float = 0.0,
+    anisotropy_ratio: float = 1.0,
+    azimuth: float = 0.0,
     members: int | None = None,
     rng: RNGLike = None,
 ) -> xr.DataArray:
@@ -66,9 +66,9 @@ def spectral(
         short cut-off (every mode the grid can carry).
     normalise : {"realisation", "expectation"}
         Whether this very surface has the rms asked for, to rounding, or the mean square over all surfaces.
-    stretch, rotation : float
-        Correlations are `stretch` times as long along the azimuth `rotation` (degree, E = 0,
-        anticlockwise) as across it. Lengths along grow by sqrt(stretch) and lengths across shrink by
+    anisotropy_ratio, azimuth : float
+        Correlations are `anisotropy_ratio` times as long along the azimuth `azimuth` (degree, E = 0,
+        anticlockwise) as across it. Lengths along grow by sqrt(anisotropy_ratio) and lengths across shrink by
         it; the cut-offs are those before stretching. Not together with two exponents.
     members : int, optional
         Return this many independent surfaces along a dim `member`, from streams of their own.
@@ -108,14 +108,19 @@ def spectral(
         rms = 1.0 if wanted is None else _arguments.length(problems, target, wanted)
         cutoffs = _cutoffs(problems, sizes, steps, long_cutoff, rolloff, short_cutoff)
         problems.choice("normalise", normalise, ("realisation", "expectation"))
-        ratio = problems.number("stretch", stretch, at_least=1e-6, at_most=1e6)
-        azimuth = problems.number("rotation", rotation)
+        ratio = problems.number("anisotropy_ratio", anisotropy_ratio, at_least=1e-6, at_most=1e6)
+        angle = problems.number("azimuth", azimuth)
         if ratio != 1.0:
-            problems.require(exponents[0] == exponents[1], "stretch", "1 with two Hurst exponents", stretch)
-            problems.require(len(sizes) == 2, "stretch", "1 for a profile", stretch)
+            problems.require(
+                exponents[0] == exponents[1],
+                "anisotropy_ratio",
+                "1 with two Hurst exponents",
+                anisotropy_ratio,
+            )
+            problems.require(len(sizes) == 2, "anisotropy_ratio", "1 for a profile", anisotropy_ratio)
         count = None if members is None else problems.integer("members", members, at_least=1)
         unit = _power_of_two(max(steps))
-        band = _band(exponents, cutoffs, unit, ratio, math.radians(azimuth), len(sizes))
+        band = _band(exponents, cutoffs, unit, ratio, math.radians(angle), len(sizes))
         _require_modes(problems, band, sizes, steps, unit)
 
     plane = (1, *sizes)[-2:]
@@ -146,8 +151,8 @@ def spectral(
             "rolloff": rolloff,
             "short_cutoff": short_cutoff,
             "normalise": normalise,
-            "stretch": ratio,
-            "rotation": azimuth,
+            "anisotropy_ratio": ratio,
+            "azimuth": angle,
         },
         title="Self-affine surface from its power spectrum",
         references=JACOBS,
@@ -218,12 +223,12 @@ def _band(
     exponents: tuple[float, float],
     cutoffs: tuple[float, float, float],
     unit: float,
-    stretch: float,
-    rotation: float,
+    anisotropy_ratio: float,
+    azimuth: float,
     axes: int,
 ) -> Band:
     low, corner, high = (2.0 * math.pi / (length / unit) if length > 0 else math.inf for length in cutoffs)
-    return Band(exponents, low, corner, high, stretch, rotation, axes)
+    return Band(exponents, low, corner, high, anisotropy_ratio, azimuth, axes)
 
 
 def _require_modes(

@@ -12,7 +12,7 @@ from fractalcontact.accuracy import measuring
 from fractalcontact.accuracy.reporting import choice_table, curves_table
 from fractalcontact.accuracy.trials.trial import Contest, Experiment
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.stopping import Stop
+from fractalcontact.base.signals import Stop
 
 
 @pytest.mark.parametrize("part", list(measuring.PARTS))

@@ -13,7 +13,7 @@ from fractalcontact.accuracy import watching
 from fractalcontact.accuracy.catalogue import cases
 from fractalcontact.accuracy.examination import examine
 from fractalcontact.accuracy.watching import Lost, examine_apart, watched
-from fractalcontact.base.stopping import Stop
+from fractalcontact.base.signals import Stop
 
 
 def test_what_hangs_is_ended_and_the_next_is_served():

@@ -89,7 +89,7 @@ def test_a_sequence_of_unlike_rows_is_refused_in_words():
     with pytest.raises(InvalidInput) as caught, Problems("somewhere") as problems:
         problems.number("young", [1.0, [2.0]])
         problems.numbers("loads", [1.0, [2.0]])
-        problems.words("keep", ["gap", ["state"]], ("gap", "state"))
+        problems.choices("keep", ["gap", ["state"]], ("gap", "state"))
     told = "\n".join(caught.value.problems)
     assert all(f"{name}: expected" in told for name in ("young", "loads", "keep"))
 

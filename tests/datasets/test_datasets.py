@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base.shipped import datasets_folder
+from fractalcontact.base.datasets import datasets_folder
 
 
 @pytest.fixture(scope="module")

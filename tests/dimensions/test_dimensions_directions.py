@@ -17,11 +17,11 @@ def brownian(n, hurst, seed, spacing=SPACING, **more):
     return fc.surfaces.fbm((n, n), spacing, hurst=hurst, rms_increment=1e-6, rng=seed, **more)
 
 
-def stretched(n, seed, stretch=2.0, rotation=30.0, hurst=0.6, thin=4, **more):
+def stretched(n, seed, anisotropy_ratio=2.0, azimuth=30.0, hurst=0.6, thin=4, **more):
     """A stretched fractal with free edges: every fourth point out of the middle of a wider band."""
     whole = fc.surfaces.spectral(
-        (2 * thin * n, 2 * thin * n), SPACING / thin, hurst=hurst, rms_height=1e-6, stretch=stretch,
-        rotation=rotation, rng=seed, **more,
+        (2 * thin * n, 2 * thin * n), SPACING / thin, hurst=hurst, rms_height=1e-6,
+        anisotropy_ratio=anisotropy_ratio, azimuth=azimuth, rng=seed, **more,
     )  # fmt: skip
     return fc.surfaces.from_array(whole.values[: thin * n : thin, : thin * n : thin], SPACING)
 
@@ -44,7 +44,7 @@ def test_isotropic_surface_has_one_exponent_and_one_increment():
     topothesy = SPACING * (1e-6 / SPACING) ** (1 / 0.3)
     assert np.log(found["topothesy"].values) == pytest.approx(np.log(topothesy), rel=0.05)
     assert float(found["isotropy_p_value"]) > 0.01
-    assert float(found["stretch_low"]) == 1.0
+    assert float(found["anisotropy_ratio_low"]) == 1.0
 
 
 @pytest.mark.parametrize("free", [True, False])
@@ -53,25 +53,25 @@ def test_stretch_and_its_azimuth_are_found(free):
         face = stretched(192, 3)
     else:
         face = fc.surfaces.spectral(
-            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, stretch=2.0, rotation=30.0, rng=3
+            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, anisotropy_ratio=2.0, azimuth=30.0, rng=3
         )
     found = fc.dimensions.directions(face)
     assert float(found["isotropy_p_value"]) < 1e-6
-    assert float(found["stretch_low"]) < 2.0 < float(found["stretch_high"]) + 0.1
-    assert turned(float(found["stretch_azimuth"]), 30.0) < 2.0
-    assert float(found["stretch_p_value"]) > 1e-3
-    # the exponent is the same all round; heights change least along the stretch
+    assert float(found["anisotropy_ratio_low"]) < 2.0 < float(found["anisotropy_ratio_high"]) + 0.1
+    assert turned(float(found["anisotropy_azimuth"]), 30.0) < 2.0
+    assert float(found["anisotropy_p_value"]) > 1e-3
+    # the exponent is the same all round; heights change least along the anisotropy_ratio
     assert ((found["ci_low"] < 0.65) & (found["ci_high"] > 0.55)).all()
     least = float(found["azimuth"][int(np.argmin(found["rms_increment"].values))])
     assert turned(least, 30.0) < 23.0
 
 
 def test_turning_the_face_turns_the_answer():
-    face = stretched(128, 4, stretch=1.6, rotation=20.0)
+    face = stretched(128, 4, anisotropy_ratio=1.6, azimuth=20.0)
     other = fc.surfaces.from_array(np.ascontiguousarray(face.values.T), SPACING)
     one, two = (fc.dimensions.directions(each) for each in (face, other))
-    assert turned(float(two["stretch_azimuth"]), 90.0 - float(one["stretch_azimuth"])) < 1e-6
-    assert float(two["stretch"]) == pytest.approx(float(one["stretch"]), rel=1e-9)
+    assert turned(float(two["anisotropy_azimuth"]), 90.0 - float(one["anisotropy_azimuth"])) < 1e-6
+    assert float(two["anisotropy_ratio"]) == pytest.approx(float(one["anisotropy_ratio"]), rel=1e-9)
     assert float(two["isotropy_p_value"]) == pytest.approx(float(one["isotropy_p_value"]), rel=1e-6)
     for azimuth in (0.0, 45.0, 90.0):
         pair = [
@@ -103,13 +103,13 @@ def test_ground_face_has_no_exponent_along_its_ridges():
 
 
 def test_ridges_in_noise_are_no_stretch():
-    """A stretch as long as the face has no interval; the azimuth of the ridges remains."""
+    """A anisotropy_ratio as long as the face has no interval; the azimuth of the ridges remains."""
     noise = 1e-7 * np.random.default_rng(7).standard_normal((96, 96))
     found = fc.dimensions.directions(fc.surfaces.from_array(profile(96, 5)[:, None] + noise, SPACING))
     assert float(found["isotropy_p_value"]) < 1e-6
-    assert np.isnan(found["stretch_high"])
-    assert "ridges" in found["stretch"].attrs["reason"]
-    assert turned(float(found["stretch_azimuth"]), 0.0) < 2.0
+    assert np.isnan(found["anisotropy_ratio_high"])
+    assert "ridges" in found["anisotropy_ratio"].attrs["reason"]
+    assert turned(float(found["anisotropy_azimuth"]), 0.0) < 2.0
     assert np.isnan(found["ci_low"]).all()
 
 
@@ -123,7 +123,7 @@ def test_smooth_isotropic_face_is_not_told_from_an_isotropic_one(gaps):
     found = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
     assert (found["hurst"] == 1.0).all()
     assert not float(found["isotropy_p_value"]) < 0.01
-    assert "smoother" in found["stretch"].attrs["reason"]
+    assert "smoother" in found["anisotropy_ratio"].attrs["reason"]
 
 
 def test_band_limited_face_with_gaps_has_a_wider_interval():
@@ -149,7 +149,7 @@ def test_two_exponents_are_more_than_a_stretch():
     face = fc.surfaces.spectral((192, 192), SPACING, hurst=(0.4, 0.8), rms_height=1e-6, rng=9)
     found = fc.dimensions.directions(face)
     assert float(found["isotropy_p_value"]) < 1e-6
-    assert float(found["stretch_p_value"]) < 1e-6
+    assert float(found["anisotropy_p_value"]) < 1e-6
     assert float(found["hurst"].sel(azimuth=0)) - float(found["hurst"].sel(azimuth=90)) > 0.3
 
 
@@ -161,7 +161,7 @@ def test_isotropic_spectrum_of_any_form_is_isotropic():
     for part in (face, face[:200, :180]):
         found = fc.dimensions.directions(part)
         assert float(found["isotropy_p_value"]) > 0.01
-        assert float(found["stretch_p_value"]) > 0.01
+        assert float(found["anisotropy_p_value"]) > 0.01
 
 
 def test_gaps_and_unequal_spacings():
@@ -172,7 +172,7 @@ def test_gaps_and_unequal_spacings():
     found = fc.dimensions.directions(face.copy(data=heights))
     assert ((found["ci_low"] - 0.02 < 0.4) & (found["ci_high"] + 0.02 > 0.4)).all()
     assert float(found["isotropy_p_value"]) > 0.01
-    assert float(found["stretch_low"]) == 1.0
+    assert float(found["anisotropy_ratio_low"]) == 1.0
 
 
 def test_asked_directions_are_those_of_the_lattice_nearest_to_them():
@@ -215,9 +215,9 @@ def test_limits_and_refusals():
     found = fc.dimensions.directions(white)
     assert (found["hurst"] < 0.03).all()
     assert float(found["isotropy_p_value"]) > 0.001
-    assert np.isnan(found["stretch"])
+    assert np.isnan(found["anisotropy_ratio"])
     periodic = fc.surfaces.from_array(white.values, SPACING, periodic=True)
-    assert np.isnan(fc.dimensions.directions(periodic)["stretch"])
+    assert np.isnan(fc.dimensions.directions(periodic)["anisotropy_ratio"])
     with pytest.raises(InvalidInput, match="16"):
         fc.dimensions.directions(brownian(12, 0.5, 1))
     with pytest.raises(InvalidInput, match="dims"):
@@ -298,13 +298,13 @@ def test_size_of_the_test_and_coverage(kind, hurst):
             heights[np.random.default_rng(21).random(heights.shape) < 0.1] = np.nan
             faces = faces.copy(data=heights)
     found = fc.dimensions.directions(faces)
-    for name in ("isotropy_p_value", "stretch_p_value"):
+    for name in ("isotropy_p_value", "anisotropy_p_value"):
         assert as_often((found[name] < 0.05).sum(), found[name].count(), 0.05).all()
-    given = np.isfinite(found["stretch_low"])
+    given = np.isfinite(found["anisotropy_ratio_low"])
     assert float(given.mean()) > 0.95  # not where the exponent is within three standard errors of none
-    assert as_often((found["stretch_low"] == 1.0).where(given).sum(), given.sum(), 0.95).all()
+    assert as_often((found["anisotropy_ratio_low"] == 1.0).where(given).sum(), given.sum(), 0.95).all()
     given = np.isfinite(found["ci_low"])
-    assert float(given.mean()) > 0.98  # not where the test of a stretch is below .001
+    assert float(given.mean()) > 0.98  # not where the test of a anisotropy_ratio is below .001
     covered = ((found["ci_low"] <= hurst) & (hurst <= found["ci_high"])).where(given).sum("member")
     # an exponent within two standard errors of 0 or 1 is covered more often: estimates end there
     limited = found["standard_error"].mean("member") > 0.5 * min(hurst, 1 - hurst)
@@ -315,7 +315,7 @@ def as_often(count, trials, share):
     """Tell whether events came as often as their chance says.
 
     The bounds are those of the binomial distribution, so wide that chance alone breaks any of the 132 of the
-    twelve cases (eight directions, two tests and one interval of the stretch in each) in one run of twenty.
+    twelve cases (eight directions, two tests and one interval of the ratio in each) in one run of twenty.
     """
     risk = 0.05 / (12 * (8 + 2 + 1))
     low, high = (binom.ppf(chance, trials, share) for chance in (0.5 * risk, 1 - 0.5 * risk))

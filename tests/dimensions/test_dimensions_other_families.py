@@ -88,7 +88,7 @@ def test_patches_of_unequal_roughness_count_for_fewer_points(method):
 @pytest.mark.parametrize("periodic", [False, True])
 def test_a_stretched_face_is_told_by_the_share_of_its_waves(periodic):
     face = fc.surfaces.spectral(
-        (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, stretch=2.0, rotation=30.0, rng=6
+        (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=2.0, azimuth=30.0, rng=6
     )
     found = fc.dimensions.estimate(face if periodic else fc.surfaces.from_array(face.values, SPACING))
     assert "more than their share" in found.hurst.attrs["note"]

@@ -229,8 +229,8 @@ def test_empty_planes_are_nan_with_the_reason_and_leave_the_others_alone():
     assert np.isnan(result.box_dimension.values[[0, 2]]).all()
     assert float(result.box_dimension[1]) == 2
     assert "empty (2 planes)" in result.box_dimension.attrs["comment"]
-    assert np.isnan(result.dust_dimension[0])
-    assert not result.differs_from_dust.values.any()
+    assert np.isnan(result.null_dimension[0])
+    assert not result.differs_from_random.values.any()
 
 
 def test_mask_of_one_or_two_cells_says_why_it_has_no_dimension():
@@ -248,7 +248,7 @@ def test_stack_equals_its_planes():
     assert stack.box_count.dims == ("seed", "step", "box_size")
     for k in range(3):
         alone = fc.domains.box_dimension(as_mask(planes[0, k]))
-        for name in ("box_dimension", "ci_low", "dust_dimension", "dust_spread", "box_measure"):
+        for name in ("box_dimension", "ci_low", "null_dimension", "null_spread", "box_measure"):
             assert np.array_equal(stack[name].values[0, k], alone[name].values)
 
 
@@ -297,10 +297,10 @@ def test_dust_counts_and_their_spread_against_dusts():
     result = fc.domains.box_dimension(as_mask(planes), scales=scales, cover="aligned")
     measured = result.box_count.values
     error = measured.std(0) / 20
-    assert np.all(np.abs(measured.mean(0) - result.dust_count.values[0]) <= 4 * error + 1e-4)
-    assert float(result.dust_spread[0]) == pytest.approx(result.box_dimension.values.std(), rel=0.15)
-    assert float(result.dust_dimension[0]) == pytest.approx(
-        result.box_dimension.values.mean(), abs=4 * float(result.dust_spread[0]) / 20
+    assert np.all(np.abs(measured.mean(0) - result.null_count.values[0]) <= 4 * error + 1e-4)
+    assert float(result.null_spread[0]) == pytest.approx(result.box_dimension.values.std(), rel=0.15)
+    assert float(result.null_dimension[0]) == pytest.approx(
+        result.box_dimension.values.mean(), abs=4 * float(result.null_spread[0]) / 20
     )
 
 
@@ -308,7 +308,7 @@ def test_dust_of_one_cell_and_of_all_cells():
     planes = np.zeros((2, 50, 50), bool)
     planes[0, 7, 7] = planes[1] = True
     result = fc.domains.box_dimension(as_mask(planes))
-    assert result.dust_dimension.values == pytest.approx([0, 2], abs=1e-12)
+    assert result.null_dimension.values == pytest.approx([0, 2], abs=1e-12)
 
 
 @pytest.mark.parametrize("coverage", [0.003, 0.02, 0.06, 0.2, 0.4])
@@ -316,16 +316,16 @@ def test_islands_tell_themselves_from_a_dust(coverage):
     rng = np.random.default_rng(13)
     for hurst in (0.3, 0.8):
         result = fc.domains.box_dimension(as_mask(level_set(256, hurst, coverage, rng)))
-        assert bool(result.differs_from_dust)
+        assert bool(result.differs_from_random)
         if coverage < 0.1:
-            assert float(result.box_dimension) > float(result.dust_dimension) + 5 * float(result.dust_spread)
+            assert float(result.box_dimension) > float(result.null_dimension) + 5 * float(result.null_spread)
 
 
 def test_dusts_are_hardly_ever_taken_for_more():
     rng = np.random.default_rng(14)
     for cells in (2, 5, 20, 100, 800, 2000, 3900):
         planes = np.array([random_dust(64, cells, rng) for _ in range(100)])
-        assert fc.domains.box_dimension(as_mask(planes)).differs_from_dust.values.mean() <= 0.02
+        assert fc.domains.box_dimension(as_mask(planes)).differs_from_random.values.mean() <= 0.02
 
 
 def test_unobserved_cells_are_in_no_set_and_leave_full_planes_full():
@@ -337,7 +337,7 @@ def test_unobserved_cells_are_in_no_set_and_leave_full_planes_full():
         full = fc.domains.box_dimension(as_mask(np.ones((60, 60))), valid=observed, cover=cover)
         assert float(full.box_dimension) == pytest.approx(2.0, abs=1e-12)
         assert float(full.coverage) == 1.0
-        assert float(full.dust_dimension) == pytest.approx(2.0, abs=1e-12)
+        assert float(full.null_dimension) == pytest.approx(2.0, abs=1e-12)
     cells = level_set(60, 0.8, 0.3, rng)
     one = fc.domains.box_dimension(as_mask(cells), valid=observed)
     other = fc.domains.box_dimension(as_mask(cells | ~valid), valid=observed)
@@ -350,11 +350,11 @@ def test_gaps_shift_the_dimension_little():
     whole = fc.domains.box_dimension(as_mask(cells))
     gappy = fc.domains.box_dimension(as_mask(cells), valid=as_mask(rng.random((256, 256)) < 0.9))
     assert float(gappy.box_dimension) == pytest.approx(float(whole.box_dimension), abs=0.06)
-    assert bool(gappy.differs_from_dust)
+    assert bool(gappy.differs_from_random)
     dust = fc.domains.box_dimension(
         as_mask(random_dust(256, 3000, rng)), valid=as_mask(rng.random((256, 256)) < 0.9)
     )
-    assert not bool(dust.differs_from_dust)
+    assert not bool(dust.differs_from_random)
 
 
 def test_default_sizes_follow_their_rule():
@@ -395,12 +395,12 @@ def test_a_dust_seen_through_gaps_is_a_dust(wraps, coverage):
     masks = as_mask(planes.reshape(-1, n, n), periodic=wraps)
     seen = as_mask(valid, periodic=wraps)
     result = fc.domains.box_dimension(masks, scales=sizes, cover="mean", valid=seen)
-    counts, null = result.box_measure.values, result.dust_count.values[0]
+    counts, null = result.box_measure.values, result.null_count.values[0]
     error = counts.std(0, ddof=1) / np.sqrt(len(counts))
     assert np.all(np.abs(counts.mean(0) - null) <= 4 * error + 1e-9)
-    assert result.differs_from_dust.values.mean() <= 0.01
+    assert result.differs_from_random.values.mean() <= 0.01
     deviation = result.box_dimension.values.std(ddof=1)
-    assert 0.8 * deviation <= float(result.dust_spread[0]) <= 4 * deviation
+    assert 0.8 * deviation <= float(result.null_spread[0]) <= 4 * deviation
     clustered = ndimage.gaussian_filter(rng.random((n, n)), 1, mode="wrap")
     clusters = as_mask(clustered > np.quantile(clustered[valid], 1 - coverage), periodic=wraps)
-    assert fc.domains.box_dimension(clusters, valid=seen).differs_from_dust
+    assert fc.domains.box_dimension(clusters, valid=seen).differs_from_random

@@ -115,7 +115,7 @@ def test_description_repeats_what_the_functions_say():
         assert result[name].identical(islands[name]) or np.array_equal(
             result[name], islands[name], equal_nan=True
         )
-    for name in ("box_dimension", "dust_dimension", "differs_from_dust"):
+    for name in ("box_dimension", "null_dimension", "differs_from_random"):
         assert np.array_equal(result[name], boxes[name], equal_nan=True)
     assert np.array_equal(result.boundary_dimension_low, edge.ci_low, equal_nan=True)
     gaps = fc.domains.lacunarity(mask, [8]).lacunarity[:, 0]
@@ -153,9 +153,9 @@ def test_evolution_gives_every_scalar_and_curve_of_the_room():
     for name, want in {
         "box_dimension": boxes.box_dimension,
         "box_dimension_low": boxes.ci_low,
-        "dust_dimension": boxes.dust_dimension,
+        "null_dimension": boxes.null_dimension,
         "minkowski_dimension": grown.minkowski_dimension,
-        "minkowski_dust_dimension": grown.dust_dimension,
+        "minkowski_null_dimension": grown.null_dimension,
         "grown_fraction": grown.grown_fraction,
         "correlation_dimension_high": pairs.ci_high,
         "lacunarity_area": gaps.lacunarity_area,

@@ -65,7 +65,7 @@ def test_bernoulli_cells_and_the_dust_beside_them():
     assert result.lacunarity.values == pytest.approx([20, 5.75, 2.1875, 1.2969, 1.0742, 1.0186], rel=0.02)
     p = cells.mean()
     want = [1 + (1 - p) / (p * r**2) for r in (1, 2, 4, 8, 16, 32)]
-    assert result.dust_lacunarity.values == pytest.approx(want, rel=1e-12)
+    assert result.null_lacunarity.values == pytest.approx(want, rel=1e-12)
 
 
 def test_one_cell_box_gives_one_over_coverage_and_full_planes_one():
@@ -74,7 +74,7 @@ def test_one_cell_box_gives_one_over_coverage_and_full_planes_one():
     result = fc.domains.lacunarity(as_mask(planes))
     assert result.lacunarity.values[:, 0] == pytest.approx(1 / planes.mean((1, 2)), rel=1e-15)
     assert np.all(result.lacunarity.values[2] == 1)
-    assert np.all(result.dust_lacunarity.values[2] == 1)
+    assert np.all(result.null_lacunarity.values[2] == 1)
 
 
 def test_covariance_identity_on_the_torus():
@@ -148,7 +148,7 @@ def test_empty_planes_are_nan_with_the_reason():
 def test_contact_like_islands_are_more_lacunar_than_dust_and_less_so_with_load():
     planes = [level_set(256, 0.8, c, np.random.default_rng(10)) for c in (0.02, 0.06, 0.18)]
     result = fc.domains.lacunarity(as_mask(np.array(planes)), [2, 4, 8, 16])
-    assert np.all(result.lacunarity.values > 2 * result.dust_lacunarity.values)
+    assert np.all(result.lacunarity.values > 2 * result.null_lacunarity.values)
     assert np.all(np.diff(result.lacunarity.values, axis=0) < 0)
     assert np.all(np.diff(result.lacunarity.values, axis=1) < 0)
 
@@ -193,7 +193,7 @@ def test_numbers_of_the_whole_curve():
     assert float(result.lacunarity_area) == pytest.approx(np.log(8) ** 2, rel=1e-13)
     assert result.normalised_lacunarity.values == pytest.approx((64 / np.array([1, 4, 16, 64]) - 1) / 63)
     assert result.relative_lacunarity.values == pytest.approx(
-        (result.lacunarity / result.dust_lacunarity).values
+        (result.lacunarity / result.null_lacunarity).values
     )
     full = fc.domains.lacunarity(as_mask(np.ones((16, 16))))
     assert (float(full.lacunarity_slope), float(full.lacunarity_area)) == (0.0, 0.0)

@@ -147,11 +147,11 @@ def test_dust_beside_it_is_the_mean_of_dusts(name):
     rng = np.random.default_rng(3)
     planes = np.array([random_dust(64, 200, rng) for _ in range(200)])
     result = getattr(fc.domains, name)(as_mask(planes, periodic=(True, True)))
-    curve, null = ("grown_fraction", "dust_fraction") if name == BOTH[0] else ("mean_mass", "dust_mass")
+    curve, null = ("grown_fraction", "null_fraction") if name == BOTH[0] else ("mean_mass", "null_mass")
     values = result[curve].values
     error = values.std(0) / np.sqrt(200)
     assert np.all(np.abs(values.mean(0) - result[null].values[0]) <= 4 * error + 1e-9)
-    assert float(result.dust_dimension[0]) == pytest.approx(float(result[name].mean()), abs=0.03)
+    assert float(result.null_dimension[0]) == pytest.approx(float(result[name].mean()), abs=0.03)
 
 
 @pytest.mark.parametrize("name", BOTH)
@@ -184,7 +184,7 @@ def test_stack_equals_its_planes_and_empty_ones_say_why(name):
     assert "empty (1 planes)" in dimension.attrs["comment"]
     for k in (1, 2):
         alone = measured(name, as_mask(planes[k]))[0]
-        for variable in (name, "ci_low", "dust_dimension", "local_slope"):
+        for variable in (name, "ci_low", "null_dimension", "local_slope"):
             assert np.array_equal(alone[variable].values, result[variable].values[0, k])
 
 

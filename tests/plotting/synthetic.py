@@ -119,7 +119,7 @@ def box_dimension(closed):
         "box_dimension": value,
         "ci_low": value - 0.08,
         "ci_high": value + 0.08,
-        "dust_dimension": value - 0.2,
+        "null_dimension": value - 0.2,
         "coverage": fraction,
     }
     return label(xr.Dataset(data).drop_vars([n for n in ("x", "y") if n in fraction.coords]))
@@ -132,7 +132,7 @@ def lacunarity(closed, sizes=(1, 2, 4, 8, 16)):
     fraction = closed["corrected_contact_fraction"]
     edge = xr.DataArray(list(sizes), dims="box_size", coords={"box_size": list(sizes)})
     value = 1 + (1 / fraction.where(fraction > 0) - 1) / edge
-    data = {"lacunarity": value, "dust_lacunarity": 1 + (value - 1) / edge}
+    data = {"lacunarity": value, "null_lacunarity": 1 + (value - 1) / edge}
     return label(xr.Dataset(data).assign_coords(box_length=edge * 8e-5))
 
 

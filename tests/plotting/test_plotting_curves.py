@@ -125,7 +125,7 @@ def test_box_dimension_shows_the_dust_and_the_interval(made, closed):
         fx = factor(ax.get_xlabel())
         return [np.array([np.asarray(line.get_xdata()) * fx, line.get_ydata()]) for line in ax.lines]
 
-    for name in ("box_dimension", "dust_dimension"):
+    for name in ("box_dimension", "null_dimension"):
         for v in result.shear:
             assert holds(lines(by_load), result.normal_force, result[name].sel(shear=v))
         assert holds(lines(by_shear), result.shear, result[name].isel(step=-1))
@@ -188,7 +188,7 @@ def test_lacunarity_shows_every_step_and_its_dust(made, closed):
     shown = [np.asarray(line.get_ydata()) for line in by_load.lines]
     for step in range(1, 5):
         one = result.sel(shear=8e-3).isel(step=step)
-        for name in ("lacunarity", "dust_lacunarity"):
+        for name in ("lacunarity", "null_lacunarity"):
             assert any(np.allclose(y, one[name].transpose("box_size")) for y in shown)
     assert factor(by_load.get_xlabel()) * np.asarray(by_load.lines[0].get_xdata()) == pytest.approx(
         result.box_length.values
@@ -313,7 +313,7 @@ def test_local_slopes_show_the_level_parts_and_those_of_the_dust():
         {
             "local_slope": (("step", "box_size"), np.array([[1.2] * 4, [1.5] * 4])),
             "box_count": (("step", "box_size"), count),
-            "dust_count": (("step", "box_size"), dust),
+            "null_count": (("step", "box_size"), dust),
         },
         coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
     )
@@ -332,7 +332,7 @@ def test_other_dimensions_of_a_domain_are_drawn_alike():
     result = xr.Dataset(
         {
             "minkowski_dimension": ("step", np.array([0.5, 1.5])),
-            "dust_dimension": ("step", np.array([0.2, 1.0])),
+            "null_dimension": ("step", np.array([0.2, 1.0])),
         },
         coords={"normal_force": ("step", np.array([1.0, 2.0]), {"units": "N"})},
     )

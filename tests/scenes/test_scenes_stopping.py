@@ -13,7 +13,7 @@ from study import SOUND
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, UnreadableFile
-from fractalcontact.base.stopping import Stopped
+from fractalcontact.base.signals import Stopped
 from fractalcontact.scenes import stages
 
 resource = pytest.importorskip("resource")  # signals and limits as Unix has them
@@ -102,12 +102,12 @@ def test_a_partial_file_holds_the_finished_part_of_a_stage(whole, tmp_path, monk
 
 
 def test_a_second_signal_is_obeyed_at_once(tmp_path, monkeypatch):
-    from fractalcontact.base import stopping
+    from fractalcontact.base import signals
 
-    monkeypatch.setattr(stopping, "ECHO", 0.0)
+    monkeypatch.setattr(signals, "ECHO", 0.0)
     # a job in the background inherits a SIGINT that is ignored, and would go on ignoring it
-    usual = stopping.leaving(signal.default_int_handler)
-    with pytest.raises(KeyboardInterrupt) as caught, usual, stopping.noted() as stop:
+    usual = signals.leaving(signal.default_int_handler)
+    with pytest.raises(KeyboardInterrupt) as caught, usual, signals.noted() as stop:
         signal.raise_signal(signal.SIGINT)
         assert stop.number == signal.SIGINT
         time.sleep(0.001)
@@ -116,9 +116,9 @@ def test_a_second_signal_is_obeyed_at_once(tmp_path, monkeypatch):
 
 
 def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
-    from fractalcontact.base import stopping
+    from fractalcontact.base import signals
 
-    with stopping.noted() as stop:
+    with signals.noted() as stop:
         signal.raise_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGTERM)
     assert stop.number == signal.SIGTERM

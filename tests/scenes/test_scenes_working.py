@@ -17,7 +17,7 @@ import fractalcontact as fc
 from fractalcontact import cli
 from fractalcontact.base import threads
 from fractalcontact.base.errors import FractalContactError
-from fractalcontact.base.stopping import Stopped
+from fractalcontact.base.signals import Stopped
 from fractalcontact.scenes import sweeping, working
 
 SWEEP = (

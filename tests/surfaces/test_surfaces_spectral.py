@@ -124,8 +124,8 @@ def _spectrum_of_profile(covariance_of, hurst):
 def _density(band, qy, qx):
     """Return the density written out, up to a factor."""
     mean = 2 / (1 / band.hurst[0] + 1 / band.hurst[1])
-    along = (qx * np.cos(band.rotation) + qy * np.sin(band.rotation)) * np.sqrt(band.stretch)
-    across = (qy * np.cos(band.rotation) - qx * np.sin(band.rotation)) / np.sqrt(band.stretch)
+    along = (qx * np.cos(band.azimuth) + qy * np.sin(band.azimuth)) * np.sqrt(band.anisotropy_ratio)
+    across = (qy * np.cos(band.azimuth) - qx * np.sin(band.azimuth)) / np.sqrt(band.anisotropy_ratio)
     if band.hurst[0] != band.hurst[1]:
         along = band.corner * np.abs(qx / band.corner) ** (band.hurst[1] / mean)
         across = band.corner * np.abs(qy / band.corner) ** (band.hurst[0] / mean)
@@ -176,11 +176,13 @@ def test_closed_form_moments_agree_with_the_sum_over_modes(hurst, rolloff):
 
 
 def test_stretch_lengthens_along_its_azimuth():
-    surface = spectral((128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, stretch=4.0, rotation=0.0)
+    surface = spectral(
+        (128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, azimuth=0.0
+    )
     slope = fc.surfaces.describe(surface)
     assert float(slope.rms_slope_y / slope.rms_slope_x) > 2.0
     turned = fc.surfaces.describe(
-        spectral((128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, stretch=4.0, rotation=90.0)
+        spectral((128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, azimuth=90.0)
     )
     assert float(turned.rms_slope_x / turned.rms_slope_y) > 2.0
 
@@ -242,9 +244,9 @@ def test_every_problem_is_told_at_once():
             rms_slope=0.1,
             normalise="both",
             short_cutoff=1.0,
-            stretch=0,
+            anisotropy_ratio=0,
         )
-    for word in ("hurst", "rms_height / rms_slope", "normalise", "short_cutoff", "stretch"):
+    for word in ("hurst", "rms_height / rms_slope", "normalise", "short_cutoff", "anisotropy_ratio"):
         assert any(problem.startswith(word) for problem in caught.value.problems)
 
 
@@ -255,8 +257,8 @@ def test_every_problem_is_told_at_once():
         ({"short_cutoff": 1e-5, "rolloff": 5e-6}, "short_cutoff"),
         ({"shape": (4, 4), "long_cutoff": 2.7e-6, "short_cutoff": 2.1e-6}, "at least one mode"),
         ({"rms_height": 0.0}, "rms_height"),
-        ({"hurst": (0.4, 0.8), "stretch": 2.0}, "stretch"),
-        ({"shape": 64, "stretch": 2.0}, "stretch"),
+        ({"hurst": (0.4, 0.8), "anisotropy_ratio": 2.0}, "anisotropy_ratio"),
+        ({"shape": 64, "anisotropy_ratio": 2.0}, "anisotropy_ratio"),
         ({"shape": 64, "hurst": (0.5, 0.6)}, "hurst"),
     ],
 )

@@ -15,7 +15,7 @@ from fractalcontact.base.schema import QUANTITIES
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fractalcontact.base.checks import Problems
+    from fractalcontact.base.validation import Problems
 
 
 def leading_coords(

@@ -1,0 +1,121 @@
+"""The one path of every public call: check, time, compute, label, record where the result comes from.
+
+    def _check(problems, mask, *, connectivity, **_):
+        problems.choice("connectivity", connectivity, (4, 8))
+
+    @public_result(title="Islands of contact", references="...", achieved_error="exact", check=_check)
+    def islands(mask, *, connectivity=8):
+        ...
+        return xr.Dataset(variables, coords, attrs={"labelled_by": "scikit-image"})
+
+The function returns plain variables and coordinates under names of `base.schema`. Attributes `comment`,
+`reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
+entries of its provenance, except `title` and `references`, which replace those of the decorator.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import time
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
+
+from fractalcontact.base.provenance import PAPER, stamp
+from fractalcontact.base.schema import label
+from fractalcontact.base.validation import Problems
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+P = ParamSpec("P")
+R = TypeVar("R", "xr.Dataset", "xr.DataArray")
+R_co = TypeVar("R_co", covariant=True)
+
+
+class PublicFunction(Protocol[P, R_co]):
+    """A public function; `validate` takes the same arguments, checks them and computes nothing."""
+
+    __name__: str
+    __signature__: inspect.Signature
+
+    def __call__(self, *arguments: P.args, **options: P.kwargs) -> R_co:
+        """Compute the result."""
+
+    def validate(self, *arguments: P.args, **options: P.kwargs) -> None:
+        """Raise `InvalidInput` where the call would."""
+
+
+def public_result(
+    *,
+    title: str,
+    references: str = PAPER,
+    achieved_error: str | None = None,
+    check: Callable[..., None] | None = None,
+) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
+    """Return a decorator that validates, times, labels and documents the result of a public function.
+
+    Parameters
+    ----------
+    title : str
+        What the result is, in a few words.
+    references : str
+        The source of the method.
+    achieved_error : str, optional
+        The error in words, for a result that carries no number for it.
+    check : callable, optional
+        Called as ``check(problems, **arguments)`` with a `Problems` and every argument, defaults included,
+        before the function; its problems are raised together.
+    """
+
+    def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
+        signature = inspect.signature(function)
+        name = public_name(function)
+
+        def checked(*arguments: Any, **options: Any) -> dict[str, Any]:
+            bound = signature.bind(*arguments, **options)
+            bound.apply_defaults()
+            if check is not None:
+                with Problems(name) as problems:
+                    check(problems, **bound.arguments)
+            return bound.arguments
+
+        @wraps(function)
+        def call(*arguments: P.args, **options: P.kwargs) -> R:
+            start = time.perf_counter()
+            parameters = checked(*arguments, **options)
+            result = function(*arguments, **options)
+            facts: dict[str, Any] = {"title": title, "references": references} | result.attrs
+            result.attrs = {}
+            if achieved_error is not None:
+                facts.setdefault("achieved_error", achieved_error)
+            elapsed = time.perf_counter() - start
+            if hasattr(result, "data_vars") and "run_time" not in result.variables:
+                result["run_time"] = elapsed
+            facts.setdefault("run_time", elapsed)
+            return stamp(label(result, keep_notes=True), name, parameters, **facts)
+
+        def validate(*arguments: P.args, **options: P.kwargs) -> None:
+            checked(*arguments, **options)
+
+        public = cast("PublicFunction[P, R]", call)
+        public.validate = validate  # type: ignore[method-assign]
+        return public
+
+    return decorate
+
+
+def public_name(function: Callable[..., Any]) -> str:
+    """Return the name under which users call a function of a private module."""
+    parts = [part for part in function.__module__.split(".") if not part.startswith("_")]
+    return ".".join([*parts, function.__qualname__])
+
+
+def provenance_of(data: xr.Dataset | xr.DataArray) -> dict[str, Any]:
+    """Return the provenance of a result, as `stamp` wrote it; empty where there is none."""
+    try:
+        entry = json.loads(data.attrs.get("provenance", "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return entry if isinstance(entry, dict) else {}

@@ -1,0 +1,336 @@
+"""Argument validation: every problem of a call is collected, and all are raised in one error.
+
+    with Problems("fractalcontact.contact.press") as problems:
+        problems.number("contact_modulus", contact_modulus, above=0)
+        problems.choice("method", method, ("fast", "elimination"))
+
+A check answers True or False and changes nothing. On leaving the block one `InvalidInput` lists every
+problem; without one, all values are valid. A check that needs valid values asks first:
+
+        if problems.surface("surface", surface) and problems.number("lag", lag, above=0):
+            problems.require(lag < extent, "lag", f"less than {extent:g} m", lag)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
+from os import PathLike
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fractalcontact.base.grid import Grid
+
+LARGEST_INTEGER = 1 << 53  # the integers beyond it are not all representable as float64
+
+
+class Problems:
+    """Collects the problems of a call and raises them all on leaving the `with` block.
+
+    Parameters
+    ----------
+    where : str
+        The public name that was called, or the file that was read.
+    error : type, default InvalidInput
+        The exception to raise.
+    """
+
+    def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
+        self.where = where
+        self.error = error
+        self.found: list[str] = []
+
+    def __enter__(self) -> Problems:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if isinstance(value, InvalidInput):
+            self._extend(value.problems)
+            raise self.error(self.where, self.found) from value
+        if kind is None and self.found:
+            raise self.error(self.where, self.found)
+
+    def add(self, argument: str, expected: str, got: object) -> None:
+        """Note that `argument` should have been `expected` and was `got`."""
+        self.found.append(f"{argument}: expected {expected}, got {_shown(got)}")
+
+    @contextmanager
+    def collect(self, prefix: str = "") -> Iterator[None]:
+        """Collect the problems of an `InvalidInput` raised in the block, and continue after it.
+
+        Use it around the construction of options that validate themselves, so that the problems of several
+        are raised together.
+        """
+        try:
+            yield
+        except InvalidInput as error:
+            self._extend(f"{prefix}{line}" for line in error.problems)
+
+    def _extend(self, lines: Iterable[str]) -> None:
+        self.found.extend(line for line in lines if line not in self.found)
+
+    def require(self, condition: bool, argument: str, expected: str, got: object) -> bool:
+        """Note a problem unless `condition` holds; return the condition."""
+        if not condition:
+            self.add(argument, expected, got)
+        return bool(condition)
+
+    def number(
+        self,
+        argument: str,
+        value: Any,
+        *,
+        above: float | None = None,
+        at_least: float | None = None,
+        below: float | None = None,
+        at_most: float | None = None,
+        optional: bool = False,
+    ) -> bool:
+        """Check for one finite real number inside the bounds; `optional` allows None."""
+        if value is None and optional:
+            return True
+        if _number_of_axes(value) != 0:
+            self.add(argument, "one number", value)
+            return False
+        return self.numbers(argument, value, above=above, at_least=at_least, below=below, at_most=at_most)
+
+    def numbers(
+        self,
+        argument: str,
+        value: Any,
+        *,
+        above: float | None = None,
+        at_least: float | None = None,
+        below: float | None = None,
+        at_most: float | None = None,
+        optional: bool = False,
+    ) -> bool:
+        """Check for one or several finite real numbers inside the bounds; `float_array` converts them."""
+        if value is None and optional:
+            return True
+        expected = _interval(above, at_least, below, at_most)
+        values = _real_numbers(value)
+        if values is None or values.size == 0:
+            self.add(argument, expected, value if values is None else "an empty sequence")
+            return False
+        if values.ndim > 1:
+            self.add(argument, "a number or a 1-D sequence", f"an array of shape {values.shape}")
+            return False
+        good = np.isfinite(values)
+        good &= True if above is None else values > above
+        good &= True if at_least is None else values >= at_least
+        good &= True if below is None else values < below
+        good &= True if at_most is None else values <= at_most
+        if not good.all():
+            self.add(argument, expected, values[~good][0])
+        return bool(good.all())
+
+    def integer(
+        self,
+        argument: str,
+        value: Any,
+        *,
+        at_least: int | None = None,
+        at_most: int | None = None,
+        optional: bool = False,
+    ) -> bool:
+        """Check for one integer inside the bounds; `optional` allows None."""
+        if value is None and optional:
+            return True
+        inside = False
+        if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+            low = -LARGEST_INTEGER if at_least is None else at_least
+            high = LARGEST_INTEGER if at_most is None else at_most
+            inside = low <= int(value) <= high
+        return self.require(inside, argument, _interval(None, at_least, None, at_most, "an integer"), value)
+
+    def boolean(self, argument: str, value: Any, *, optional: bool = False) -> bool:
+        """Check for True or False; `optional` allows None."""
+        valid = isinstance(value, (bool, np.bool_)) or (optional and value is None)
+        return self.require(valid, argument, "None, True or False" if optional else "True or False", value)
+
+    def choice(self, argument: str, value: Any, allowed: Iterable[str], *, optional: bool = False) -> bool:
+        """Check for one of the allowed words; `optional` allows None."""
+        words = tuple(allowed)
+        valid = (isinstance(value, str) and value in words) or (optional and value is None)
+        return self.require(valid, argument, f"one of {_quoted(words)}{did_you_mean(value, words)}", value)
+
+    def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> bool:
+        """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""
+        words = tuple(allowed)
+        if not isinstance(value, (str, Sequence, np.ndarray)) or _number_of_axes(word_list(value)) != 1:
+            self.add(argument, f"a sequence out of {_quoted(words)}", value)
+            return False
+        wrong = [word for word in word_list(value) if not isinstance(word, str) or word not in words]
+        for word in wrong:
+            self.add(argument, f"words out of {_quoted(words)}{did_you_mean(word, words)}", word)
+        return not wrong
+
+    def exactly_one(self, **options: object) -> bool:
+        """Check that one of the options is given and the others are None; `given_option` returns it."""
+        given = [name for name, value in options.items() if value is not None]
+        return self.require(len(given) == 1, " / ".join(options), "exactly one of them", given or "none")
+
+    def finite(self, argument: str, array: xr.DataArray | np.ndarray, *, remedy: str = "") -> bool:
+        """Check that all values are finite; otherwise report how many are not."""
+        values = np.asarray(array)
+        missing = values.size - int(np.count_nonzero(np.isfinite(values)))
+        expected = "finite values" + (f" ({remedy})" if remedy else "")
+        return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
+
+    def path(self, argument: str, value: Any) -> bool:
+        """Check for the path of a file: text or a `pathlib.Path`."""
+        valid = isinstance(value, (str, PathLike)) and str(value) != "" and "\0" not in str(value)
+        return self.require(valid, argument, "the path of a file", value)
+
+    def surface(
+        self,
+        argument: str,
+        value: Any,
+        *,
+        finite: bool = True,
+        smallest: int = 3,
+        leading: bool = False,
+        profile: bool = False,
+        decades: int | None = None,
+    ) -> bool:
+        """Check for heights in metres on a uniform grid; `base.grid.read_grid` then reads the grid.
+
+        Parameters
+        ----------
+        argument : str
+            Name of the argument.
+        value : DataArray
+            Dims (..., y, x), or (..., x) where `profile` allows one.
+        finite : bool
+            Refuse NaN and infinite heights.
+        smallest : int
+            Smallest number of points along each axis.
+        leading : bool
+            Allow dims before (y, x).
+        profile : bool
+            Allow a profile, dims (..., x) without y.
+        decades : int, optional
+            Allowed powers of ten of a metre, up and down, for heights and their range.
+        """
+        from fractalcontact.base.grid import DECADES, check_surface
+
+        before = len(self.found)
+        check_surface(
+            value,
+            self,
+            argument,
+            finite=finite,
+            smallest=smallest,
+            leading=leading,
+            profile=profile,
+            decades=DECADES if decades is None else decades,
+        )
+        return len(self.found) == before
+
+    def grid(self, argument: str, array: Any, *, dims: Sequence[str] = ("y", "x")) -> bool:
+        """Check that `dims` are the last dims of a DataArray and have uniform coordinates in metres."""
+        from fractalcontact.base.grid import grid_of
+
+        before = len(self.found)
+        grid_of(array, self, argument, dims=dims)
+        return len(self.found) == before
+
+    def periodic(self, argument: str, value: Any, grid: Grid) -> bool:
+        """Check a choice of periodicity (None, True, False); `base.grid.periodic_axes` then applies it.
+
+        A periodic axis may be declared free, never the reverse; True therefore needs every axis to be
+        periodic, except where the array has no coordinates.
+        """
+        if not self.boolean(argument, value, optional=True):
+            return False
+        allowed = not value or not grid.known or all(grid.periodic)
+        expected = "periodic axes (attribute `period` of x and y equal to n * spacing)"
+        return self.require(allowed, argument, expected, value)
+
+
+def float_array(value: Any) -> np.ndarray:
+    """Return one or several numbers that passed `Problems.numbers` as a 1-D float64 array."""
+    return np.atleast_1d(np.asarray(value, dtype=np.float64))
+
+
+def word_list(value: Any) -> list[Any]:
+    """Return one word, or a sequence of words, as a list."""
+    return [value] if isinstance(value, str) else list(value)
+
+
+def word_tuple(value: Any) -> tuple[str, ...]:
+    """Return words that passed `Problems.choices`, without repetition; none for None."""
+    return () if value is None else tuple(dict.fromkeys(str(word) for word in word_list(value)))
+
+
+def given_option(**options: Any) -> tuple[str, Any]:
+    """Return name and value of the one option that is not None (see `Problems.exactly_one`)."""
+    return next((name, value) for name, value in options.items() if value is not None)
+
+
+def did_you_mean(word: object, words: Iterable[str]) -> str:
+    """Return a question that names the allowed word nearest to a wrong one, or nothing."""
+    near = get_close_matches(word, tuple(words), n=1) if isinstance(word, str) else []
+    return f" (did you mean {near[0]!r}?)" if near and near[0] != word else ""
+
+
+def _real_numbers(value: Any) -> np.ndarray | None:
+    """Return real numbers as an array of at least one axis, None for anything else."""
+    if isinstance(value, (bool, np.bool_, str, bytes, dict)):
+        return None
+    try:
+        if np.iscomplexobj(value):
+            return None
+        return float_array(value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _number_of_axes(value: Any) -> int | None:
+    """Return the number of axes, 0 for a scalar; None for a ragged sequence."""
+    try:
+        return np.ndim(value)
+    except ValueError:
+        return None
+
+
+def _interval(
+    above: float | None,
+    at_least: float | None,
+    below: float | None,
+    at_most: float | None,
+    what: str = "a finite number",
+) -> str:
+    bounds = [
+        f"{sign} {bound:g}"
+        for sign, bound in ((">", above), (">=", at_least), ("<", below), ("<=", at_most))
+        if bound is not None
+    ]
+    return " ".join([what, " and ".join(bounds)]).strip()
+
+
+def _quoted(words: Iterable[str]) -> str:
+    return ", ".join(map(repr, words))
+
+
+def _shown(value: object) -> str:
+    """Return a short, one-line rendering for an error message."""
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    if type(value).__module__.startswith("xarray"):
+        return f"a {type(value).__name__} with dims {tuple(getattr(value, 'dims', ()))}"
+    if isinstance(value, (np.floating, np.integer, np.bool_)):
+        value = value.item()
+    text = value if isinstance(value, str) and " " in value else repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."
