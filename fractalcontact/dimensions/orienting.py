@@ -84,8 +84,8 @@ def directions(
     of a stretched fractional Brownian surface, edges and gaps counted. Where the exponent changes with the
     lag, the interval also holds those of the shorter and of the longer lags; where no stretch explains the
     face (`anisotropy_p_value` below .001), or ridges run on, there is none. A periodic face is measured by
-    the waves of its band that run within 11 degrees of the direction: where two exponents H_x and H_y were built
-    in, with the harmonic mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
+    the waves of its band that run within 11 degrees of the direction: where two exponents H_x and H_y were
+    built in, with the harmonic mean H, the waves along x fall off with the exponent H_x (1 + 1/H) - 1.
 
     Tests: of a periodic face, the modes over the mean of their ring of wavevectors are held against the
     second and fourth harmonics of the direction, in level and in slope (chi square with 8 degrees of
