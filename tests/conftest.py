@@ -1,4 +1,4 @@
-"""What every test may ask for."""
+"""Options and fixtures that every test may use."""
 
 import os
 from pathlib import Path
@@ -6,6 +6,38 @@ from pathlib import Path
 import pytest
 
 DATA = "FRACTALCONTACT_DATA"
+STRICT = "FRACTALCONTACT_STRICT_SKIPS"
+# other solvers are compared with where they are installed, and are never required
+RIVALS = ("tamaas", "ContactMechanics", "aspher")
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--strict-skips",
+        action="store_true",
+        default=bool(os.environ.get(STRICT)),
+        help=f"fail every test that is skipped for a missing library or missing data (or set {STRICT}=1)",
+    )
+
+
+def _fail_if_skipped(report, config):
+    """Turn a skip into a failure, in strict mode."""
+    if report.skipped and config.getoption("--strict-skips") and not hasattr(report, "wasxfail"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        if not any(name in reason for name in RIVALS):
+            report.outcome = "failed"
+            report.longrepr = f"skipped, which strict mode does not allow: {reason}"
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    return _fail_if_skipped((yield), item.config)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    return _fail_if_skipped((yield), collector.config)
 
 
 @pytest.fixture(scope="session")
@@ -19,7 +51,7 @@ def measured():
 
 @pytest.fixture(scope="session")
 def compliance():
-    """Return a function that gives the findings of the CF checker for a flat file."""
+    """Return a function that lists the findings of the CF checker for a flat file."""
     import warnings
 
     with warnings.catch_warnings():

@@ -1,0 +1,65 @@
+"""The examples in docstrings and in the README run, and every public name has one."""
+
+import doctest
+import importlib
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints", "accuracy", "scenes", "plotting")
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def public_names():
+    """Yield every public function and class as subpackage.name."""
+    yield from ("save", "open")
+    for subpackage in SUBPACKAGES:
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
+        for name in module.__all__:
+            if callable(getattr(module, name)):
+                yield f"{subpackage}.{name}"
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mpl.use("Agg")
+
+
+def public_object(name):
+    result = importlib.import_module("fractalcontact")
+    for part in name.split("."):
+        result = getattr(result, part)
+    return result
+
+
+@pytest.mark.parametrize("name", list(public_names()))
+def test_docstring_example_runs(name):
+    tests = [test for test in doctest.DocTestFinder().find(public_object(name), name) if test.examples]
+    assert tests, f"{name} has no example"
+    for test in tests:
+        result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(test)
+        assert result.failed == 0
+
+
+@pytest.mark.parametrize("name", list(public_names()))
+def test_docstring_starts_with_one_sentence_and_fits_a_screen(name):
+    lines = public_object(name).__doc__.strip().splitlines()
+    assert lines[0].endswith((".", "?")), lines[0]
+    assert len(lines) == 1 or not lines[1].strip(), "one line of purpose, then a blank line"
+    assert len(lines) <= LONGEST_DOCSTRING.get(name, 75)
+
+
+# functions whose list of parameters and results alone is longer than a screen
+LONGEST_DOCSTRING: dict[str, int] = {}
+
+
+def test_readme_example_runs():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), {})
+    assert list(Path().glob("*.nc"))
