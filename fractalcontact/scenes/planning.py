@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from fractalcontact.base.text import table
+from fractalcontact.base.tables import table
 from fractalcontact.scenes.grammar import ISLANDS, LOADS, SOLVED
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.netcdf import Outline, outline
-from fractalcontact.base.text import table
+from fractalcontact.base.tables import table
 from fractalcontact.scenes.statements import paper_table
 
 if TYPE_CHECKING:

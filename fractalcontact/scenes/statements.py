@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fractalcontact.base.text import table
+from fractalcontact.base.tables import table
 
 if TYPE_CHECKING:
     import xarray as xr

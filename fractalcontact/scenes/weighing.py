@@ -17,7 +17,7 @@ import numpy as np
 from fractalcontact.base.errors import FractalContactError
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
-from fractalcontact.base.text import table
+from fractalcontact.base.tables import table
 from fractalcontact.scenes.choosing import choose
 from fractalcontact.scenes.given import face_grid
 from fractalcontact.scenes.needing import least, least_stages
