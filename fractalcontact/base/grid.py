@@ -109,12 +109,13 @@ def read_grid(array: xr.DataArray, dims: Sequence[str] = ("y", "x")) -> Grid:
     spacing, periodic = [], []
     for dim in dims:
         coordinate = array.coords[dim]
-        n, period = coordinate.size, coordinate.attrs.get("period")
+        centres = np.asarray(coordinate.values, dtype=np.float64)
+        n, period = centres.size, coordinate.attrs.get("period")
         if n < 2:  # one point along the axis: its extent is the period
             spacing.append(float(period))
             periodic.append(True)
             continue
-        step = float(coordinate[-1] - coordinate[0]) / (n - 1)
+        step = float(centres[-1] - centres[0]) / (n - 1)
         spacing.append(step)
         periodic.append(period is not None and abs(float(period) - n * step) <= UNIFORM * float(period))
     return Grid(tuple(int(array.sizes[dim]) for dim in dims), tuple(spacing), tuple(periodic))

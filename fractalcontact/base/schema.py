@@ -8,6 +8,7 @@ are degrees and counts are "1". Nothing is named `load`, which is a method of xa
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,11 +23,15 @@ CORE_DIMS = ("y", "x")
 
 @dataclass(frozen=True)
 class Quantity:
-    """Unit (UDUNITS) and meaning of one name; `attributes` are written as they stand."""
+    """Unit (UDUNITS) and meaning of one name; `attributes` are written as they stand.
+
+    A function may state one of `other_units` instead, as for scales in cells.
+    """
 
     units: str | None
     long_name: str
     attributes: dict[str, Any] = field(default_factory=dict)
+    other_units: tuple[str, ...] = ()
 
 
 OPEN, CONTACT, YIELDED = 0, 1, 2
@@ -100,8 +105,8 @@ QUANTITIES: dict[str, Quantity] = {
     "standard_error": Quantity("1", "standard error of the Hurst exponent"),
     "ci_low": Quantity("1", "lower end of the 95 % confidence interval of the Hurst exponent", _NO_INTERVAL),
     "ci_high": Quantity("1", "upper end of the 95 % confidence interval of the Hurst exponent", _NO_INTERVAL),
-    "scale_min": Quantity("m", "smallest scale of the fit"),
-    "scale_max": Quantity("m", "largest scale of the fit"),
+    "scale_min": Quantity("m", "smallest scale of the fit", other_units=("1",)),
+    "scale_max": Quantity("m", "largest scale of the fit", other_units=("1",)),
     "scale_count": Quantity("1", "number of scales in the fit"),
     "rms_increment": Quantity("m", "root mean square height increment over one lag"),
     "increment_lag": Quantity("m", "lag of the height increment"),
@@ -399,7 +404,8 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     ----------
     data : Dataset or DataArray
         Every variable and coordinate is known to the table; a DataArray by its `name`. The coordinate of a
-        dim may have a name of the user's own: it keeps its own units and meaning.
+        dim may have a name of the user's own, and so may one of the rows of a table that is called after
+        their dim (`island_seed`): it keeps its own units and meaning.
     keep_notes : bool
         Keep the attributes `long_name`, `comment` and `reason` of the variables of a Dataset.
 
@@ -415,13 +421,15 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     """
     data = data.copy(deep=False)
     for name, coordinate in data.coords.items():
-        if name not in QUANTITIES and coordinate.dims == (name,):
+        if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
             _label_own(str(name), coordinate.variable)
         else:
             _label_variable(str(name), coordinate.variable, is_coordinate=True)
     if hasattr(data, "data_vars"):
         for name, variable in data.data_vars.items():
             notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}
+            if name in QUANTITIES and variable.attrs.get("units") in QUANTITIES[name].other_units:
+                notes["units"] = variable.attrs["units"]
             _label_variable(str(name), variable.variable, is_coordinate=False)
             variable.variable.attrs.update(notes)
     else:
@@ -450,6 +458,11 @@ def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) ->
         attributes["period"] = float(variable.attrs["period"])
     variable.attrs = attributes
     variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
+
+
+def _follows_dim(name: str, dims: tuple[Hashable, ...]) -> bool:
+    """Return whether a coordinate is that of its only dim, or named after it (`island_seed`)."""
+    return len(dims) == 1 and (name == dims[0] or name.startswith(f"{dims[0]}_"))
 
 
 def _label_own(name: str, variable: xr.Variable) -> None:

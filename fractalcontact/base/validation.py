@@ -114,8 +114,12 @@ class Problems:
         below: float | None = None,
         at_most: float | None = None,
         optional: bool = False,
+        integral: bool = False,
     ) -> bool:
-        """Check for one or several finite real numbers inside the bounds; `float_array` converts them."""
+        """Check for one or several finite real numbers inside the bounds; `float_array` converts them.
+
+        With `integral` they must be integers, of any numeric type.
+        """
         if value is None and optional:
             return True
         expected = _interval(above, at_least, below, at_most)
@@ -133,6 +137,11 @@ class Problems:
         good &= True if at_most is None else values <= at_most
         if not good.all():
             self.add(argument, expected, values[~good][0])
+        if integral:
+            fractional = np.isfinite(values) & (values != np.rint(values))
+            if fractional.any():
+                self.add(argument, "integers", values[fractional][0])
+            good &= ~fractional
         return bool(good.all())
 
     def integer(
