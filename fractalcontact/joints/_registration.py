@@ -1,0 +1,420 @@
+"""Registration of two measured faces: the shift, rotation and tilt that bring them into mated position.
+
+The upper face is rotated by an angle about the centre c of the lower one, shifted, and tilted:
+moved(p) = upper(q) + slope . p with p = c + R (q - c) + shift, all lengths in cells, (y, x). The first guess
+of the shift is the maximum of the masked correlation of the faces without their long waves. Newton steps on
+smoothed faces refine it. Places where the faces are damaged get little weight.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
+from fractalcontact.base.grid import UNIFORM, Grid, read_grid
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Pair = tuple[float, float]
+
+WHERE = "fractalcontact.joints.register"
+SMALLEST = 16  # points along an axis
+UNCERTAIN = 1.0  # cells of standard error beyond which the position counts as undetermined
+SMOOTHING = (4.0, 2.0, 1.0)  # cells; the last width decides, and suppresses what lies between the points
+OVERLAP = 0.3  # smallest fraction of the faces that must overlap
+MAX_STEPS = 40
+SMALL_STEP = 1e-4  # a step this small, in cells at the edge, ends the iteration
+SETTLED = 0.01  # so does one that is this small relative to the standard errors
+FULL_STEPS = 10  # Newton steps of full length; damped ones after them end a cycle of the robust weights
+TILES = 6  # along each axis, left out one by one for the standard errors
+RANK = 1e-9  # relative; below it a shift or rotation does not change the match
+
+
+def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, tilt: Any) -> None:
+    problems.boolean("rotation", rotation)
+    problems.boolean("tilt", tilt)
+    valid = [
+        problems.surface(name, face, finite=False, smallest=SMALLEST)
+        for name, face in (("lower", lower), ("upper", upper))
+    ]
+    if not all(valid):
+        return
+    grid, other = read_grid(lower), read_grid(upper)
+    for axis, name in enumerate(("y", "x")):
+        step, step_upper = grid.spacing[axis], other.spacing[axis]
+        if abs(step_upper - step) * other.shape[axis] > UNIFORM * step * 100:
+            problems.add(f"upper.{name}", f"the spacing of lower, {step:g} m", f"{step_upper:g} m")
+    for argument, face in (("lower", lower), ("upper", upper)):
+        values = np.asarray(face.values, dtype=np.float64)
+        problems.require(not np.isinf(values).any(), argument, "no infinite heights", "some")
+        problems.require(bool(np.isfinite(values).any()), argument, "heights", "none")
+    ratio = grid.spacing[0] / grid.spacing[1]
+    # a rotation in cells is one in the plane only where the cells are square
+    square = not rotation or abs(ratio - 1.0) <= UNIFORM
+    problems.require(square, "rotation", "False where spacings differ", f"a ratio of {ratio:g}")
+
+
+@public_result(
+    title="two faces in mated position",
+    references="Padfield, D., Masked object registration in the Fourier domain, IEEE TIP 21 (2012)",
+    check=_check,
+)
+def register(
+    lower: xr.DataArray, upper: xr.DataArray, *, rotation: bool = True, tilt: bool = True
+) -> xr.Dataset:
+    """Move the upper of two measured faces into mated position over the lower one.
+
+    The upper face is shifted, rotated about the middle of the lower face and tilted until the aperture varies
+    least; then it is interpolated to the grid of the lower face. The mean aperture stays as measured.
+
+    Parameters
+    ----------
+    lower, upper : DataArray, shape (y, x)
+        Heights (m) of two facing faces, both up positive and seen from above: a scan of the upper body from
+        below must be mirrored and turned over first. Equal spacing; the extents may differ. Missing heights
+        (NaN) are allowed.
+    rotation, tilt : bool
+        Whether the face may be rotated and tilted.
+
+    Returns
+    -------
+    Dataset
+        height (y, x): the upper face in mated position on the grid of `lower`, NaN where it was not measured,
+        the `upper` of a `Crack`; aperture (y, x) = height - lower; shift_x, shift_y (m), rotation (degree,
+        anticlockwise), tilt_x, tilt_y (slopes): the motion of the upper face; shift_x_error, shift_y_error,
+        rotation_error: jackknife standard errors over 6 x 6 tiles; mismatch (m, standard deviation of the
+        aperture), correlation (of the facing heights), common_fraction, iterations, converged, run_time (s).
+
+    Raises
+    ------
+    InvalidInput
+        The faces are not on grids of equal spacing, have fewer than 16 points along an axis, do not overlap,
+        have no relief that determines their position, or are rotated by more than about 5 degrees.
+
+    Warns
+    -----
+    ConvergenceWarning
+        The position was still moving after the last step, or its standard error exceeds one point: the faces
+        may not belong together.
+
+    Notes
+    -----
+    The first guess is the best correlation over all shifts of whole cells, of the faces without their long
+    waves. Least squares with robust weights refine it, on faces smoothed over 4, 2 and 1 cells. The
+    interpolation (cubic spline) smooths the face slightly.
+
+    References
+    ----------
+    Padfield (2012), IEEE Trans. Image Process. 21:2706 (masked correlation).
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> block = fc.surfaces.fbm((72, 72), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    >>> lower, upper = block[4:68, 4:68], block[4:68, 2:66]  # the upper face lies 2 cells too far east
+    >>> upper = upper.assign_coords(x=lower.x)
+    >>> mated = fc.joints.register(lower, upper, rotation=False, tilt=False)
+    >>> round(float(mated.shift_x) / 1e-4, 2), round(float(mated.correlation), 3)
+    (-2.0, 1.0)
+    """
+    low, up = (np.asarray(face.values, dtype=np.float64) for face in (lower, upper))
+    grid = read_grid(lower)
+    starts = [
+        float(upper[dim].values[0] - lower[dim].values[0]) / step
+        for dim, step in zip(("y", "x"), grid.spacing, strict=True)
+    ]
+    offset = (starts[0], starts[1])
+    pose = find_pose(low, up, offset, rotation, tilt)
+    if not pose.determined:
+        expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
+        raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
+    moved = resample(up, source_places(pose, low.shape, offset))
+    moved += _tilted_plane(pose, np.isfinite(moved - low))
+    _warn(pose)
+    return _dataset(lower, low, moved, pose, grid)
+
+
+def _warn(pose: Pose) -> None:
+    if not pose.converged:
+        warnings.warn(
+            f"{WHERE}: not converged after {pose.iterations} steps", ConvergenceWarning, stacklevel=4
+        )
+    error = max(pose.errors[:2])
+    if error > UNCERTAIN:
+        warnings.warn(
+            f"{WHERE}: position not determined, only to {error:.2g} points: do the faces belong together, "
+            "turned by a few degrees at most?",
+            ConvergenceWarning,
+            stacklevel=4,
+        )
+
+
+def _tilted_plane(pose: Pose, common: Array) -> Array:
+    """Return the plane of the tilt, with mean zero over the common part."""
+    y, x = np.indices(common.shape, dtype=float)
+    plane = pose.slope[0] * y + pose.slope[1] * x
+    return np.asarray(plane - plane[common].mean())
+
+
+def _dataset(lower: xr.DataArray, low: Array, moved: Array, pose: Pose, grid: Grid) -> xr.Dataset:
+    aperture = moved - low
+    common = np.isfinite(aperture)
+    dy, dx = grid.spacing
+    return xr.Dataset(
+        {
+            "height": (("y", "x"), moved),
+            "aperture": (("y", "x"), aperture),
+            "shift_x": pose.shift[1] * dx,
+            "shift_y": pose.shift[0] * dy,
+            "rotation": math.degrees(pose.angle),
+            "tilt_x": pose.slope[1] / dx,
+            "tilt_y": pose.slope[0] / dy,
+            "shift_x_error": pose.errors[1] * dx,
+            "shift_y_error": pose.errors[0] * dy,
+            "rotation_error": math.degrees(pose.errors[2]),
+            "mismatch": float(aperture[common].std()),
+            "correlation": float(np.corrcoef(low[common], moved[common])[0, 1]),
+            "common_fraction": float(common.mean()),
+            "iterations": pose.iterations,
+            "converged": pose.converged,
+        },
+        coords={"y": lower["y"].variable, "x": lower["x"].variable},
+    )
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Shift (cells, y and x), angle (rad, anticlockwise), slope of the upper face (height per cell)."""
+
+    shift: Pair = (0.0, 0.0)
+    angle: float = 0.0
+    slope: Pair = (0.0, 0.0)
+    errors: tuple[float, float, float] = (math.nan, math.nan, math.nan)  # of shift y, shift x, angle
+    iterations: int = 0
+    converged: bool = False
+    determined: bool = True
+
+
+def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> Pose:
+    """Return the pose of the upper face.
+
+    Parameters
+    ----------
+    lower, upper : ndarray, shapes (ny, nx), (my, mx)
+        Heights, NaN where missing.
+    offset : pair of float
+        Place of the first point of `upper` on the grid of `lower`, in cells.
+    rotates, tilts : bool
+        Whether to fit a rotation and a tilt.
+    """
+    # no step depends on a constant height between the faces or on the unit of height
+    lower, upper = lower - np.nanmean(lower), upper - np.nanmean(upper)
+    largest = max(float(np.nanmax(np.abs(face))) for face in (lower, upper))
+    if largest == 0:
+        return Pose(determined=False)
+    unit = math.ldexp(1.0, math.frexp(largest)[1])
+    lower, upper = lower / unit, upper / unit
+    pose = Pose(shift=coarse_shift(lower, upper, offset))
+    widest = min(*lower.shape, *upper.shape) / 16.0
+    for width in SMOOTHING:
+        # near an edge the mean of fewer heights is noisier, and would pull the edges together
+        low, up = (smooth(face, min(width, widest), 0.95) for face in (lower, upper))
+        pose = _refine(pose, low, up, offset, rotates, tilts)
+        if not pose.determined:
+            break
+    return replace(pose, slope=(pose.slope[0] * unit, pose.slope[1] * unit))
+
+
+def coarse_shift(lower: Array, upper: Array, offset: Pair) -> Pair:
+    """Return the shift of whole cells at which the faces, without their long waves, correlate most."""
+    from skimage.registration import phase_cross_correlation
+
+    width = max(min(*lower.shape, *upper.shape) / 16.0, 1.0)
+    shape = tuple(max(a, b) for a, b in zip(lower.shape, upper.shape, strict=True))
+    planes, masks = [], []
+    for face in (lower, upper):
+        observed = np.zeros(shape, bool)
+        plane = np.zeros(shape)
+        inside = tuple(slice(n) for n in face.shape)
+        observed[inside] = np.isfinite(face)
+        plane[inside] = np.where(np.isfinite(face), face - smooth(face, width), 0.0)
+        planes.append(plane / (math.sqrt(float(np.mean(plane**2))) or 1.0))
+        masks.append(observed)
+    correlation = phase_cross_correlation(
+        *planes, reference_mask=masks[0], moving_mask=masks[1], overlap_ratio=OVERLAP
+    )
+    shift = np.asarray(correlation[0], dtype=float)
+    # the correlation counts from the corners of the arrays
+    return float(shift[0] - offset[0]), float(shift[1] - offset[1])
+
+
+def smooth(face: Array, width: float, smallest_weight: float = 0.0) -> Array:
+    """Return a Gaussian mean over the observed heights, NaN where the face is missing.
+
+    It is NaN too where less than `smallest_weight` of the Gaussian was observed.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    observed = np.isfinite(face)
+    weight = gaussian_filter(observed.astype(float), width, mode="constant")
+    total = gaussian_filter(np.where(observed, face, 0.0), width, mode="constant")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(observed & (weight >= smallest_weight), total / weight, np.nan)
+
+
+def source_places(pose: Pose, shape: tuple[int, ...], offset: Pair) -> Array:
+    """Return the place on `upper`, in cells, that lies at every point of `lower`, shape (2, ny, nx)."""
+    y, x = _centred_indices(shape)
+    y, x = y - pose.shift[0], x - pose.shift[1]
+    cosine, sine = math.cos(pose.angle), math.sin(pose.angle)
+    middle = (shape[0] - 1) / 2 - offset[0], (shape[1] - 1) / 2 - offset[1]
+    return np.stack([cosine * y - sine * x + middle[0], sine * y + cosine * x + middle[1]])
+
+
+def resample(face: Array, places: Array) -> Array:
+    """Return heights at fractional places (cubic spline); NaN outside and next to missing heights."""
+    from scipy.ndimage import distance_transform_edt, map_coordinates
+
+    missing = ~np.isfinite(face)
+    filled = face
+    if missing.any():
+        nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+        filled = face[tuple(nearest)]
+    values = map_coordinates(filled, places, order=3, mode="nearest")
+    missing_weight = map_coordinates(missing.astype(float), places, order=1, mode="nearest")
+    last = np.array(face.shape)[:, None, None] - 1
+    outside = ((places < -1e-9) | (places > last + 1e-9)).any(axis=0)
+    return np.where(outside | (missing_weight > 1e-9), np.nan, values)
+
+
+def _centred_indices(shape: tuple[int, ...]) -> tuple[Array, Array]:
+    y, x = np.indices(shape, dtype=float)
+    return y - (shape[0] - 1) / 2, x - (shape[1] - 1) / 2
+
+
+def _refine(pose: Pose, lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> Pose:
+    """Take Newton steps on shift, angle, height and slope, with angle and slope only where wanted."""
+    gradients = np.gradient(lower), np.gradient(upper)
+    edge = max(lower.shape) / 2
+    used = [0, 1] + ([2] if rotates else []) + [3] + ([4, 5] if tilts else [])
+    first = pose.iterations + 1
+    for iteration in range(first, first + MAX_STEPS):
+        system = _normal_equations(pose, lower, upper, gradients, offset, edge)
+        matrix = system.matrices.sum(axis=0)[np.ix_(used, used)]
+        if not _has_full_rank(matrix):
+            return replace(pose, determined=False)
+        step = np.zeros(6)
+        step[used] = np.linalg.solve(matrix, system.vectors.sum(axis=0)[used])
+        step[:3] *= 1.0 if iteration - first < FULL_STEPS else 0.25
+        try:
+            errors = _jackknife_errors(system, used)
+        except np.linalg.LinAlgError:  # one tile alone determines the position
+            return replace(pose, determined=False)
+        settled = np.abs(step[:3]).max() <= max(SMALL_STEP, SETTLED * float(np.nanmin(errors)))
+        pose = Pose(
+            shift=(pose.shift[0] + step[0], pose.shift[1] + step[1]),
+            angle=pose.angle + step[2] / edge,
+            slope=(step[4] / edge, step[5] / edge),
+            errors=(errors[0], errors[1], errors[2] / edge),
+            iterations=iteration,
+            converged=bool(settled),
+        )
+        if settled:
+            break
+    return pose
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Weighted normal equations of every tile, shapes (tiles, 6, 6) and (tiles, 6).
+
+    `error_factor` corrects the standard errors for the robust weights, which change with the residuals.
+    """
+
+    matrices: Array
+    vectors: Array
+    error_factor: float
+
+
+def _normal_equations(
+    pose: Pose, lower: Array, upper: Array, gradients: Any, offset: Pair, edge: float
+) -> NormalEquations:
+    """Return the equations for the step that brings the difference of the faces to zero.
+
+    The gradients of the upper face share the noise of the difference, and least squares on them alone would
+    be biased. They form the columns; the gradients of the lower face are the instruments that multiply them.
+    """
+    places = source_places(pose, lower.shape, offset)
+    cosine, sine = math.cos(pose.angle), math.sin(pose.angle)
+    gy, gx = (resample(part, places) for part in gradients[1])
+    instruments = _columns(pose, gradients[0][0], gradients[0][1], edge)
+    columns = _columns(pose, cosine * gy + sine * gx, cosine * gx - sine * gy, edge)
+    difference = lower - resample(upper, places)
+    observed = np.isfinite(difference + instruments[0] + instruments[1] + columns[0] + columns[1])
+    instruments, columns, target = instruments[:, observed], columns[:, observed], difference[observed]
+    weights, error_factor = _robust_weights(columns, target)
+    tile = _tile_numbers(lower.shape)[observed]
+    matrices, vectors = np.empty((TILES * TILES, 6, 6)), np.empty((TILES * TILES, 6))
+    for i, instrument in enumerate(instruments):
+        weighted = instrument * weights
+        vectors[:, i] = np.bincount(tile, weighted * target, TILES * TILES)
+        for j, column in enumerate(columns):
+            matrices[:, i, j] = np.bincount(tile, weighted * column, TILES * TILES)
+    return NormalEquations(matrices, vectors, error_factor)
+
+
+def _columns(pose: Pose, gy: Array, gx: Array, edge: float) -> Array:
+    """Return the derivatives of the moved heights by shift y, shift x, angle, height and the two slopes."""
+    y, x = _centred_indices(gy.shape)
+    by_angle = (gx * (y - pose.shift[0]) - gy * (x - pose.shift[1])) / edge
+    return np.stack([-gy, -gx, by_angle, np.ones_like(y), y / edge, x / edge])
+
+
+def _robust_weights(columns: Array, target: Array) -> tuple[Array, float]:
+    """Return Cauchy weights, small where the faces differ by more than usual, and their error factor."""
+    if target.size < columns.shape[0]:
+        return np.zeros(target.size), 1.0
+    plane = columns[3:]
+    residual = target - np.linalg.lstsq(plane.T, target, rcond=None)[0] @ plane
+    deviation = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+    if deviation == 0:
+        return np.ones(target.size), 1.0
+    square = (residual / (2.385 * deviation)) ** 2
+    weights = 1.0 / (1.0 + square)
+    return weights, float(np.sum(weights) / np.sum((1.0 - square) * weights**2))
+
+
+def _tile_numbers(shape: tuple[int, ...]) -> Array:
+    rows, columns = (np.arange(n) * TILES // n for n in shape)
+    return np.asarray(rows[:, None] * TILES + columns[None, :])
+
+
+def _has_full_rank(matrix: Array) -> bool:
+    """Return whether every parameter changes the match."""
+    scale = np.sqrt(np.abs(np.diagonal(matrix)))
+    if not (scale > 0).all():
+        return False
+    return bool(np.linalg.svd(matrix / np.outer(scale, scale), compute_uv=False)[-1] > RANK)
+
+
+def _jackknife_errors(system: NormalEquations, used: list[int]) -> Array:
+    """Return the standard errors of shift y, shift x and angle, from leaving out one tile at a time."""
+    block = np.ix_(used, used)
+    matrix, vector = system.matrices.sum(axis=0), system.vectors.sum(axis=0)
+    estimates = np.array(
+        [
+            np.linalg.solve((matrix - tile_matrix)[block], (vector - tile_vector)[used])
+            for tile_matrix, tile_vector in zip(system.matrices, system.vectors, strict=True)
+            if tile_matrix.any()
+        ]
+    )
+    errors = np.full(6, np.nan)
+    errors[used] = np.sqrt((len(estimates) - 1) * estimates.var(axis=0)) * system.error_factor
+    return errors[:3]
