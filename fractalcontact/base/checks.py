@@ -42,6 +42,9 @@ def rehearse(function: Callable[..., Any], *arguments: Any, **options: Any) -> N
     InvalidInput
         What is wrong with the call.
     """
+    if hasattr(function, "validate"):  # see `base.results.public_result`
+        function.validate(*arguments, **options)
+        return
     depth = _depth.set(0)
     try:
         function(*arguments, **options)

@@ -127,6 +127,8 @@ def plain(value: Any) -> Any:
         return value.name
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
+    if callable(getattr(value, "summary", None)):  # an object that describes itself, as a `joints.Crack`
+        return plain(value.summary())
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)

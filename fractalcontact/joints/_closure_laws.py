@@ -21,9 +21,7 @@ REFERENCES = (
     "Mech. Min. Sci. 20 (1983)"
 )
 NO_FIT = "NaN where fewer than three loading steps have a force, or the interface does not close"
-NO_STIFFNESS = (
-    "NaN where there is no force, where a branch of the path has one step only, or nothing closes"
-)
+NO_STIFFNESS = "NaN where there is no force, where a branch of the path has one step only, or nothing closes"
 FITS = ("closure_length", "reference_pressure", "exponential_misfit", "initial_stiffness",
         "greatest_closure", "hyperbolic_misfit")  # fmt: skip
 FEWEST_STEPS = 3  # to fit a law of two parameters
