@@ -88,12 +88,6 @@ def _parser() -> argparse.ArgumentParser:
     accuracy.add_argument(
         "--large", action="store_true", help="with --extreme: those of minutes and gigabytes too"
     )
-    accuracy.add_argument(
-        "--lean",
-        nargs="+",
-        metavar="SCENE",
-        help="tell what scenes load, compile, allocate and write, beside the least they need",
-    )
     accuracy.add_argument("--curves", metavar="FILE", help="write the curves that scenes choose from")
     bench = accuracy.add_argument_group("of estimators")
     bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
@@ -185,8 +179,6 @@ def _accuracy(options: argparse.Namespace) -> int:
         writable(options.out)  # before the measuring, not after it
     if options.extreme:
         return _extremes(options)
-    if options.lean:
-        return _lean(options)
     if options.parts == ["estimators"]:
         return _estimators(options)
     with noted() as stop:
@@ -253,23 +245,6 @@ def _check_accuracy(options: argparse.Namespace) -> None:
             problems.require(options.curves is None, "--curves", "nothing with --extreme", options.curves)
         else:
             problems.require(not options.large, "--large", "nothing without --extreme", "--large")
-
-
-def _lean(options: argparse.Namespace) -> int:
-    from fractalcontact.scenes.weighing import footprint, lean_table
-
-    scenes = [_checked_scene(path) for path in options.lean]
-    found = {scene.name: footprint(scene) for scene in scenes}
-    print(lean_table(found))
-    if options.out is not None:
-        import xarray as xr
-
-        from fractalcontact.base.netcdf import save
-
-        tree = xr.DataTree.from_dict({f"/{name}": one for name, one in found.items()})
-        written = save(tree, Path(options.out) / "lean.nc").name
-        print(f"\nwritten to {options.out}: {written}")
-    return 0
 
 
 def _estimators(options: argparse.Namespace) -> int:

@@ -62,7 +62,7 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = f"fractalcontact {version}"
 html_show_sourcelink = False
-html_sidebars = {"index": [], "data_model": [], "conventions": [], "extremes": [], "lean": []}
+html_sidebars = {"index": [], "data_model": [], "conventions": [], "extremes": []}
 html_theme_options = {
     "show_prev_next": False,
     "navbar_end": ["theme-switcher"],

@@ -8,7 +8,6 @@ def setup(app):
     """Make the directive `names` known to sphinx."""
     app.add_directive("names", Names)
     app.add_directive("extremes", Extremes)
-    app.add_directive("lean", Lean)
     app.connect("autodoc-process-docstring", escape_bars)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -45,27 +44,6 @@ class Extremes(Directive):
             for name, quantity, *rest in rows
         ]
         return [table((16, 28, 26, 12, 12, 8, 8), (head[0], "what is extreme", *head[1:]), told)]
-
-
-class Lean(Directive):
-    """What scenes take beside the least that they need, measured by this build, their figures left out."""
-
-    required_arguments = 1
-    final_argument_whitespace = True
-
-    def run(self):
-        from dataclasses import replace
-
-        from fractalcontact import scenes
-        from fractalcontact.scenes.weighing import lean_rows
-
-        found = {}
-        for name in self.arguments[0].split():
-            scene = scenes.load(name)
-            want = {**scene.table("want"), "figures": False}
-            found[name] = scenes.footprint(replace(scene, tables={**scene.tables, "want": want}))
-        head, *rows = lean_rows(found)
-        return [table((15, 10, 9, 9, 14, 14, 12, 9, 14), head, rows)]
 
 
 def table(widths, head, rows):

@@ -1,4 +1,4 @@
-"""What this process holds: its memory, what it has written, and a library that it can do without."""
+"""What this process holds: its memory, and a library that it can do without."""
 
 from __future__ import annotations
 
@@ -17,12 +17,6 @@ def most_memory() -> int:
     except ImportError:
         return 0
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-
-
-def written() -> int | None:
-    """Return the bytes that this process has written so far, None where the system does not tell."""
-    told = _lines(Path("/proc/self/io")).get("wchar")
-    return None if told is None else int(told)
 
 
 def _lines(path: Path) -> dict[str, str]:

@@ -11,7 +11,6 @@ studying    one study, stage by stage; `sweeping`: an ensemble, member by member
 working     tasks carried out here or on workers; `keeping`: finished parts, to go on from
 running     a scene checked, carried out, drawn and written as one file
 reporting   the summary on the screen
-weighing    what a scene takes, beside the least of `needing`; `probing`: the process it runs in
 statements  what the founding paper says beside what a study finds
 
 Nothing is computed, imported, compiled or stored that no wanted result needs. A scene is TOML:
