@@ -21,6 +21,8 @@ UNLABELLED = {
     "joints.barton_choubey_strength",
     "joints.self_weight_strength",
     "joints.size_effect",
+    "contact.ContactOptions",
+    "contact.LoadPath",
     "contact.effective_modulus",
     "contact.flat_stiffness",
     "dimensions.methods",

@@ -384,7 +384,8 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         dim may have a name of the user's own, and so may one of the rows of a table that is called after
         their dim (`island_seed`): it keeps its own units and meaning.
     keep_notes : bool
-        Keep the attributes `long_name`, `comment` and `reason` of the variables of a Dataset.
+        Keep the attributes `long_name`, `comment` and `reason` of the variables of a Dataset, and `reason`
+        of its coordinates.
 
     Returns
     -------
@@ -401,7 +402,10 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
             _label_own(str(name), coordinate.variable)
         else:
+            reason = coordinate.attrs.get("reason") if keep_notes else None
             _label_variable(str(name), coordinate.variable, is_coordinate=True)
+            if reason is not None:
+                coordinate.variable.attrs["reason"] = reason
     if hasattr(data, "data_vars"):
         for name, variable in data.data_vars.items():
             notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}

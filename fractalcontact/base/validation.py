@@ -13,12 +13,12 @@ problem; without one, all values are valid. A check that needs valid values asks
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from os import PathLike
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from fractalcontact.base.grid import Grid
 
+T = TypeVar("T")
 LARGEST_INTEGER = 1 << 53  # the integers beyond it are not all representable as float64
 
 
@@ -75,6 +76,14 @@ class Problems:
             yield
         except InvalidInput as error:
             self._extend(f"{prefix}{line}" for line in error.problems)
+
+    def construct(self, constructor: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
+        """Return what `constructor` makes of the arguments; None if it has problems, which are collected."""
+        try:
+            return constructor(*arguments, **options)
+        except InvalidInput as error:
+            self._extend(error.problems)
+            return None
 
     def _extend(self, lines: Iterable[str]) -> None:
         self.found.extend(line for line in lines if line not in self.found)
@@ -177,7 +186,9 @@ class Problems:
     def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> bool:
         """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""
         words = tuple(allowed)
-        if not isinstance(value, (str, Sequence, np.ndarray)) or _number_of_axes(word_list(value)) != 1:
+        if not isinstance(value, str) and (
+            not isinstance(value, (Sequence, np.ndarray)) or _number_of_axes(value) != 1
+        ):
             self.add(argument, f"a sequence out of {_quoted(words)}", value)
             return False
         wrong = [word for word in word_list(value) if not isinstance(word, str) or word not in words]

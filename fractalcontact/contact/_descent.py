@@ -39,7 +39,7 @@ from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped import lowest, shifted
 from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._problem import Control, Solution, serial_sum
+from fractalcontact.contact._scaling import Control, Solution, serial_sum
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -22,7 +22,7 @@ from scipy.linalg import solve as solve_dense
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.contact._optimality import residual
-from fractalcontact.contact._problem import Control, Problem, Solution
+from fractalcontact.contact._scaling import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

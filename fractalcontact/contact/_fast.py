@@ -19,7 +19,7 @@ from fractalcontact.contact._nested import cold_start
 from fractalcontact.contact._nodes import NodePreconditioner, PairSum, stiffness_table
 from fractalcontact.contact._operator import Operator
 from fractalcontact.contact._plane import WHOLE_PLANE, Plane, Window, first_precision
-from fractalcontact.contact._problem import Control, Problem, Solution
+from fractalcontact.contact._scaling import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.contact._precondition import Preconditioner
-from fractalcontact.contact._problem import Body, serial_mean, serial_sum
+from fractalcontact.contact._scaling import Body, serial_mean, serial_sum
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

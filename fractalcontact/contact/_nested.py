@@ -13,7 +13,7 @@ import numpy as np
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
 from fractalcontact.contact._plane import plane_descent
-from fractalcontact.contact._problem import Body, Control, Problem
+from fractalcontact.contact._scaling import Body, Control, Problem
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -13,7 +13,7 @@ import numpy as np
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._operator import Wavenumbers
-from fractalcontact.contact._problem import Body
+from fractalcontact.contact._scaling import Body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -16,8 +16,15 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from fractalcontact.contact._flat import flat_block
-from fractalcontact.contact._problem import Body, Control, Problem, Solution, serial_mean, serial_sum
-from fractalcontact.contact._setup import Units
+from fractalcontact.contact._scaling import (
+    Body,
+    Control,
+    Problem,
+    Solution,
+    Units,
+    serial_mean,
+    serial_sum,
+)
 
 if TYPE_CHECKING:
     from fractalcontact.contact._elimination import Elimination

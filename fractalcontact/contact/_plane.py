@@ -14,7 +14,7 @@ import numpy as np
 
 from fractalcontact.contact._descent import Descent
 from fractalcontact.contact._precondition import Preconditioner
-from fractalcontact.contact._problem import Control, Problem, Solution
+from fractalcontact.contact._scaling import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -11,42 +10,12 @@ import numpy as np
 from fractalcontact.base.checks import Problems
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
-from fractalcontact.contact._problem import Body, power_of_two
+from fractalcontact.contact._scaling import Body, length_unit
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 INFLUENCES = ("disc", "square", "spectral")
 POINT = 1e-9  # of the spacing: a plate that is smaller is a point, which has no stiffness
-
-
-@dataclass(frozen=True)
-class Units:
-    """Scales of a problem: two powers of two, and the modulus."""
-
-    length: float
-    height: float
-    modulus: float
-    cell_area: float
-
-    @property
-    def pressure(self) -> float:
-        """Pressure (Pa) of a scaled pressure of 1."""
-        return self.modulus * (self.height / self.length)
-
-    @property
-    def force(self) -> float:
-        """Force (N) of a scaled sum of pressure of 1."""
-        return self.modulus * self.cell_area * (self.height * self.length)
-
-    @property
-    def energy(self) -> float:
-        """Energy (J) of a scaled sum of pressure times settlement of 1."""
-        return self.force * self.height
-
-
-def length_unit(spacing: tuple[float, float]) -> float:
-    """Power of two in which lengths of the plane are measured."""
-    return power_of_two(max(spacing))
 
 
 def make_body(

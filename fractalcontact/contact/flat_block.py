@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.checks import Problems
-from fractalcontact.contact._setup import length_unit, make_body
+from fractalcontact.base.grid import Grid
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.contact._options import BOUNDARIES, ContactOptions
+from fractalcontact.contact._scaling import length_unit, scaled_body
 
 
 def flat_stiffness(
@@ -18,7 +21,7 @@ def flat_stiffness(
     boundary: str = "free",
     influence: str | None = None,
     disc_radius: str | float = "second_order",
-    settlement: str = "rigid",
+    loading: str = "rigid",
 ) -> float:
     """Force per closure of two perfectly mating faces, in N/m.
 
@@ -34,7 +37,7 @@ def flat_stiffness(
         E* of the pair in Pa.
     boundary, influence, disc_radius
         As for `press`.
-    settlement : {"rigid", "uniform"}
+    loading : {"rigid", "uniform"}
         "rigid": the faces approach by the same amount everywhere, as rigid flats would make them; "uniform":
         the pressure is the same everywhere, and the closure is its mean settlement.
 
@@ -57,19 +60,37 @@ def flat_stiffness(
     from fractalcontact.contact import _flat
 
     with Problems("fractalcontact.contact.flat_stiffness") as problems:
-        modulus = problems.number("contact_modulus", contact_modulus, above=0)
-        problems.choice("boundary", boundary, ("free", "periodic"))
-        problems.choice("settlement", settlement, ("rigid", "uniform"))
-        if problems.require(np.shape(shape) == (2,), "shape", "(ny, nx)", shape):
-            for n in shape:
-                problems.integer("shape", n, at_least=3)
-        steps = problems.numbers("spacing", spacing, above=0, at_most=1e100)
-        problems.require(steps.size in (1, 2), "spacing", "one length or (dy, dx)", spacing)
-        pair = (float(steps[0]), float(steps[-1]))
-        if not problems.found:
-            size = (int(shape[0]), int(shape[1]))
-            body = make_body(size, pair, boundary == "periodic", influence, disc_radius, problems)
-    compliance = (
-        _flat.flat_block(body).compliance if settlement == "rigid" else _flat.uniform_compliance(body)
+        problems.number("contact_modulus", contact_modulus, above=0)
+        known_boundary = problems.choice("boundary", boundary, BOUNDARIES)
+        problems.choice("loading", loading, ("rigid", "uniform"))
+        has_shape = problems.require(_has_two_entries(shape), "shape", "(ny, nx)", shape)
+        has_shape = has_shape and all(problems.integer("shape", n, at_least=3) for n in shape)
+        has_spacing = problems.numbers("spacing", spacing, above=0, at_most=1e100) and problems.require(
+            float_array(spacing).size in (1, 2), "spacing", "one length or (dy, dx)", spacing
+        )
+        word = boundary if known_boundary else None
+        options = problems.construct(ContactOptions, word, influence, disc_radius)
+        if known_boundary and has_shape and has_spacing and options is not None:
+            options.check_grid(_grid(shape, spacing, boundary), problems)
+    options, grid = ContactOptions(boundary, influence, disc_radius), _grid(shape, spacing, boundary)
+    cells, pair = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
+    body = scaled_body(cells, pair, boundary == "periodic", options.influence_on(grid), options.disc_radius)
+    compliance = _flat.flat_block(body).compliance if loading == "rigid" else _flat.uniform_compliance(body)
+    return (
+        math.inf
+        if compliance == 0
+        else float(contact_modulus) * length_unit(pair) * body.cell_area / compliance
     )
-    return math.inf if compliance == 0 else modulus * length_unit(pair) * body.cell_area / compliance
+
+
+def _has_two_entries(shape: Any) -> bool:
+    try:
+        return bool(np.shape(shape) == (2,))
+    except ValueError:  # a ragged sequence
+        return False
+
+
+def _grid(shape: Any, spacing: Any, boundary: str) -> Grid:
+    steps, periodic = float_array(spacing), boundary == "periodic"
+    pair = (float(steps[0]), float(steps[-1]))
+    return Grid((int(shape[0]), int(shape[1])), pair, (periodic, periodic))

@@ -128,7 +128,7 @@ class Pressing:
             boundary=self.boundary,
             influence=load.solver["influence"],
             disc_radius=load.solver["disc_radius"],
-            settlement=BULK[load.bulk][0],
+            loading=BULK[load.bulk][0],
         )
 
     def along(self, values: Array, keep: Sequence[str] = ()) -> dict[str, Array]:

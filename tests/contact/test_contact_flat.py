@@ -35,7 +35,7 @@ def test_the_stiffness_of_a_square_block_and_its_order():
 
 
 def test_uniform_pressure_settles_by_the_mean_of_love():
-    stiffness = fc.contact.flat_stiffness((128, 128), 1 / 128, contact_modulus=1.0, settlement="uniform")
+    stiffness = fc.contact.flat_stiffness((128, 128), 1 / 128, contact_modulus=1.0, loading="uniform")
     assert stiffness == pytest.approx(1 / 0.9464020, rel=2e-4)
 
 

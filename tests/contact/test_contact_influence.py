@@ -6,7 +6,7 @@ from scipy.integrate import dblquad
 
 from fractalcontact.contact import _influence as influence
 from fractalcontact.contact._operator import FreeOperator, PeriodicOperator
-from fractalcontact.contact._problem import Body
+from fractalcontact.contact._scaling import Body
 
 
 def test_plate_under_itself_and_its_neighbours():

@@ -7,7 +7,7 @@ import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.contact import _descent, _fast, _plane
 from fractalcontact.contact._precondition import Preconditioner
-from fractalcontact.contact._problem import Body
+from fractalcontact.contact._scaling import Body
 
 MODULUS = 1e9
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fractalcontact.base.checks import Problems
+from fractalcontact.base.validation import Problems
 
 
 def effective_modulus(
@@ -40,28 +40,36 @@ def effective_modulus(
     Johnson, K. L. (1985) Contact Mechanics, eq. 3.32 and 4.20.
     """
     with Problems("fractalcontact.contact.effective_modulus") as problems:
-        first = _compliance(problems, "young", young, "poisson", poisson)
-        second = first
+        _check_body(problems, "young", young, "poisson", poisson)
         if young2 is not None:
-            second = _compliance(problems, "young2", young2, "poisson2", poisson2)
+            _check_body(problems, "young2", young2, "poisson2", poisson2)
         elif poisson2 is not None:
             problems.add("poisson2", "a value with young2, or neither of them for two equal bodies", poisson2)
-        elastic = not (_rigid(young) and (young2 is None or _rigid(young2)))
+        elastic = not (_is_rigid(young) and (young2 is None or _is_rigid(young2)))
         problems.require(elastic, "young / young2", "one of the bodies to be elastic", "two rigid ones")
+    first = _compliance(young, poisson)
+    second = first if young2 is None else _compliance(young2, poisson2)
     return 1.0 / (first + second)
 
 
-def _rigid(young: object) -> bool:
+def _is_rigid(young: object) -> bool:
     return isinstance(young, (int, float)) and young == math.inf
 
 
-def _compliance(problems: Problems, name: str, young: float, ratio_name: str, poisson: float | None) -> float:
-    """(1 - nu^2)/E of one body, in 1/Pa; zero for a rigid one."""
-    if _rigid(young) and poisson is None:
-        return 0.0
-    modulus = math.inf if _rigid(young) else problems.number(name, young, above=0)
+def _check_body(problems: Problems, name: str, young: object, ratio_name: str, poisson: object) -> None:
+    if _is_rigid(young) and poisson is None:
+        return
+    if not _is_rigid(young):
+        problems.number(name, young, above=0)
     if poisson is None:
         problems.add(ratio_name, f"a Poisson's ratio beside {name}", poisson)
+    else:
+        problems.number(ratio_name, poisson, above=-1, at_most=0.5)
+
+
+def _compliance(young: float, poisson: float | None) -> float:
+    """Return (1 - nu^2)/E of one body, in 1/Pa; zero for a rigid one."""
+    if poisson is None:
         return 0.0
-    ratio = problems.number(ratio_name, poisson, above=-1, at_most=0.5)
-    return 0.0 if problems.found else (1.0 - ratio) * (1.0 + ratio) / modulus
+    ratio = float(poisson)
+    return (1.0 - ratio) * (1.0 + ratio) / float(young)

@@ -3,32 +3,68 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.base.grid import Grid, contact_edges
+from fractalcontact.base.grid import Grid, contact_edges, read_grid
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import stamp
-from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED, label
-from fractalcontact.contact._path import Step, solve_path
-from fractalcontact.contact._plan import CONTROLS, Plan, make_plan
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import xarray as xr
+from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED
+from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._path import Path, Step, solve_path
+from fractalcontact.contact._scaling import make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.contact.press"
 UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
 BEYOND = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
+MAPS = ("state", "pressure", "gap", "displacement", "residual_height")
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
+def _check(
+    problems: Problems,
+    *,
+    surface: Any,
+    contact_modulus: Any,
+    keep: Any,
+    progress: Any,
+    closure: Any,
+    normal_force: Any,
+    nominal_pressure: Any,
+    **keywords: Any,
+) -> None:
+    """Collect what is wrong with a call of `press`."""
+    surface_is_valid = problems.surface("surface", surface)
+    problems.number("contact_modulus", contact_modulus, above=0)
+    if keep is not None:
+        problems.choices("keep", keep, MAPS)
+    problems.boolean("progress", progress)
+    options = problems.construct(ContactOptions, **keywords)
+    load = problems.construct(
+        LoadPath.from_keywords,
+        closure=closure,
+        normal_force=normal_force,
+        nominal_pressure=nominal_pressure,
+    )
+    if not surface_is_valid or options is None:
+        return
+    grid = read_grid(surface)
+    options.check_grid(grid, problems)
+    if load is None or problems.found:
+        return
+    height_range = float(surface.values.max()) - float(surface.values.min())
+    check_scale(problems, grid, height_range, float(contact_modulus), options.hardness, load)
+    options.check_load(load, grid.nominal_area, problems)
+
+
+@public_result(title="Elastic contact of a rough surface", check=_check)
 def press(
     surface: xr.DataArray,
     *,
@@ -140,27 +176,49 @@ def press(
     Stanley and Kato (1997), J. Tribol. 119:481; Bugnicourt et al. (2018), Tribol. Int. 121:69; Yastrebov,
     Anciaux and Molinari (2017), Tribol. Int. 114:161 (perimeter correction).
     """
-    call = dict(locals())
-    with Problems(WHERE) as problems:
-        plan = make_plan(call, problems)
-    measures: list[dict[str, Any]] = []
-    maps: dict[str, list[Array]] = {name: [] for name in plan.keep}
-    steps = solve_path(plan.path)
-    for _ in track(plan.path.values, progress, "press"):
+    options = ContactOptions(boundary, influence, disc_radius, hardness, tolerance, method)
+    load = LoadPath.from_keywords(
+        closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+    )
+    grid = read_grid(surface)
+    heights = np.asarray(surface.values, dtype=np.float64)
+    path = _scaled_path(heights, grid, float(contact_modulus), options, load)
+    names = word_tuple(keep)
+    scalars: list[dict[str, Any]] = []
+    maps: dict[str, list[Array]] = {name: [] for name in names}
+    steps = solve_path(path)
+    for _ in track(path.values, progress, "press"):
         step = next(steps)
-        measures.append(_measures(step, plan.grid, plan.path.body.periodic))
-        for name in plan.keep:
-            maps[name].append(_map(step, name, plan.heights))
-    result = label(_dataset(surface, plan, measures, maps))
+        scalars.append(_scalars(step, grid, path.body.periodic))
+        for name in names:
+            maps[name].append(_map(step, name, heights))
+    result = _dataset(surface, grid, path, scalars, maps)
     _explain(result)
     _warn(result)
-    facts: dict[str, Any] = {
-        "boundary": "periodic" if plan.path.body.periodic else "free",
-        "influence": plan.path.body.influence,
+    result.attrs = {
+        "boundary": "periodic" if path.body.periodic else "free",
+        "influence": path.body.influence,
         "achieved_residual": float(np.fmax.reduce(result["residual"].values)),
-        "run_time": float(result["run_time"].sum()),
     }
-    return stamp(result, WHERE, call, title="Elastic contact of a rough surface", **facts)
+    return result
+
+
+def _scaled_path(
+    heights: Array, grid: Grid, contact_modulus: float, options: ContactOptions, load: LoadPath
+) -> Path:
+    """Return the scaled problem with its load path."""
+    control, values = load.solver_values(grid.nominal_area)
+    spacing = (grid.spacing[0], grid.spacing[1])
+    gap = heights.max() - heights
+    units = make_units(spacing, float(gap.max()), contact_modulus, control, float(values.max()))
+    gap /= units.height
+    shape = (grid.shape[0], grid.shape[1])
+    periodic, influence = options.is_periodic(grid), options.influence_on(grid)
+    body = scaled_body(shape, spacing, periodic, influence, options.disc_radius)
+    hardness = np.inf if options.hardness is None else options.hardness
+    return Path(
+        body, units, gap, control, tuple(values.tolist()), hardness, options.tolerance, options.method
+    )
 
 
 def _map(step: Step, name: str, heights: Array) -> Array:
@@ -179,7 +237,7 @@ def _state(step: Step) -> Array:
     return state
 
 
-def _measures(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
+def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
     """Scalars of one step."""
     contact = step.contact
     cells = int(np.count_nonzero(contact))
@@ -204,21 +262,19 @@ def _measures(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
 
 
 def _dataset(
-    surface: xr.DataArray, plan: Plan, measures: list[dict[str, Any]], maps: dict[str, list[Array]]
+    surface: xr.DataArray, grid: Grid, path: Path, scalars: list[dict[str, Any]], maps: dict[str, list[Array]]
 ) -> xr.Dataset:
-    """Put steps side by side."""
-    import xarray as xr
-
-    columns = {name: ("step", np.array([one[name] for one in measures])) for name in measures[0]}
+    """Return the Dataset over all steps."""
+    columns = {name: ("step", np.array([step[name] for step in scalars])) for name in scalars[0]}
     coords: dict[str, Any] = {name: columns.pop(name) for name in CONTROLS}
-    coords["step"] = np.arange(len(measures))
+    coords["step"] = np.arange(len(scalars))
     variables: dict[str, Any] = dict(columns)
-    variables["nominal_area"] = plan.grid.nominal_area
-    variables["contact_modulus"] = plan.path.units.modulus
-    if not np.isfinite(plan.path.hardness):
+    variables["nominal_area"] = grid.nominal_area
+    variables["contact_modulus"] = path.units.modulus
+    if not np.isfinite(path.hardness):
         del variables["plastic_work"]
-    if plan.path.body.influence == "disc":
-        variables["disc_radius"] = plan.path.body.radius * plan.path.units.length
+    if path.body.influence == "disc":
+        variables["disc_radius"] = path.body.radius * path.units.length
     if maps:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
         variables |= {name: (("step", "y", "x"), np.stack(planes)) for name, planes in maps.items()}
@@ -243,4 +299,4 @@ def _warn(result: xr.Dataset) -> None:
             f"step {i}: {words[why[i]]} (residual {result['residual'].values[i]:.2g})" for i in failed[:5]
         )
         more = f" and {failed.size - 5} more" if failed.size > 5 else ""
-        warnings.warn(f"{WHERE}: not converged: {reasons}{more}", ConvergenceWarning, stacklevel=3)
+        warnings.warn(f"{WHERE}: not converged: {reasons}{more}", ConvergenceWarning, stacklevel=4)

@@ -48,6 +48,31 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Units:
+    """Scales of a problem: two powers of two, and the modulus."""
+
+    length: float
+    height: float
+    modulus: float
+    cell_area: float
+
+    @property
+    def pressure(self) -> float:
+        """Pressure (Pa) of a scaled pressure of 1."""
+        return self.modulus * (self.height / self.length)
+
+    @property
+    def force(self) -> float:
+        """Force (N) of a scaled sum of pressure of 1."""
+        return self.modulus * self.cell_area * (self.height * self.length)
+
+    @property
+    def energy(self) -> float:
+        """Energy (J) of a scaled sum of pressure times settlement of 1."""
+        return self.force * self.height
+
+
+@dataclass(frozen=True)
 class Problem:
     """A body and the gap above its surface at first touch, scaled."""
 
@@ -102,3 +127,36 @@ def serial_mean(plane: Array) -> float:
 def power_of_two(value: float) -> float:
     """Return the power of two next above `value`; 1 for zero."""
     return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0
+
+
+def length_unit(spacing: tuple[float, float]) -> float:
+    """Power of two in which lengths of the plane are measured."""
+    return power_of_two(max(spacing))
+
+
+def make_units(
+    spacing: tuple[float, float], height_range: float, modulus: float, control: str, largest: float
+) -> Units:
+    """Return the scales of a problem; a flat surface is measured by its largest closure or force."""
+    length = length_unit(spacing)
+    height = height_range
+    if height == 0:
+        height = largest if control == "closure" else largest / modulus / length
+    cell_area = (spacing[0] / length) * (spacing[1] / length)
+    return Units(length, power_of_two(height), modulus, cell_area)
+
+
+def scaled_body(
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    periodic: bool,
+    influence: str,
+    disc_radius: str | float,
+) -> Body:
+    """Return the scaled body of a grid, from valid options in SI units."""
+    unit = length_unit(spacing)
+    scaled = (spacing[0] / unit, spacing[1] / unit)
+    if influence != "disc":
+        return Body(shape, scaled, periodic, influence, 0.0)
+    choice = disc_radius if isinstance(disc_radius, str) else disc_radius / unit
+    return Body(shape, scaled, periodic, influence, _influence.disc_radius(choice, scaled))

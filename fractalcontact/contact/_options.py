@@ -1,0 +1,240 @@
+"""Options of the contact solver, shared by `press`, by the joints and by the scenes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.grid import UNIFORM, Grid
+from fractalcontact.base.validation import Problems, float_array, given_option
+from fractalcontact.contact import _influence
+from fractalcontact.contact._scaling import length_unit, make_units, scaled_body
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+BOUNDARIES = ("free", "periodic")
+INFLUENCES = ("disc", "square", "spectral")
+METHODS = ("fast", "elimination")
+CONTROLS = ("closure", "normal_force", "nominal_pressure")
+SMALLEST_RADIUS = 1e-9  # of the spacing: a smaller plate is a point force, which has no stiffness
+REACH = 2.0**300  # of forces and closures over their scales, so that no product leaves the range of a double
+UNIT_RANGE = (2.0**-900, 2.0**900)
+FORCE_ROUNDING = 1e-12  # relative rounding allowed in a force of exactly hardness times area
+
+
+@dataclass(frozen=True)
+class ContactOptions:
+    """How a contact problem is solved: boundary, influence coefficients, hardness and accuracy.
+
+    The values are validated on construction. What depends on the surface is validated by `check_grid` and
+    `check_load`.
+
+    Parameters
+    ----------
+    boundary : {None, "periodic", "free"}
+        None: periodic where both axes of the surface are periodic. A periodic surface may be declared free,
+        never the reverse.
+    influence : {None, "disc", "square", "spectral"}
+        Influence coefficients, see `press`. None: "spectral" for periodic bodies, "disc" for free ones.
+    disc_radius : {"second_order", "inscribed", "equal_area"} or float
+        Radius of the circular plate of influence "disc", by name or in m.
+    hardness : float, optional
+        Largest pressure that the surface bears, in Pa. None: elastic.
+    tolerance : float
+        Bound on the scale-free residual of each step, between 0 and 1.
+    method : {"fast", "elimination"}
+        Constrained conjugate gradients, or the dense active set method.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> options = fc.contact.ContactOptions(influence="square", tolerance=1e-6)
+    >>> options.keywords()["influence"]
+    'square'
+    """
+
+    boundary: str | None = None
+    influence: str | None = None
+    disc_radius: str | float = "second_order"
+    hardness: float | None = None
+    tolerance: float = 1e-8
+    method: str = "fast"
+
+    def __post_init__(self) -> None:
+        """Validate what does not depend on the surface."""
+        with Problems("fractalcontact.contact.ContactOptions") as problems:
+            problems.choice("boundary", self.boundary, BOUNDARIES, optional=True)
+            problems.choice("influence", self.influence, INFLUENCES, optional=True)
+            if isinstance(self.disc_radius, str):
+                problems.choice("disc_radius", self.disc_radius, _influence.DISC_RADII)
+            else:
+                problems.number("disc_radius", self.disc_radius, above=0)
+            problems.number("hardness", self.hardness, above=0, optional=True)
+            problems.number("tolerance", self.tolerance, above=0, below=1)
+            if problems.choice("method", self.method, METHODS) and self.method == "elimination":
+                expected = "None with method='elimination'"
+                problems.require(self.hardness is None, "hardness", expected, self.hardness)
+        for name in ("disc_radius", "hardness", "tolerance"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, str):
+                object.__setattr__(self, name, float(value))
+
+    def keywords(self) -> dict[str, Any]:
+        """Return the options as keyword arguments of `press`."""
+        return asdict(self)
+
+    def is_periodic(self, grid: Grid) -> bool:
+        """Return whether the bodies on this grid are periodic."""
+        return all(grid.periodic) if self.boundary is None else self.boundary == "periodic"
+
+    def influence_on(self, grid: Grid) -> str:
+        """Return the influence coefficients used on this grid."""
+        if self.influence is not None:
+            return self.influence
+        return "spectral" if self.is_periodic(grid) else "disc"
+
+    def check_grid(self, grid: Grid, problems: Problems) -> bool:
+        """Check boundary, influence and plate radius against shape, spacing and periodicity of a grid."""
+        before = len(problems.found)
+        if self.boundary is None:
+            mixed = any(grid.periodic) and not all(grid.periodic)
+            expected = "'free' where one axis is periodic and the other is not"
+            problems.require(not mixed, "boundary", expected, self.boundary)
+        elif self.boundary == "periodic":
+            expected = "periodic axes (attribute `period` of x and y equal to n * spacing), or 'free'"
+            problems.require(all(grid.periodic), "boundary", expected, self.boundary)
+        influence = self.influence_on(grid)
+        allowed, bodies = (
+            (("spectral",), "periodic") if self.is_periodic(grid) else (("disc", "square"), "free")
+        )
+        expected = f"{' or '.join(map(repr, allowed))} for {bodies} bodies"
+        problems.require(influence in allowed, "influence", expected, influence)
+        if influence == "disc":
+            self._check_radius((grid.spacing[0], grid.spacing[1]), problems)
+        else:
+            expected = "'second_order', the default: other values are only valid with influence='disc'"
+            problems.require(self.disc_radius == "second_order", "disc_radius", expected, self.disc_radius)
+        return len(problems.found) == before
+
+    def _check_radius(self, spacing: tuple[float, float], problems: Problems) -> None:
+        """Check that the plates exist on this grid and leave the elastic operator positive."""
+        ratio = max(spacing) / min(spacing)
+        if self.disc_radius == "second_order" and ratio > _influence.GREATEST_RATIO * (1 + UNIFORM):
+            expected = "spacings in a ratio of at most 2 for the second-order disc (use influence='square')"
+            problems.add("influence", expected, f"'disc' with a ratio of {ratio:.4g}")
+            return
+        if not isinstance(self.disc_radius, str) and not self.disc_radius >= SMALLEST_RADIUS * min(spacing):
+            expected = f"a length of at least {SMALLEST_RADIUS:g} spacings"
+            problems.add("disc_radius", expected, f"{self.disc_radius:g} m")
+            return
+        plate = scaled_body((1, 1), spacing, False, "disc", self.disc_radius)
+        least = _least_symbol(plate.radius / float(np.sqrt(plate.cell_area)), ratio)
+        problems.require(
+            least > 0,
+            "disc_radius",
+            "plates small enough for a positive operator (or influence='square')",
+            f"radius {plate.radius * length_unit(spacing):.4g} m, with a symbol down to {least:.3g}"
+            " of that of the half-space",
+        )
+
+    def check_load(self, load: LoadPath, nominal_area: float, problems: Problems) -> bool:
+        """Check that the hardness bears the load on an area (m2)."""
+        if self.hardness is None or load.control == "closure":
+            return True
+        largest = max(load.values)
+        if load.control == "nominal_pressure":
+            capacity, expected = self.hardness, f"a pressure of at most the hardness, {self.hardness:.6g} Pa"
+        else:
+            capacity = self.hardness * nominal_area
+            expected = f"a force of at most hardness times area, {capacity:.6g} N"
+        borne = largest <= capacity * (1 + FORCE_ROUNDING)
+        return problems.require(borne, load.control, expected, largest)
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """What is imposed at each step: closures, forces or nominal pressures.
+
+    Parameters
+    ----------
+    control : {"closure", "normal_force", "nominal_pressure"}
+        The imposed quantity.
+    values : float or sequence of float
+        Its value at each step, not negative: m, N or Pa. The load may go up and down.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> fc.contact.LoadPath.from_keywords(normal_force=[1.0, 2.0])
+    LoadPath(control='normal_force', values=(1.0, 2.0))
+    """
+
+    control: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Validate and turn the values into a tuple of float."""
+        with Problems("fractalcontact.contact.LoadPath") as problems:
+            if problems.choice("control", self.control, CONTROLS):
+                problems.numbers(self.control, self.values, at_least=0)
+        object.__setattr__(self, "values", tuple(float_array(self.values).tolist()))
+
+    @classmethod
+    def from_keywords(cls, **loads: Any) -> LoadPath:
+        """Return the path given by exactly one of the keywords; the others are None."""
+        with Problems("fractalcontact.contact.LoadPath") as problems:
+            problems.exactly_one(**loads)
+        return cls(*given_option(**loads))
+
+    def keywords(self) -> dict[str, Any]:
+        """Return the path as a keyword argument of `press`."""
+        return {self.control: self.values}
+
+    def solver_values(self, nominal_area: float) -> tuple[str, Array]:
+        """Return the control of the solver, "closure" (m) or "normal_force" (N), and its values."""
+        values = float_array(self.values)
+        if self.control != "nominal_pressure":
+            return self.control, values
+        with np.errstate(over="ignore"):  # what overflows is refused as out of proportion
+            return "normal_force", values * nominal_area
+
+
+def check_scale(
+    problems: Problems,
+    grid: Grid,
+    height_range: float,
+    contact_modulus: float,
+    hardness: float | None,
+    load: LoadPath,
+) -> bool:
+    """Check that heights, modulus, hardness and load are in proportion, so that no product overflows."""
+    control, values = load.solver_values(grid.nominal_area)
+    spacing = (grid.spacing[0], grid.spacing[1])
+    units = make_units(spacing, height_range, contact_modulus, control, float(values.max()))
+    sizes = (units.length, units.height, units.modulus, units.pressure, units.force, units.energy)
+    if not problems.require(
+        all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes),
+        "surface / contact_modulus",
+        "spacing, heights and modulus whose products a double can hold",
+        f"scales {sizes}",
+    ):
+        return False
+    before = len(problems.found)
+    if hardness is not None:
+        low, high = units.pressure / REACH, units.pressure * REACH
+        expected = f"None or between {low:.3g} and {high:.3g} for this surface"
+        problems.require(low < hardness < high, "hardness", expected, hardness)
+    unit = units.height if control == "closure" else units.force
+    scale = unit / (grid.nominal_area if load.control == "nominal_pressure" else 1.0)
+    expected = f"0 or between {scale / REACH:.3g} and {scale * REACH:.3g} for this surface and modulus"
+    for given, value in zip(load.values, values, strict=True):
+        problems.require(value == 0 or unit / REACH < value < unit * REACH, load.control, expected, given)
+    return len(problems.found) == before
+
+
+@lru_cache(maxsize=64)
+def _least_symbol(radius: float, ratio: float) -> float:
+    return _influence.least_symbol(radius, ratio)
