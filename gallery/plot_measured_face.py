@@ -22,7 +22,7 @@ else:
 
 face = fc.surfaces.level(fc.surfaces.fill(face))
 print(fc.surfaces.describe(face))
-relief = fc.plotting.face(face)
+relief = fc.plotting.surface(face)
 
 # %%
 # The curves, before any fit.

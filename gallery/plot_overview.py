@@ -29,7 +29,7 @@ print(islands)
 
 overview = Figure(figsize=(12.4, 3.7), layout="constrained")
 left, middle, right = overview.subplots(1, 3)
-fc.plotting.face(face, title="a rough face", ax=left)
+fc.plotting.surface(face, title="a rough face", ax=left)
 fc.plotting.field(pressed["pressure"], title="pressed: where it touches, and how hard", ax=middle)
 fc.plotting.island_map(islands, title="the domain of contact and its islands", ax=right)
 

@@ -24,7 +24,7 @@ print(families["fbm"])
 
 reliefs = Figure(figsize=(9.2, 7.4), layout="constrained")
 for ax, (name, face) in zip(reliefs.subplots(2, 2).ravel(), families.items(), strict=True):
-    fc.plotting.face(face, title=name, ax=ax)
+    fc.plotting.surface(face, title=name, ax=ax)
 
 # %%
 # The variograms of single surfaces wander at lags beyond a tenth of the face, where few independent

@@ -1,15 +1,15 @@
-"""Figures, drawn from labelled results and from nothing else.
+"""Figures, drawn from labelled results.
 
-Every function takes a result as the other rooms give it, or as it was read back from a file, and returns a
-matplotlib Figure. No state of pyplot is touched, so figures can be made on a machine without a screen, many
-at a time. Units come from the labels of the data and are shown with the prefix that suits them (mm, um, kN).
+Every function takes a result of another subpackage, as computed or as read back from a file, and returns a
+matplotlib Figure. No function uses pyplot or changes global settings, so figures can be drawn without a
+display and in any number. Units are read from the data and shown with a suitable prefix (mm, µm, kN).
 
     figure = fc.plotting.closure_laws(result)
     figure.savefig("closure.png")
 
-A function with one panel takes `ax`, one with several takes `figure` (a Figure or a SubFigure), to become
-part of a larger drawing. `paper_figure` draws the five figures of the founding paper from a saved study;
-`draw` writes every figure that a study has data for.
+A function with one panel takes `ax`, one with several takes `figure` (a Figure or a SubFigure), to draw into
+a larger figure. `paper_figure` draws the five figures of the 1998 paper from a study; `draw` writes every
+figure that a study has data for.
 """
 
 import lazy_loader

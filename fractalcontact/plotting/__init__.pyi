@@ -1,26 +1,26 @@
-from .accuracy_curves import error_against_time as error_against_time
-from .accuracy_curves import estimator_errors as estimator_errors
-from .closing import closure_laws as closure_laws
-from .closing import contact_area as contact_area
-from .domain_maps import contact_domains as contact_domains
-from .domain_maps import island_map as island_map
-from .domain_maps import islands as islands
-from .drawing import draw as draw
-from .forgetting import correlation as correlation
-from .forgetting import delta_dimension as delta_dimension
-from .lacunar import box_dimension as box_dimension
-from .lacunar import lacunarity as lacunarity
-from .lacunar import local_slopes as local_slopes
-from .leakage import hydraulic_aperture as hydraulic_aperture
-from .paper import paper_figure as paper_figure
-from .relief import face as face
-from .relief import field as field
-from .roughness import dimension_curves as dimension_curves
-from .roughness import dimensions as dimensions
-from .scheme import sliding_scheme as sliding_scheme
-from .sliding import elastic_dilatancy as elastic_dilatancy
-from .sliding import friction as friction
-from .sliding import rigid_dilatancy as rigid_dilatancy
+from ._accuracy import error_against_time as error_against_time
+from ._accuracy import estimator_errors as estimator_errors
+from ._box_dimension import box_dimension as box_dimension
+from ._box_dimension import local_slopes as local_slopes
+from ._closure import closure_laws as closure_laws
+from ._closure import contact_area as contact_area
+from ._contact_maps import contact_domains as contact_domains
+from ._decorrelation import correlation as correlation
+from ._decorrelation import delta_dimension as delta_dimension
+from ._dilatancy import elastic_dilatancy as elastic_dilatancy
+from ._dilatancy import rigid_dilatancy as rigid_dilatancy
+from ._dimensions import dimension_curves as dimension_curves
+from ._dimensions import dimensions as dimensions
+from ._draw import draw as draw
+from ._friction import friction as friction
+from ._islands import island_map as island_map
+from ._islands import islands as islands
+from ._lacunarity import lacunarity as lacunarity
+from ._paper import paper_figure as paper_figure
+from ._shear_scheme import sliding_scheme as sliding_scheme
+from ._surface import field as field
+from ._surface import surface as surface
+from ._transmissivity import hydraulic_aperture as hydraulic_aperture
 
 __all__ = [
     "box_dimension",
@@ -35,7 +35,6 @@ __all__ = [
     "elastic_dilatancy",
     "error_against_time",
     "estimator_errors",
-    "face",
     "field",
     "friction",
     "hydraulic_aperture",
@@ -46,4 +45,5 @@ __all__ = [
     "paper_figure",
     "rigid_dilatancy",
     "sliding_scheme",
+    "surface",
 ]

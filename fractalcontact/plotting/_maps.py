@@ -1,4 +1,4 @@
-"""Planes drawn on axes: shaded heights, fields, contact states."""
+"""Maps of planes: shaded heights, fields, contact states, with colour bar and scale bar."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._units import Scale, amount
+from fractalcontact.plotting._units import Scale, quantity_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[Any]]
 Extent = tuple[float, float, float, float]
 
-MOST_CELLS = 1600  # along an edge; a finer plane is averaged first, no screen shows more
+MOST_CELLS = 1600  # along an edge; a finer plane is averaged first, since no screen shows more
 SHADED_SLOPE = 0.5  # rms slope after the exaggeration of the shading
-CLIPPED = 0.2  # per cent of the heights at either end that may lie beyond the colour bar
+CLIPPED = 0.2  # per cent of the values at either end that may lie outside the colour bar
 
 
-def thinned(plane: Array, most: int = MOST_CELLS) -> Array:
-    """Return the means over blocks of cells, so that no edge has more than `most` of them."""
+def block_means(plane: Array, most: int = MOST_CELLS) -> Array:
+    """Return means over blocks of cells, so that no edge has more than `most` cells."""
     by, bx = (-(-n // most) for n in plane.shape)
     if by == bx == 1:
         return plane
@@ -30,14 +30,14 @@ def thinned(plane: Array, most: int = MOST_CELLS) -> Array:
     return means
 
 
-def limits(values: Array, clipped: float = CLIPPED) -> tuple[float, float, str]:
-    """Return lower and upper end of a colour scale, and which of its ends have values beyond them."""
+def colour_limits(values: Array, clipped: float = CLIPPED) -> tuple[float, float, str]:
+    """Return the ends of a colour scale, and which ends (`neither`, `min`, `max`, `both`) are exceeded."""
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return 0.0, 1.0, "neither"
     lowest, highest = float(finite.min()), float(finite.max())
     low, high = (float(v) for v in np.percentile(finite, (clipped, 100 - clipped)))
-    # a tail that adds little to the range is shown whole, one that would flatten all else is cut
+    # a tail that adds little to the range is shown; one that would flatten everything else is cut
     low = lowest if low - lowest <= 0.25 * (high - low) else low
     high = highest if highest - high <= 0.25 * (high - low) else high
     if not high > low:
@@ -48,39 +48,39 @@ def limits(values: Array, clipped: float = CLIPPED) -> tuple[float, float, str]:
 
 
 def relief(ax: Axes, heights: Array, extent: Extent, length: Scale, height: Scale) -> Any:
-    """Draw heights (m) as a shaded relief, lit from the north-west; return what a colour bar needs."""
+    """Draw heights (m) as a shaded relief lit from the north-west; return the mappable of a colour bar."""
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LightSource, Normalize
 
-    heights = thinned(heights)
-    low, high, beyond = limits(heights)
+    heights = block_means(heights)
+    low, high, beyond = colour_limits(heights)
     norm, colours = (
         Normalize(float(height(low)), float(height(high))),
         matplotlib.colormaps[_style.HEIGHT_MAP],
     )
     missing = ~np.isfinite(heights)
-    whole = np.where(missing, low, heights)
+    filled = np.where(missing, low, heights)
     spacing = (extent[3] - extent[2]) / heights.shape[0], (extent[1] - extent[0]) / heights.shape[1]
-    image = colours(norm(height(whole)))[..., :3]
-    light = _light(LightSource(azdeg=315, altdeg=45), whole, spacing)
+    image = colours(norm(height(filled)))[..., :3]
+    light = _light(LightSource(azdeg=315, altdeg=45), filled, spacing)
     image = np.clip(image * (0.35 + 0.85 * light[..., None]), 0.0, 1.0)
     image[missing] = matplotlib.colors.to_rgb(_style.MISSING)
-    show(ax, image, extent, length)
+    draw_image(ax, image, extent, length)
     mappable = ScalarMappable(norm, colours)
     mappable.beyond = beyond  # type: ignore[attr-defined]
     return mappable
 
 
 def _light(source: Any, heights: Array, spacing: tuple[float, float]) -> Array:
-    """Return the light that each cell gets, 0 to 1; the relief is raised until its slopes show."""
+    """Return the illumination of each cell, 0 to 1, with slopes scaled to an rms of `SHADED_SLOPE`."""
     if min(heights.shape) < 2:
         return np.full(heights.shape, 0.75)
     slopes = np.gradient(heights, *spacing)
     steep = float(np.sqrt(np.mean(slopes[0] ** 2 + slopes[1] ** 2)))
     if not steep > 0 or not np.isfinite(steep):
         return np.full(heights.shape, 0.75)
-    # the array starts in the south, whereas the light source counts rows from the north
+    # row 0 is the south edge, whereas LightSource counts rows from the north
     normal = np.stack([-slopes[1], -slopes[0]], axis=-1) * (SHADED_SLOPE / steep)
     lit = (normal @ source.direction[:2] + source.direction[2]) / np.sqrt(1 + (normal**2).sum(axis=-1))
     clipped: Array = np.clip(np.asarray(lit), 0.0, 1.0)
@@ -88,13 +88,13 @@ def _light(source: Any, heights: Array, spacing: tuple[float, float]) -> Array:
 
 
 def field(ax: Axes, values: Array, extent: Extent, length: Scale, shown: Scale, *, positive: bool) -> Any:
-    """Draw a field; with `positive`, cells where it is zero are left pale. Return what a colour bar needs."""
+    """Draw a field; with `positive`, zero cells are left pale. Return the mappable of a colour bar."""
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    values = thinned(np.where(values > 0, values, 0.0) if positive else values)
-    low, high, beyond = limits(
+    values = block_means(np.where(values > 0, values, 0.0) if positive else values)
+    low, high, beyond = colour_limits(
         values[values > 0] if positive else values, clipped=1.0 if positive else CLIPPED
     )
     norm, colours = (
@@ -106,7 +106,7 @@ def field(ax: Axes, values: Array, extent: Extent, length: Scale, shown: Scale, 
     if positive:
         image[values == 0] = matplotlib.colors.to_rgb(_style.STATE_COLOURS[0])
     image[missing] = matplotlib.colors.to_rgb(_style.MISSING)
-    show(ax, image, extent, length)
+    draw_image(ax, image, extent, length)
     mappable = ScalarMappable(norm, colours)
     mappable.beyond = "max" if positive and beyond in ("max", "both") else "neither" if positive else beyond  # type: ignore[attr-defined]
     return mappable
@@ -117,35 +117,35 @@ def state(ax: Axes, flags: Array, extent: Extent, length: Scale) -> None:
     import matplotlib
 
     palette = np.array([matplotlib.colors.to_rgb(c) for c in _style.STATE_COLOURS])
-    show(ax, palette[np.clip(np.asarray(flags).astype(np.int64), 0, 2)], extent, length)
+    draw_image(ax, palette[np.clip(np.asarray(flags).astype(np.int64), 0, 2)], extent, length)
 
 
-def show(ax: Axes, image: Array, extent: Extent, length: Scale) -> None:
-    """Put an image of colours on the axes, the first row at the bottom, both axes at one scale."""
+def draw_image(ax: Axes, image: Array, extent: Extent, length: Scale) -> None:
+    """Draw an RGB image with its first row at the bottom and equal axes."""
     left, right, bottom, top = (float(v) for v in length(extent))
     ax.imshow(image, origin="lower", extent=(left, right, bottom, top), aspect="equal")
-    _style.boxed(ax)
+    _style.draw_frame(ax)
 
 
-def bar(ax: Axes, mappable: Any, label: str) -> Any:
-    """Put a slim colour bar beside the axes."""
-    colour_bar: Any = ax.get_figure().colorbar(  # type: ignore[union-attr]
+def colour_bar(ax: Axes, mappable: Any, label: str) -> Any:
+    """Add a narrow colour bar beside the axes."""
+    bar: Any = ax.get_figure().colorbar(  # type: ignore[union-attr]
         mappable, ax=ax, label=label, extend=mappable.beyond, aspect=28, shrink=0.85, pad=0.02
     )
-    colour_bar.outline.set_linewidth(0.5)
-    colour_bar.ax.tick_params(labelsize=_style.RC["ytick.labelsize"], length=2.5)
-    return colour_bar
+    bar.outline.set_linewidth(0.5)
+    bar.ax.tick_params(labelsize=_style.RC["ytick.labelsize"], length=2.5)
+    return bar
 
 
-def framed(ax: Axes) -> None:
-    """Turn axes into a bare picture with a thin frame."""
+def bare_frame(ax: Axes) -> None:
+    """Remove ticks and draw a thin frame."""
     ax.set_xticks([])
     ax.set_yticks([])
-    _style.boxed(ax, _style.GREY)
+    _style.draw_frame(ax, _style.GREY)
 
 
-def ruler(ax: Axes, extent: Extent, length: Scale) -> None:
-    """Draw a scale bar of a round length under a picture."""
+def scale_bar(ax: Axes, extent: Extent, length: Scale) -> None:
+    """Draw a scale bar of a round length below a map."""
     width = extent[1] - extent[0]
     size = round_length(width / 4)
     start = float(length(extent[0]))
@@ -155,7 +155,7 @@ def ruler(ax: Axes, extent: Extent, length: Scale) -> None:
     ax.text(
         end + 0.02 * float(length(width)),
         -0.045,
-        amount(size, "m"),
+        quantity_text(size, "m"),
         transform=transform,
         va="center",
         fontsize=8,

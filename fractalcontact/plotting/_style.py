@@ -1,4 +1,4 @@
-"""The decisions of taste, in one place: sizes, colours, lines, keys."""
+"""Sizes, colours, line styles and legends shared by all figures."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 DPI = 150
-WIDTH = 7.2  # inches, of a figure with several panels
-PANEL = (5.2, 3.5)  # inches, of a figure with one panel and its key
+WIDTH = 7.2  # inches, a figure with several panels
+PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
 
-# Okabe and Ito (2008): told apart by every kind of colour vision
+# Okabe and Ito (2008): distinguishable with every kind of colour vision
 BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
     "#000000",
     "#E69F00",
@@ -34,10 +34,12 @@ DIRECTION_COLOURS = {"E": RED, "N": GREEN, "W": BLUE, "S": ORANGE}
 DIRECTION_LINES = {"E": "-", "N": "--", "W": "-", "S": "--"}
 INK, GREY, PALE, MISSING = "#222222", "#6B6B6B", "#E4E4E4", "#D9D9D9"
 STATE_COLOURS = ("#F2F0E9", "#12355B", RED)  # open, contact, yielded
-HEIGHT_MAP, FIELD_MAP, FAMILY_MAP = "cividis", "viridis", "viridis"
-FAMILY_END = 0.86  # the palest end of the map cannot be read on white
-LONGEST_KEY = 8
-WIDE = 30.0  # ratio of the numbers on an axis beyond which it is logarithmic
+HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
+SEQUENCE_END = 0.86  # the lightest colours of the map cannot be read on white
+MAX_LEGEND_ENTRIES = 8
+MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
+NULL_LINE: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}  # the random null beside a measured curve
+LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
 
 RC: dict[Any, Any] = {
     "font.size": 9.0,
@@ -74,28 +76,28 @@ RC: dict[Any, Any] = {
 
 
 def styled(function: Callable[P, R]) -> Callable[P, R]:
-    """Draw inside the house style, and leave the caller's settings as they were."""
+    """Draw with the settings `RC` and restore the caller's settings afterwards."""
 
     @functools.wraps(function)
-    def drawn(*arguments: P.args, **options: P.kwargs) -> R:
+    def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
         import matplotlib
 
         with matplotlib.rc_context(RC):
             return function(*arguments, **options)
 
-    return drawn
+    return wrapper
 
 
-def canvas(ax: Axes | None, size: tuple[float, float] = PANEL) -> tuple[Figure, Axes]:
-    """Return the axes to draw on and the figure they are in; a new one unless given."""
+def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL) -> tuple[Figure, Axes]:
+    """Return the root figure and the axes to draw on; both are new if `ax` is None."""
     if ax is None:
-        ax = sheet(None, size).add_subplot()
-    dress(ax)
-    return root(ax), ax
+        ax = figure_or_new(None, size).add_subplot()
+    style_axes(ax)
+    return root_figure(ax), ax
 
 
-def sheet(figure: Figure | SubFigure | None, size: tuple[float, float]) -> Any:
-    """Return the (sub)figure to put panels on; a new one unless given."""
+def figure_or_new(figure: Figure | SubFigure | None, size: tuple[float, float]) -> Any:
+    """Return the (sub)figure for the panels; a new one if `figure` is None."""
     if figure is not None:
         return figure
     from matplotlib.figure import Figure
@@ -104,46 +106,46 @@ def sheet(figure: Figure | SubFigure | None, size: tuple[float, float]) -> Any:
     return Figure(figsize=size, layout=ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07))
 
 
-def root(part: Any) -> Figure:
+def root_figure(part: Any) -> Figure:
     """Return the figure that axes or a subfigure belong to."""
-    whole: Figure = part.get_figure(root=True)
-    return whole
+    figure: Figure = part.get_figure(root=True)
+    return figure
 
 
-def dress(ax: Axes) -> None:
-    """Fix what matplotlib would otherwise look up when the figure is rendered, outside the house style."""
+def style_axes(ax: Axes) -> None:
+    """Set what matplotlib looks up only when the figure is rendered, outside the context of `RC`."""
     ax.tick_params(which="both", labelsize=RC["xtick.labelsize"], color=INK, labelcolor=INK)
     ax.grid(True, color=PALE, linewidth=0.6)
 
 
-def boxed(ax: Axes, colour: str = INK) -> None:
-    """Frame a picture on all four sides."""
+def draw_frame(ax: Axes, colour: str = INK) -> None:
+    """Draw a frame on all four sides of a map."""
     ax.grid(False)
     for spine in ax.spines.values():
         spine.set(visible=True, linewidth=0.6, color=colour)
 
 
-def family(count: int) -> list[Any]:
-    """Return one colour for each member of an ordered family of curves, dark to light."""
+def sequence_colours(count: int) -> list[Any]:
+    """Return colours for an ordered set of curves, dark to light."""
     import matplotlib
 
-    colours = matplotlib.colormaps[FAMILY_MAP]
-    return [colours(place) for place in np.linspace(0.0, FAMILY_END, max(count, 2))[:count]]
+    colours = matplotlib.colormaps[SEQUENCE_MAP]
+    return [colours(position) for position in np.linspace(0.0, SEQUENCE_END, max(count, 2))[:count]]
 
 
-def key(ax: Axes, title: str, labels: Sequence[str], colours: Sequence[Any]) -> None:
-    """Name the curves of an ordered family beside the axes; of a long family only some are named."""
+def sequence_legend(ax: Axes, title: str, labels: Sequence[str], colours: Sequence[Any]) -> None:
+    """Put a legend of an ordered set of curves beside the axes; a long legend is thinned out."""
     from matplotlib.lines import Line2D
 
     if not labels:
         return
-    shown = chosen(len(labels), LONGEST_KEY)
+    shown = spread_indices(len(labels), MAX_LEGEND_ENTRIES)
     entries = [Line2D([], [], color=colours[i], label=labels[i]) for i in shown]
-    beside(ax, entries, title=title)
+    side_legend(ax, entries, title=title)
 
 
-def beside(ax: Axes, entries: Sequence[Any], *, title: str = "", low: bool = False) -> None:
-    """Put a legend to the right of the axes, outside the data: at their top, or with `low` at their foot."""
+def side_legend(ax: Axes, entries: Sequence[Any], *, title: str = "", low: bool = False) -> None:
+    """Put a legend to the right of the axes: at the top, or at the bottom with `low`."""
     from matplotlib.legend import Legend
 
     if not entries:
@@ -161,51 +163,51 @@ def beside(ax: Axes, entries: Sequence[Any], *, title: str = "", low: bool = Fal
         labelspacing=0.35,
     )
     ax.add_artist(legend)
-    legend.set_clip_on(False)  # else the layout takes it for hidden, and leaves it no room
+    legend.set_clip_on(False)  # a clipped artist is ignored by the layout and would be cut off
 
 
-def line_entry(label: str, **style: Any) -> Any:
-    """Return one entry of a legend that tells a kind of line."""
+def legend_line(label: str, **style: Any) -> Any:
+    """Return a legend entry that shows a line style."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **{"color": GREY, **style})
 
 
-def chosen(count: int, most: int) -> list[int]:
-    """Return at most `most` of the indices 0 ... count - 1, evenly spread, ends included."""
+def spread_indices(count: int, most: int) -> list[int]:
+    """Return at most `most` of the indices 0 ... count - 1, evenly spread and including both ends."""
     if count <= 0:
         return []
     return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(count, most))})
 
 
 def letter(number: int) -> str:
-    """Return A, B, C ... for the points that are marked on a curve and shown as maps."""
+    """Return A, B, C ... for points marked on a curve and shown as maps."""
     return chr(ord("A") + number) if number < 26 else str(number + 1)
 
 
 def halo() -> list[Any]:
-    """Return the effect that keeps words readable where they cross a line."""
+    """Return a white outline that keeps text readable where it crosses a line."""
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=2.0, foreground="white")]
 
 
 def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
-    """Set logarithmic axes, those for which there is anything positive to show."""
+    """Make an axis logarithmic if it has any positive value to show."""
     for values, setter in ((x, ax.set_xscale), (y, ax.set_yscale)):
         if values is not None and np.any(np.asarray(values, dtype=float) > 0):
             setter("log")
 
 
-def wide(values: Any) -> bool:
-    """Tell whether positive numbers spread so widely that only a logarithmic axis shows them."""
+def needs_log_axis(values: Any) -> bool:
+    """Return True for positive values whose ratio exceeds `LOG_AXIS_RATIO`."""
     shown = np.asarray(values, dtype=float)
     shown = shown[np.isfinite(shown)]
-    return bool(shown.size and shown.min() > 0 and shown.max() > WIDE * shown.min())
+    return bool(shown.size and shown.min() > 0 and shown.max() > LOG_AXIS_RATIO * shown.min())
 
 
 def plain_ticks(ax: Axes) -> None:
-    """Write the numbers of logarithmic axes plainly (0.1, 1, 10), and more than one of them."""
+    """Label logarithmic axes with plain numbers (0.1, 1, 10), at least two of them where possible."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for axis in (ax.xaxis, ax.yaxis):
@@ -213,13 +215,20 @@ def plain_ticks(ax: Axes) -> None:
             continue
         low, high = sorted(axis.get_view_interval())
         if low < 1e-3 or high > 1e6:
-            continue  # powers of ten read better there
+            continue  # powers of ten are easier to read there
         narrow = high / low < 50
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
 
 
-def say(ax: Axes, text: str) -> None:
-    """Write a remark in the middle of axes that have nothing to show."""
+def write_in_empty_axes(ax: Axes, text: str) -> None:
+    """Write a note in the middle of axes without data."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
+
+
+def log_x_if_wide(ax: Axes, values: Any) -> None:
+    """Make the x axis logarithmic where the positive values on it span more than `LOG_AXIS_RATIO`."""
+    if needs_log_axis(values):
+        ax.set_xscale("log")
+        plain_ticks(ax)

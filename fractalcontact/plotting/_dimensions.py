@@ -1,4 +1,4 @@
-"""How rough a face is: the scaling curves, what was fitted to them, and the dimensions that follow."""
+"""Scaling curves of a surface with their fits, and the estimated fractal dimensions."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
-from fractalcontact.base.checks import Problems
+from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._reading import as_dataset, result_of, table, words
+from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
-# slope of each curve in log-log scale: a H + b d + c, for a Hurst exponent H and the d of a surface (3) or a
-# profile (2); the first name that a Dataset holds is its curve
+# log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
+# profile; the first name present in a Dataset is its curve
 CURVES = {
     "power_spectral_density": (-2.0, -1.0, 1.0),
     "profile_power_spectral_density": (-2.0, 0.0, -1.0),
@@ -33,24 +33,23 @@ CURVES = {
     "covering_length": (1.0, 0.0, -1.0),
 }
 COLUMNS = 3
-CLIPPED = 10  # per cent of the local slopes at either end that may lie beyond the axis
+CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
 @_style.styled
 def dimension_curves(
     curves: Any, estimates: Any = None, *, figure: Figure | SubFigure | None = None
 ) -> Figure:
-    """Draw scaling curves with their local slopes, and the window and slope that were fitted.
+    """Draw scaling curves with their local slopes, and the fitted window and slope.
 
     Parameters
     ----------
     curves : mapping of str to Dataset, Dataset, or node of a DataTree
-        From `fractalcontact.dimensions.spectrum`, `.variogram`, `.cube_counts` ..., by name. Of the node
-        /dimensions of a study the children are taken, with the estimates beside them.
+        From `fractalcontact.dimensions.spectrum`, `.variogram`, `.cube_counts` ..., by name. The node
+        /dimensions of a study holds the curves as children, and the estimates.
     estimates : Dataset, optional
-        From `fractalcontact.dimensions.estimate`: where it has a method of the same name, its window
-        (scale_min, scale_max, in m) is shaded, and the slope that its exponent stands for is drawn through
-        the curve in that window and told.
+        From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
+        scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -62,13 +61,21 @@ def dimension_curves(
     ------
     InvalidInput
         There is no curve.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> upper, lower = fc.plotting.dimension_curves(fc.dimensions.variogram(surface)).axes
+    >>> print(upper.get_ylabel(), "|", lower.get_xlabel())
+    variogram (µm²) | lag (mm)
     """
-    found, fitted = _curves_in(curves, estimates)
-    names = list(found)
+    datasets, fits = _curves_in(curves, estimates)
+    names = list(datasets)
     columns = 2 if len(names) == 4 else min(len(names), COLUMNS)
     rows = -(-len(names) // columns)
     width = 2.7 * columns + (0.4 if columns > 1 else 1.6)
-    sheet = _style.sheet(figure, (width, 3.7 * rows))
+    sheet = _style.figure_or_new(figure, (width, 3.7 * rows))
     heights = (2.2, 1.0) * rows
     axes = np.asarray(sheet.subplots(2 * rows, columns, squeeze=False, height_ratios=heights))
     for number in range(rows * columns):
@@ -78,30 +85,28 @@ def dimension_curves(
             upper.set_axis_off()
             lower.set_axis_off()
             continue
-        _draw_curve(upper, lower, names[number], found[names[number]], _fit_of(fitted, names[number]))
-    return _style.root(sheet)
+        _draw_curve(upper, lower, names[number], datasets[names[number]], _fit_of(fits, names[number]))
+    return _style.root_figure(sheet)
 
 
 def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
-    import xarray as xr
-
-    found: dict[str, xr.Dataset] = {}
+    datasets: dict[str, xr.Dataset] = {}
     if isinstance(curves, xr.DataTree) and curves.children:
-        found = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
+        datasets = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
         estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
     elif isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset | xr.DataTree):
-        found = {str(name): as_dataset(curve, "dimension_curves") for name, curve in curves.items()}
+        datasets = {str(name): as_dataset(curve, "dimension_curves") for name, curve in curves.items()}
     else:
-        one = as_dataset(curves, "dimension_curves")
-        found = {curve_of(one)[1]: one}
-    found = {name: curve for name, curve in found.items() if curve_of(curve)[1]}
+        dataset = as_dataset(curves, "dimension_curves")
+        datasets = {curve_of(dataset)[1]: dataset}
+    datasets = {name: curve for name, curve in datasets.items() if curve_of(curve)[1]}
     with Problems("fc.plotting.dimension_curves") as problems:
-        problems.require(bool(found), "curves", f"a variable out of {', '.join(CURVES)}", "none")
-    return found, None if estimates is None else as_dataset(estimates, "dimension_curves")
+        problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", "none")
+    return datasets, None if estimates is None else as_dataset(estimates, "dimension_curves")
 
 
 def curve_of(curve: xr.Dataset) -> tuple[str, str]:
-    """Return the names of the scale and of the quantity of a scaling curve; empty where there is none."""
+    """Return the names of scale and quantity of a scaling curve; empty if there is none."""
     for value in CURVES:
         if value in curve.data_vars:
             for scale in SCALES:
@@ -119,7 +124,7 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
     for ax in (upper, lower):
-        _style.dress(ax)
+        _style.style_axes(ax)
     scale, value = curve_of(curve)
     curve = result_of(curve, "dimension_curves", (scale, value), ())
     dim = curve[scale].dims[0]
@@ -145,16 +150,16 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     for ax in (upper, lower):
         _style.plain_ticks(ax)
     if not np.isfinite(y).any():
-        _style.say(upper, "no curve")
+        _style.write_in_empty_axes(upper, "no curve")
 
 
 def _slope_limits(ax: Axes, slopes: Any) -> None:
-    """Keep the noise at the ends of a curve from squeezing all the rest."""
-    known = slopes[np.isfinite(slopes)]
-    if known.size:
-        low, high = np.percentile(known, (CLIPPED, 100 - CLIPPED))
-        room = max(0.4 * (high - low), 0.05)
-        ax.set_ylim(low - room, high + room)
+    """Limit the axis so that noise at the ends of a curve does not compress the rest."""
+    finite = slopes[np.isfinite(slopes)]
+    if finite.size:
+        low, high = np.percentile(finite, (CLIPPED, 100 - CLIPPED))
+        margin = max(0.4 * (high - low), 0.05)
+        ax.set_ylim(low - margin, high + margin)
 
 
 def _draw_fit(
@@ -165,7 +170,7 @@ def _draw_fit(
     curve: tuple[Any, Any],
     shown: tuple[Any, Any],
 ) -> None:
-    """Shade the window of the fit, draw its slope through the curve, and tell it."""
+    """Shade the window of the fit, draw its slope through the curve, and write its value."""
     window = np.sort([float(fit["scale_min"]), float(fit["scale_max"])])
     if names[0] == "wavenumber":
         window = np.sort(2 * np.pi / window)
@@ -198,9 +203,9 @@ def dimensions(
     band: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw the fractal dimension by each method with its 95 % interval.
+    r"""Draw the fractal dimension estimated by each method with its 95 % interval.
 
-    A method that gives no honest interval is drawn as an open circle.
+    A method without a validated interval is drawn as an open circle.
 
     Parameters
     ----------
@@ -208,9 +213,9 @@ def dimensions(
         From `fractalcontact.dimensions.estimate`: hurst, fractal_dimension, ci_low, ci_high (of the Hurst
         exponent) over `method`.
     truth : float, optional
-        Dimension to compare with, drawn as a line.
+        True dimension, drawn as a line.
     band : pair of float, optional
-        Range of dimensions to compare with, shaded.
+        Range of dimensions for comparison, shaded.
     ax : Axes, optional
         Draw here; otherwise on a new figure.
 
@@ -222,35 +227,46 @@ def dimensions(
     ------
     InvalidInput
         A variable is missing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> estimates = fc.dimensions.estimate(surface, ["default", "variogram"])
+    >>> ax = fc.plotting.dimensions(estimates, truth=2.2).axes[0]
+    >>> print([label.get_text() for label in ax.get_yticklabels()], "|", ax.get_xlabel())
+    ['default', 'variogram'] | fractal dimension $\Delta$
     """
     data = result_of(estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",))
     names = words(data["method"])
-    figure, ax = _style.canvas(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
+    figure, ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
     value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))
-    top = value + hurst  # 3 of a surface, 2 of a profile
-    nothing = np.full(value.shape, np.nan)
-    low = top - table(data, "ci_high", ("method",)) if "ci_high" in data else nothing
-    high = top - table(data, "ci_low", ("method",)) if "ci_low" in data else nothing
-    places = np.arange(len(names))[::-1]
-    known = np.isfinite(low) & np.isfinite(high)
-    ax.hlines(places[known], low[known], high[known], color=_style.BLUE, lw=2.2)
-    ax.plot(value[known], places[known], "o", color=_style.BLUE, ms=6)
-    ax.plot(value[~known], places[~known], "o", mfc="white", mec=_style.BLUE, ms=6)
+    embedding = value + hurst  # 3 for a surface, 2 for a profile
+    missing = np.full(value.shape, np.nan)
+    low = embedding - table(data, "ci_high", ("method",)) if "ci_high" in data else missing
+    high = embedding - table(data, "ci_low", ("method",)) if "ci_low" in data else missing
+    rows = np.arange(len(names))[::-1]
+    has_interval = np.isfinite(low) & np.isfinite(high)
+    ax.hlines(rows[has_interval], low[has_interval], high[has_interval], color=_style.BLUE, lw=2.2)
+    ax.plot(value[has_interval], rows[has_interval], "o", color=_style.BLUE, ms=6)
+    ax.plot(value[~has_interval], rows[~has_interval], "o", mfc="white", mec=_style.BLUE, ms=6)
     entries = (
-        [_style.line_entry("95 % interval", color=_style.BLUE, lw=2.2, marker="o")] if known.any() else []
+        [_style.legend_line("95 % interval", color=_style.BLUE, lw=2.2, marker="o")]
+        if has_interval.any()
+        else []
     )
-    if not known.all():
+    if not has_interval.all():
         entries.append(
-            _style.line_entry("no interval", ls="", marker="o", mfc="white", mec=_style.BLUE, ms=6)
+            _style.legend_line("no interval", ls="", marker="o", mfc="white", mec=_style.BLUE, ms=6)
         )
     if band is not None:
         ax.axvspan(*band, color=_style.PALE, lw=0, zorder=0)
     if truth is not None:
         ax.axvline(truth, color=_style.BLACK, lw=0.9, ls=":")
-        entries.append(_style.line_entry("true", color=_style.BLACK, lw=0.9, ls=":"))
-    ax.set_yticks(places, [name.replace("_", " ") for name in names])
+        entries.append(_style.legend_line("true", color=_style.BLACK, lw=0.9, ls=":"))
+    ax.set_yticks(rows, [name.replace("_", " ") for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.grid(False, axis="y")
     ax.set_xlabel(name_of(data["fractal_dimension"]))
-    _style.beside(ax, entries)
+    _style.side_legend(ax, entries)
     return figure

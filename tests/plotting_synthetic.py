@@ -1,14 +1,13 @@
-"""A small synthetic study, labelled as the rooms label theirs, with numbers that no solver made."""
+"""A small synthetic study with the variables and labels of real results and freely chosen numbers."""
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.schema import label
 
 
 def heights(n=48, spacing=8e-4, seed=0):
-    """Return a labelled, rough face of n x n points with a slope."""
-    import xarray as xr
-
+    """Return a labelled, rough surface of n x n points with a slope."""
     rng = np.random.default_rng(seed)
     waves = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.rfftfreq(n), indexing="ij"))
     waves[0, 0] = np.inf
@@ -19,15 +18,13 @@ def heights(n=48, spacing=8e-4, seed=0):
     return label(xr.DataArray(z - z.mean(), dims=("y", "x"), coords={"y": x, "x": x}, name="height"))
 
 
-def delta(face, cells=24, shears=(8e-4, 8e-3), direction="W"):
-    """Return the labelled delta-surfaces of a mated block in the middle of a face."""
-    import xarray as xr
-
-    n, spacing = face.sizes["x"], float(face.x[1] - face.x[0])
+def delta(surface, cells=24, shears=(8e-4, 8e-3), direction="W"):
+    """Return the labelled delta-surfaces of a mated block in the middle of a surface."""
+    n, spacing = surface.sizes["x"], float(surface.x[1] - surface.x[0])
     first = (n - cells) // 2
-    block = face.isel(x=slice(first, first + cells), y=slice(first, first + cells))
+    block = surface.isel(x=slice(first, first + cells), y=slice(first, first + cells))
     planes = [
-        face.values[first : first + cells, first - k : first - k + cells] - block.values
+        surface.values[first : first + cells, first - k : first - k + cells] - block.values
         for k in (round(v / spacing) for v in shears)
     ]
     coords = {"shear": list(shears), "y": block.y, "x": block.x, "direction": direction, "azimuth": 180.0}
@@ -46,14 +43,12 @@ def path_coords(shears, forces, planes=None):
     return coords
 
 
-def closure(face_delta, forces=(0.0, 100.0, 1e3, 1e4, 3e4)):
+def closure(delta_surface, forces=(0.0, 100.0, 1e3, 1e4, 3e4)):
     """Return closure laws of the form F ~ w^2, with states cut out of the delta-surface by height."""
-    import xarray as xr
-
-    shears, forces = face_delta.shear.values, np.asarray(forces)
+    shears, forces = delta_surface.shear.values, np.asarray(forces)
     own = 2e-6 * np.sqrt(forces)[None, :] * (1 + np.arange(len(shears)))[:, None] / 4
     fraction = 1e-6 * forces[None, :] / (1 + np.arange(len(shears)))[:, None]
-    z = face_delta.values
+    z = delta_surface.values
     cut = np.array([[np.quantile(plane, 1 - q) for q in row] for plane, row in zip(z, fraction, strict=True)])
     state = (z[:, None] > cut[..., None, None]).astype(np.int8)
     dims = ("shear", "step")
@@ -67,15 +62,13 @@ def closure(face_delta, forces=(0.0, 100.0, 1e3, 1e4, 3e4)):
                 "corrected_contact_fraction": (dims, fraction),
                 "state": ((*dims, "y", "x"), state),
             },
-            coords=path_coords(shears, forces, face_delta),
+            coords=path_coords(shears, forces, delta_surface),
         )
     )
 
 
 def dilatancy(shears=None, forces=(1e3, 1e4, 3e4), directions=("E", "N", "W", "S")):
     """Return dilatancy curves with a plateau and a mean slope."""
-    import xarray as xr
-
     shears = np.arange(0, 1.0e-2, 8e-5) if shears is None else np.asarray(shears)
     slope = np.array([0.06, 0.01, -0.06, -0.01, 0.02])[: len(directions)]
     rigid = 1.5e-3 * (1 - np.exp(-shears / 4e-4)) + slope[:, None] * shears
@@ -97,8 +90,6 @@ def dilatancy(shears=None, forces=(1e3, 1e4, 3e4), directions=("E", "N", "W", "S
 
 def friction(opening):
     """Return the friction angle of dilatancy curves by differences."""
-    import xarray as xr
-
     name = "dilatancy" if "dilatancy" in opening else "rigid_dilatancy"
     angle = np.rad2deg(np.arctan(opening[name].differentiate("shear")))
     angle = angle.clip(-10, 40)
@@ -110,9 +101,7 @@ def friction(opening):
 
 
 def box_dimension(closed):
-    """Return box dimensions that grow with the force, beside those of a dust."""
-    import xarray as xr
-
+    """Return box dimensions that grow with the force, beside those of a random null."""
     fraction = closed["corrected_contact_fraction"]
     value = 2 + np.log(fraction.where(fraction > 0)) / 8
     data = {
@@ -126,9 +115,7 @@ def box_dimension(closed):
 
 
 def lacunarity(closed, sizes=(1, 2, 4, 8, 16)):
-    """Return lacunarities 1 + (1/coverage - 1) / r, beside those of a dust."""
-    import xarray as xr
-
+    """Return lacunarities 1 + (1/coverage - 1) / r, beside those of a random null."""
     fraction = closed["corrected_contact_fraction"]
     edge = xr.DataArray(list(sizes), dims="box_size", coords={"box_size": list(sizes)})
     value = 1 + (1 / fraction.where(fraction > 0) - 1) / edge
@@ -138,8 +125,6 @@ def lacunarity(closed, sizes=(1, 2, 4, 8, 16)):
 
 def estimates(methods=("default", "spectrum", "variogram", "cube_counts")):
     """Return estimates; the last method has no interval."""
-    import xarray as xr
-
     hurst = 0.78 + 0.01 * np.arange(len(methods))
     width = np.full(len(methods), 0.03)
     width[-1] = np.nan
@@ -157,8 +142,6 @@ def estimates(methods=("default", "spectrum", "variogram", "cube_counts")):
 
 def curves():
     """Return power laws as scaling curves."""
-    import xarray as xr
-
     lag = 8e-5 * 2.0 ** np.arange(9)
     wave = 2 * np.pi / lag[::-1]
     laws = {
@@ -176,7 +159,6 @@ def curves():
 
 def islands(plane):
     """Return the labelled islands of one mask (y, x)."""
-    import xarray as xr
     from scipy import ndimage
 
     numbers, count = ndimage.label(plane.values > 0)
@@ -192,9 +174,7 @@ def islands(plane):
 
 
 def transmissivity(closed):
-    """Return hydraulic apertures that fall with the force; flow along y is barred at the end."""
-    import xarray as xr
-
+    """Return hydraulic apertures that fall with the force; flow along y is blocked at the last step."""
     force = closed["normal_force"].values
     shears = closed["shear"].values
     aperture = 1e-4 * (1 + np.arange(len(shears)))[:, None, None] * np.exp(-force / 2e4)[None, :, None]
@@ -206,13 +186,11 @@ def transmissivity(closed):
 
 def accuracy():
     """Return two parts of error against run time; one method stops early."""
-    import xarray as xr
-
-    knob = np.array([8.0, 16.0, 32.0, 64.0])
-    error = np.array([1 / knob, 4 / knob**2])
+    size = np.array([8.0, 16.0, 32.0, 64.0])
+    error = np.array([1 / size, 4 / size**2])
     error[1, -1] = np.nan
     dims = ("method", "setting")
-    seconds = 1e-6 * knob**2 * np.array([[1.0], [3.0]])
+    seconds = 1e-6 * size**2 * np.array([[1.0], [3.0]])
     data = {"error": (dims, error), "run_time": (dims, seconds), "memory": (dims, 1e8 * seconds)}
     data["on_frontier"] = (dims, np.array([[True, True, False, False], [False, True, True, False]]))
     coords = {"method": ["plain", "fast, disc"], "setting": np.arange(4)}
@@ -223,15 +201,13 @@ def accuracy():
 
 def study():
     """Return a whole study as a tree, with the groups that a scene gives."""
-    import xarray as xr
-
-    face = heights()
+    surface = heights()
     shears = (8e-4, 1.6e-3, 8e-3)
-    under = delta(face, shears=shears)
+    under = delta(surface, shears=shears)
     closed = closure(under)
     short = dilatancy(shears=[0, 8e-5, 1.6e-4, 4e-4, 8e-4, 8e-3], directions=("W",))
     groups = {
-        "/surfaces": face.to_dataset(),
+        "/surfaces": surface.to_dataset(),
         "/dimensions": estimates(),
         "/joints/delta_surface": under.to_dataset(),
         "/joints/closure": closed,

@@ -1,24 +1,24 @@
-"""Taking from a labelled result what a figure shows, whatever dims it came with."""
+"""Reading labelled results: checks, required dims, coordinates and map extents."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from fractalcontact.base.checks import Problems
-
-if TYPE_CHECKING:
-    import xarray as xr
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
+PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
 
 def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) -> xr.Dataset:
-    """Return a result with exactly `dims` ahead of its other dims.
+    """Return a result in which every dim of `dims` exists and no other path dim is left.
 
-    A dim that is missing is added with length one, a leftover of length one is dropped.
+    A missing dim is added with length one; another path dim of length one is dropped.
 
     Parameters
     ----------
@@ -26,14 +26,14 @@ def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) 
     where : str
         Name of the plotting function, for the message.
     names : sequence of str
-        Variables that must be there.
+        Variables that must be present.
     dims : sequence of str
-        Dims that a figure runs over (`shear`, `step` ...).
+        Dims that the figure runs over (`shear`, `step` ...).
 
     Raises
     ------
     InvalidInput
-        Something is missing, or a further dim is longer than one.
+        A variable is missing, or another path dim is longer than one.
     """
     dataset = as_dataset(data, where)
     with Problems(f"fc.plotting.{where}") as problems:
@@ -46,7 +46,7 @@ def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) 
             for dim in dataset.dims
             if dim in PATH_DIMS
             and dim not in dims
-            and any(dim in dataset[n].dims for n in names if n in dataset)
+            and any(dim in dataset[name].dims for name in names if name in dataset)
         ]
         for dim in extra:
             problems.require(
@@ -56,28 +56,29 @@ def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) 
     return dataset.expand_dims([dim for dim in dims if dim not in dataset.dims])
 
 
-PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
-
-
 def as_dataset(data: Any, where: str) -> xr.Dataset:
-    """Return the Dataset in `data`: itself, that of a tree's node, or of one variable."""
-    import xarray as xr
-
+    """Return a Dataset, the Dataset of a tree's node, or a DataArray as a Dataset."""
     if isinstance(data, xr.Dataset):
         return data
     if isinstance(data, xr.DataTree):
         return data.to_dataset()
     if isinstance(data, xr.DataArray):
         return data.to_dataset(name="height" if data.name is None else str(data.name))
+    expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
+    raise InvalidInput(f"fc.plotting.{where}", [f"result: expected {expected}, got {type(data).__name__}"])
+
+
+def require_variables(dataset: xr.Dataset, where: str, names: Sequence[str], argument: str) -> None:
+    """Raise InvalidInput unless the variables are present."""
     with Problems(f"fc.plotting.{where}") as problems:
-        problems.add(
-            "result", "a labelled result (Dataset, DataArray or node of a DataTree)", type(data).__name__
-        )
-    raise AssertionError
+        for name in names:
+            problems.require(
+                name in dataset.variables, argument, f"the variable {name!r}", list(dataset.variables)
+            )
 
 
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
-    """Return the numbers of a variable with exactly `dims`, repeated along those it does not have."""
+    """Return a variable as an array with exactly `dims`, repeated along those it does not have."""
     variable = data[name]
     for dim in dims:
         if dim not in variable.dims:
@@ -86,12 +87,12 @@ def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
 
 
 def words(data: xr.DataArray) -> list[str]:
-    """Return the texts of a coordinate, whether they were read as text or as bytes."""
+    """Return the strings of a coordinate, decoded if they were read as bytes."""
     return [v.decode() if isinstance(v, bytes) else str(v) for v in np.atleast_1d(data.values).tolist()]
 
 
 def extent_of(plane: xr.DataArray | xr.Dataset) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top edge of a plane in metres, from its cell centres."""
+    """Return the left, right, bottom and top edge of a plane in metres, from its cell centres."""
     edges: list[float] = []
     for dim in ("x", "y"):
         n = plane.sizes[dim]
@@ -104,7 +105,7 @@ def extent_of(plane: xr.DataArray | xr.Dataset) -> tuple[float, float, float, fl
     return edges[0], edges[1], edges[2], edges[3]
 
 
-def nearest(values: Any, wanted: float) -> int:
-    """Return the index of the number nearest to `wanted`, NaN never."""
-    distance = np.abs(np.asarray(values, dtype=float) - wanted)
+def nearest(values: Any, target: float) -> int:
+    """Return the index of the value nearest to `target`, ignoring NaN."""
+    distance = np.abs(np.asarray(values, dtype=float) - target)
     return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))

@@ -1,4 +1,4 @@
-"""How a joint forgets under shear: the correlation of its faces, the dimension of what is left between."""
+"""Loss of correlation of the two faces of a joint under shear, and the dimension of its delta-surface."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._reading import result_of, table
+from fractalcontact.plotting._directions import direction_styles
+from fractalcontact.plotting._inputs import result_of, table
 from fractalcontact.plotting._units import axis_label, scale_of
-from fractalcontact.plotting.sliding import directions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WAYS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
+DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
 
 
 @_style.styled
 def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
-    """Draw the correlation of the two faces against shear, and the length where it is lost.
+    """Draw the correlation of the two faces of a joint against shear displacement.
 
-    The vertical lines stand at the decorrelation lengths, the bands beside them are their intervals.
+    Vertical dotted lines show the decorrelation lengths, and bands their intervals.
 
     Parameters
     ----------
@@ -38,9 +38,19 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     Raises
     ------
     InvalidInput
-        A variable is missing, or the result runs over something else as well.
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> result = fc.joints.decorrelation_length(crack, direction="E")
+    >>> ax = fc.plotting.correlation(result).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    shear displacement $v$ (mm) | correlation of the faces
     """
-    figure, ax = _style.canvas(ax)
+    figure, ax = _style.axes_or_new(ax)
     names = ("correlation", "decorrelation_length", "shear")
     data = result_of(memory, "correlation", names, ("direction", "shear"))
     values = table(data, "correlation", ("direction", "shear"))
@@ -48,25 +58,25 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     lengths = data.isel(shear=0)
     ends = [table(lengths, f"decorrelation_length{end}", ("direction",)) for end in ("_low", "", "_high")]
     entries = []
-    for i, (word, look) in enumerate(directions(data)):
+    for i, (name, look) in enumerate(direction_styles(data)):
         ax.plot(along(data["shear"].values), values[i], **look)
         low, length, high = (float(end[i]) for end in ends)
         if np.isfinite(length):
             ax.axvline(float(along(length)), color=look["color"], lw=0.7, ls=":")
         if np.isfinite(low) and np.isfinite(high):
             ax.axvspan(float(along(low)), float(along(high)), color=look["color"], alpha=0.12, lw=0)
-        entries.append(_style.line_entry(word, **look))
+        entries.append(_style.legend_line(name, **look))
     ax.axhline(0.0, color="0.6", lw=0.6)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("correlation of the faces")
-    _style.beside(ax, entries, title="block slides")
-    _style.beside(ax, [_style.line_entry("decorrelation length", lw=0.7, ls=":")], low=True)
+    _style.side_legend(ax, entries, title="block slides")
+    _style.side_legend(ax, [_style.legend_line("decorrelation\nlength", lw=0.7, ls=":")], low=True)
     return figure
 
 
 @_style.styled
 def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
-    """Draw the dimension of the delta-surface against shear, by each way to measure it.
+    """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method.
 
     Parameters
     ----------
@@ -82,19 +92,29 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     Raises
     ------
     InvalidInput
-        A variable is missing, or the result runs over something else as well.
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
+    >>> result = xr.Dataset({name: ("shear", [2.1, 2.2]) for name in names}, {"shear": [1e-4, 1e-3]})
+    >>> ax = fc.plotting.delta_dimension(result).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    shear displacement $v$ (mm) | dimension of the delta-surface
     """
-    figure, ax = _style.canvas(ax)
-    data = result_of(dimension, "delta_dimension", (*WAYS, "shear"), ("shear",))
+    figure, ax = _style.axes_or_new(ax)
+    data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",))
     along = scale_of(data["shear"])
     entries = []
-    for i, name in enumerate(WAYS):
+    for i, name in enumerate(DIMENSIONS):
         look: dict[str, Any] = {"color": _style.CYCLE[i], "marker": "osD"[i], "ms": 3.5}
         ax.plot(along(data["shear"].values), table(data, name, ("shear",)), **look)
-        entries.append(_style.line_entry(name.split("_")[0], **look))
+        entries.append(_style.legend_line(name.split("_")[0], **look))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
         ax.set_xscale("log")
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("dimension of the delta-surface")
-    _style.beside(ax, entries, title="by its")
+    _style.side_legend(ax, entries, title="method")
     return figure

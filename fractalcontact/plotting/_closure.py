@@ -1,4 +1,4 @@
-"""The joint under normal force: how far it closes, and how much of it touches."""
+"""Closure of a joint under normal load: closure laws and real contact area."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import nearest, result_of, table
 from fractalcontact.plotting._paths import shear_words
-from fractalcontact.plotting._reading import nearest, result_of, table
 from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
+TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 
 
 @_style.styled
@@ -27,9 +30,10 @@ def closure_laws(
     key: bool = True,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw force against closure, one curve for each shear.
+    """Draw normal force against closure, one curve per shear displacement.
 
-    The whole closure w is drawn thin, that of the interface alone, w_int = w - w_b, thick.
+    Thin lines show the total closure w, thick lines the interface closure w_int = w - w_b, where w_b is the
+    closure of the two bodies.
 
     Parameters
     ----------
@@ -37,11 +41,11 @@ def closure_laws(
         From `fractalcontact.joints.closure`: closure, interface_closure (m) and normal_force (N) over
         (shear, step), or over one of them.
     shear : float, optional
-        Shear (m) of the curve that gets the marked points; the nearest one is taken.
+        Shear displacement (m) of the curve with the marked points; the nearest one is taken.
     marked : sequence of int
-        Steps to be marked A, B, C ... on that curve.
+        Steps to mark A, B, C ... on that curve.
     key : bool
-        Name the shears beside the axes.
+        Add a legend of the shear displacements.
     ax : Axes, optional
         Draw here; otherwise on a new figure.
 
@@ -52,35 +56,45 @@ def closure_laws(
     Raises
     ------
     InvalidInput
-        A variable is missing, or the result runs over something else as well.
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
+    >>> result = fc.joints.closure(crack, shear=2e-4, direction="E", normal_force=[1.0, 10.0])
+    >>> ax = fc.plotting.closure_laws(result).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    closure (µm) | normal force $F$ (N)
     """
-    figure, ax = _style.canvas(ax)
+    figure, ax = _style.axes_or_new(ax)
     data = result_of(closure, "closure_laws", ("closure", "normal_force"), ("shear", "step"))
-    own = "interface_closure" if "interface_closure" in data else "closure"
+    inner_name = "interface_closure" if "interface_closure" in data else "closure"
     force = table(data, "normal_force", ("shear", "step"))
-    whole = table(data, "closure", ("shear", "step"))
-    inner = table(data, own, ("shear", "step"))
+    total = table(data, "closure", ("shear", "step"))
+    inner = table(data, inner_name, ("shear", "step"))
     length, newton = scale_of(data["closure"]), scale_of(data["normal_force"])
-    colours = _style.family(len(force))
+    colours = _style.sequence_colours(len(force))
+    dot = "o" if force.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
-        dot = "o" if force.shape[1] == 1 else ""
-        if own != "closure":
-            ax.plot(length(whole[i]), newton(force[i]), color=colour, lw=0.8, alpha=0.75, marker=dot)
+        if inner_name != "closure":
+            ax.plot(length(total[i]), newton(force[i]), color=colour, marker=dot, **TOTAL_LINE)
         ax.plot(length(inner[i]), newton(force[i]), color=colour, marker=dot)
     if len(marked) and len(force):
         row = 0 if shear is None or len(force) == 1 else nearest(data["shear"], shear)
-        mark(ax, length(inner[row, list(marked)]), newton(force[row, list(marked)]), colours[row])
+        mark_points(ax, length(inner[row, list(marked)]), newton(force[row, list(marked)]), colours[row])
     ax.set_xlabel(length.label("closure"))
     ax.set_ylabel(axis_label(data["normal_force"], newton))
-    from_zero(ax, whole, force)
+    _start_at_zero(ax, total, force)
     if key:
-        shear_key(ax, data, colours)
-    if own != "closure":
-        _style.beside(
+        _shear_legend(ax, data, colours)
+    if inner_name != "closure":
+        _style.side_legend(
             ax,
             [
-                _style.line_entry(r"interface, $w_\mathrm{int}$"),
-                _style.line_entry("whole, $w$", lw=0.8, alpha=0.75),
+                _style.legend_line(r"interface, $w_\mathrm{int}$"),
+                _style.legend_line("total, $w$", **TOTAL_LINE),
             ],
             title="closure",
             low=True,
@@ -90,10 +104,10 @@ def closure_laws(
 
 @_style.styled
 def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None = None) -> Figure:
-    """Draw the part of the nominal area that touches, one curve for each shear.
+    """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
 
-    The corrected area is drawn thick, the raw count of cells thin and broken: a cell that is touched in a
-    corner counts whole, so the count is too high.
+    Solid lines show the area corrected for the perimeter, thin dashed lines the count of cells in contact,
+    which is too high because a cell that is partly in contact counts fully.
 
     Parameters
     ----------
@@ -112,54 +126,63 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
     Raises
     ------
     InvalidInput
-        A variable is missing, or the result runs over something else as well.
+        A variable is missing, or the result has a further dimension.
 
     References
     ----------
     Yastrebov, Anciaux and Molinari (2017), Journal of the Mechanics and Physics of Solids 107 (correction).
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    >>> ax = fc.plotting.contact_area(result, against="nominal_pressure").axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    nominal pressure (MPa) | real / nominal contact area (%)
     """
-    figure, ax = _style.canvas(ax)
+    figure, ax = _style.axes_or_new(ax)
     data = result_of(result, "contact_area", ("contact_fraction", against), ("shear", "step"))
     loads = table(data, against, ("shear", "step"))
     raw = table(data, "contact_fraction", ("shear", "step"))
     scale, percent = scale_of(data[against]), scale_of(data["contact_fraction"])
     corrected = "corrected_contact_fraction" in data
-    colours = _style.family(len(loads))
+    colours = _style.sequence_colours(len(loads))
     dot = "o" if loads.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
-        look: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))} if corrected else {}
+        look = RAW_LINE if corrected else {}
         ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **look)
         if corrected:
             fraction = table(data, "corrected_contact_fraction", ("shear", "step"))[i]
             ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)
     ax.set_xlabel(axis_label(data[against], scale))
-    ax.set_ylabel(percent.label("real contact area over nominal area"))
-    from_zero(ax, loads, raw)
-    shear_key(ax, data, colours)
+    ax.set_ylabel(percent.label("real / nominal contact area"))
+    _start_at_zero(ax, loads, raw)
+    _shear_legend(ax, data, colours)
     if corrected:
-        _style.beside(
+        _style.side_legend(
             ax,
             [
-                _style.line_entry("corrected for\nthe perimeter"),
-                _style.line_entry("cells in contact", lw=0.9, ls=(0, (4, 2))),
+                _style.legend_line("corrected for\nthe perimeter"),
+                _style.legend_line("cell count", **RAW_LINE),
             ],
-            title="area",
+            title="contact area",
             low=True,
         )
     return figure
 
 
-def shear_key(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
-    """Name the curves by their shear; a single curve without a shear needs no name."""
-    title, texts = shear_words(data)
-    if texts:
-        _style.key(ax, title, texts, colours)
+def _shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
+    """Label the curves by their shear; a single curve without a shear gets no legend."""
+    title, labels = shear_words(data)
+    if labels:
+        _style.sequence_legend(ax, title, labels, colours)
 
 
-def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
-    """Mark points of a curve with letters in rings, beginning with letter number `first`.
+def mark_points(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
+    """Mark points of a curve with circled letters, beginning with letter number `first`.
 
-    The letters stand on their points, so that none lies on another curve.
+    The letters are centred on their points, so that none covers another curve.
     """
     ax.plot(x, y, "o", mfc="white", mec=colour, mew=1.2, ms=10.5, zorder=4, clip_on=False)
     for number, (a, b) in enumerate(zip(x, y, strict=True), first):
@@ -168,8 +191,8 @@ def mark(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
                         va="center_baseline", zorder=5, annotation_clip=False)  # fmt: skip
 
 
-def from_zero(ax: Axes, x: Any, y: Any) -> None:
-    """Let the axes start at zero where all that is shown is positive."""
+def _start_at_zero(ax: Axes, x: Any, y: Any) -> None:
+    """Start an axis at zero if all its values are non-negative and one is positive."""
     for values, axis in ((x, "x"), (y, "y")):
         shown = np.asarray(values, dtype=float)
         shown = shown[np.isfinite(shown)]

@@ -1,0 +1,209 @@
+"""Accuracy: true error against run time and memory, and errors of the estimators of the Hurst exponent."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import as_dataset, require_variables, table, words
+from fractalcontact.plotting._units import axis_label, scale_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
+MEGABYTE = 1e6
+NARROW = 2.0  # costs within this ratio are drawn on an axis of at least its width
+PLANE = ("method", "setting")
+
+
+@_style.styled
+def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+    """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
+
+    Each point is one setting of a method. A filled point is on the Pareto front: no other method of the
+    benchmark reached a smaller error in the same time.
+
+    Parameters
+    ----------
+    measured : DataTree or Dataset
+        From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
+        on_frontier over (method, setting), contest and error_meaning over method.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> measured = xr.Dataset(
+    ...     {
+    ...         "error": (("method", "setting"), [[0.1, 0.02]]),
+    ...         "run_time": (("method", "setting"), [[0.01, 0.2]]),
+    ...         "memory": (("method", "setting"), [[2e6, 8e6]]),
+    ...         "on_frontier": (("method", "setting"), [[True, True]]),
+    ...     },
+    ...     coords={
+    ...         "method": ["fast"],
+    ...         "contest": ("method", ["sphere"]),
+    ...         "error_meaning": ("method", ["relative error of the force"]),
+    ...     },
+    ... )
+    >>> time, memory = fc.plotting.error_against_time(measured).axes
+    >>> print(time.get_xlabel(), "|", memory.get_xlabel())
+    run time (ms) | peak memory (MB)
+    """
+    benchmarks = _benchmarks(measured)
+    sheet = _style.figure_or_new(figure, (8.6, 2.7 * len(benchmarks)))
+    axes = sheet.subplots(len(benchmarks), 2, squeeze=False, sharey="row")
+    for (left, right), (name, data) in zip(axes, benchmarks.items(), strict=True):
+        seconds = scale_for("s", table(data, "run_time", PLANE))
+        _error_curves(left, data, seconds(table(data, "run_time", PLANE)))
+        left.set_xlabel(axis_label(data["run_time"], seconds))
+        left.set_ylabel("true error")
+        entries = _error_curves(right, data, table(data, "memory", PLANE) / MEGABYTE)
+        right.set_xlabel("peak memory (MB)")
+        right.tick_params(labelleft=False)
+        _style.side_legend(right, entries)
+        meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
+        left.set_title(f"{name}\n{meaning}", fontsize=8)
+    return _style.root_figure(sheet)
+
+
+def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
+    """Return the results of each benchmark by name."""
+    if isinstance(measured, xr.DataTree) and measured.children:
+        groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
+    else:
+        groups = {"": as_dataset(measured, "error_against_time")}
+    needed = ("error", "run_time", "memory", "on_frontier", "contest", "error_meaning")
+    benchmarks = {}
+    for prefix, data in groups.items():
+        require_variables(data, "error_against_time", needed, "measured")
+        names = np.asarray(words(data["contest"]))
+        for name in dict.fromkeys(names.tolist()):
+            benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
+    return benchmarks
+
+
+def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
+    """Draw error against a cost, a curve for each method; return the entries of the legend."""
+    _style.style_axes(ax)
+    errors, on_front = table(data, "error", PLANE), table(data, "on_frontier", PLANE).astype(bool)
+    entries = []
+    for row, name in enumerate(words(data["method"])):
+        finite = np.isfinite(errors[row]) & np.isfinite(cost[row])
+        best = finite & on_front[row]
+        look = _method_style(row)
+        ax.plot(cost[row][finite], errors[row][finite], **look, markerfacecolor="white")
+        ax.plot(cost[row][best], errors[row][best], **look, ls="")
+        entries.append(_style.legend_line(name.replace("_", " "), **look))
+    _style.log_scale(ax, x=cost, y=errors)
+    least, most = np.nanmin(cost), np.nanmax(cost)
+    if least > 0 and most < NARROW * least:  # nearly equal costs must not look different
+        ax.set_xlim(least / NARROW, most * NARROW)
+    _style.plain_ticks(ax)
+    return entries
+
+
+def _method_style(number: int) -> dict[str, Any]:
+    colour = _style.CYCLE[number % len(_style.CYCLE)]
+    return {"color": colour, "marker": MARKERS[number % len(MARKERS)]}
+
+
+@_style.styled
+def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+    """Draw the rms error over the Cramer-Rao bound and the interval coverage against the true Hurst exponent.
+
+    There is one column per surface family and size, and one curve per method. An unbiased estimator has a
+    ratio of at least one. A calibrated 95 % interval has a coverage of 0.95; vertical bars show the
+    uncertainty due to the number of surfaces.
+
+    Parameters
+    ----------
+    bench : Dataset
+        From `fractalcontact.accuracy.estimators`: error_ratio and interval_coverage over (method, family,
+        hurst, size), with the ends of their intervals.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> dims = ("method", "family", "hurst", "size")
+    >>> bench = xr.Dataset(
+    ...     {"error_ratio": (dims, [[[[1.1], [1.2]]]]), "interval_coverage": (dims, [[[[0.94], [0.95]]]])},
+    ...     coords={"method": ["default"], "family": ["fbm"], "hurst": [0.3, 0.8], "size": [128]},
+    ... )
+    >>> upper, lower = fc.plotting.estimator_errors(bench).axes
+    >>> print(upper.get_title(loc="left"), "|", lower.get_xlabel())
+    fbm, n = 128 | true Hurst exponent
+    """
+    data = as_dataset(bench, "estimator_errors")
+    require_variables(data, "estimator_errors", ("error_ratio", "interval_coverage"), "bench")
+    cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
+    sheet = _style.figure_or_new(figure, (2.3 * len(cases) + 1.6, 5.2))
+    axes = np.asarray(
+        sheet.subplots(2, len(cases), squeeze=False, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
+    )
+    names = words(data["method"])
+    looks = [
+        _method_style(number) | {"ls": "-" if number < len(_style.CYCLE) else "--"}
+        for number in range(len(names))
+    ]
+    for (upper, lower), (family, size) in zip(axes.T, cases, strict=True):
+        case = data.sel(family=family, size=size)
+        for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
+            _style.style_axes(ax)
+            _curves_against_hurst(ax, case, quantity, looks)
+        upper.set_yscale("log")
+        upper.axhline(1.0, color=_style.BLACK, lw=0.9, ls=":")
+        lower.axhline(0.95, color=_style.BLACK, lw=0.9, ls=":")
+        _style.plain_ticks(upper)
+        upper.set_title(f"{family}, n = {size}")
+        lower.set_xlabel("true Hurst exponent")
+    axes[0, 0].set_ylabel("rms error / Cramér-Rao bound")
+    axes[1, 0].set_ylabel("interval coverage")
+    entries = [
+        _style.legend_line(name.replace("_", " "), **look) for name, look in zip(names, looks, strict=True)
+    ]
+    _style.side_legend(axes[0, -1], entries)
+    return _style.root_figure(sheet)
+
+
+def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, looks: list[dict[str, Any]]) -> None:
+    dims = ("method", "hurst")
+    hurst = np.asarray(case["hurst"].values, float)
+    values = table(case, quantity, dims)
+    for row, look in enumerate(looks):
+        finite = np.isfinite(values[row])
+        if not finite.any():
+            continue
+        ax.plot(hurst[finite], values[row][finite], **look)
+        if f"{quantity}_low" in case:
+            low, high = (table(case, f"{quantity}_{end}", dims)[row][finite] for end in ("low", "high"))
+            ax.vlines(hurst[finite], low, high, color=look["color"], lw=0.8)

@@ -1,0 +1,180 @@
+"""Box dimension of a contact domain, and the local slopes it is fitted to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.scaling import local_slope
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._families import draw_families, path_panels
+from fractalcontact.plotting._inputs import as_dataset, result_of, table
+from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
+from fractalcontact.plotting._units import axis_label, name_of, scale_for, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+DIMENSIONS = ("box_dimension", "minkowski_dimension", "correlation_dimension", "boundary_dimension")
+WIDE_INTERVAL = 0.5  # width of an interval beyond which a point is drawn open
+
+
+@_style.styled
+def box_dimension(
+    result: Any, *, normal_force: float | None = None, figure: Figure | SubFigure | None = None
+) -> Figure:
+    r"""Draw the box dimension of a contact domain against load, and against shear at one force.
+
+    The other dimensions of a domain are drawn in the same way. Dashed lines show the random null: randomly
+    placed cells of equal coverage. Bands show the intervals where there is a single curve. A point without
+    an interval, or with one wider than 0.5, is open.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.box_dimension`, `minkowski_dimension`, `correlation_dimension` or
+        `boundary_dimension` over (shear, step), or over one of them.
+    normal_force : float, optional
+        Normal force (N) of the panel against shear; the nearest step is taken. Default: the last step.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import numpy as np
+    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
+    >>> ax = fc.plotting.box_dimension(fc.domains.box_dimension(mask)).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    coverage (%) | box dimension $\Delta_\sigma$
+    """
+    present = [name for name in DIMENSIONS if name in as_dataset(result, "box_dimension")]
+    data = result_of(result, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
+    name = present[0]
+    sheet, axes = path_panels(figure, data)
+    colours = _style.sequence_colours(data.sizes["shear"])
+    for ax, dim in axes:
+        if dim == "step":
+            for i, colour in enumerate(colours):
+                _dimension_curve(ax, data.isel(shear=i), name, dim, colour, band=len(colours) == 1)
+        else:
+            path = at_force(data, normal_force)
+            _dimension_curve(ax, path, name, dim, _style.BLACK, band=True)
+            ax.set_title(load_text(path, data))
+        ax.set_ylim(-0.05, 2.05)
+        if not bool(data[name].notnull().any()):
+            _style.write_in_empty_axes(ax, "no contact")
+    axes[0][0].set_ylabel(name_of(data[name]))
+    last = axes[-1][0]
+    if data.sizes["step"] > 1:
+        title, labels = shear_words(data)
+        _style.sequence_legend(last, title, labels, colours)
+    _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
+    return _style.root_figure(sheet)
+
+
+def _line_legend(data: xr.Dataset, name: str) -> list[Any]:
+    """Return the legend entries of the line and point styles in use."""
+    from matplotlib.patches import Patch
+
+    entries = [_style.legend_line("contact domain", marker="o")]
+    if "ci_low" in data and "ci_high" in data:
+        entries.append(Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label="interval"))
+        uncertain = ~(data["ci_high"] - data["ci_low"] <= WIDE_INTERVAL) & data[name].notnull()
+        if bool(uncertain.any()):
+            label = f"interval wider than\n{WIDE_INTERVAL:g}, or none"
+            entries.append(_style.legend_line(label, ls="", marker="o", mfc="white"))
+    if "null_dimension" in data:
+        entries.append(_style.legend_line("random null,\nequal coverage", **_style.NULL_LINE))
+    return entries
+
+
+def _dimension_curve(ax: Axes, path: xr.Dataset, name: str, dim: str, colour: Any, *, band: bool) -> None:
+    """Draw one curve with its random null, intervals and points, against shear or load."""
+    load = load_of(path) or ("coverage" if "coverage" in path else dim)
+    against = "shear" if dim == "shear" else load
+    labelled = against in path.variables
+    values = table(path, name, (dim,))
+    x = table(path, against, (dim,)) if labelled else np.arange(values.size, dtype=float)
+    scale = scale_of(path[against]) if labelled else scale_for("", 1.0)
+    certain = np.full(values.shape, True)
+    if "ci_low" in path and "ci_high" in path:
+        low, high = (table(path, end, (dim,)) for end in ("ci_low", "ci_high"))
+        certain = high - low <= WIDE_INTERVAL
+        if band:
+            ax.fill_between(scale(x), low, high, color=colour, alpha=0.14, lw=0)
+    ax.plot(scale(x), values, color=colour)
+    if values.size <= _style.MAX_MARKED_POINTS:
+        ax.plot(scale(x)[certain], values[certain], "o", color=colour)
+        ax.plot(scale(x)[~certain], values[~certain], "o", mec=colour, mfc="white")
+    if "null_dimension" in path:
+        ax.plot(scale(x), table(path, "null_dimension", (dim,)), color=colour, **_style.NULL_LINE)
+    _style.log_x_if_wide(ax, x)
+    ax.set_xlabel(axis_label(path[against], scale) if labelled else against)
+
+
+@_style.styled
+def local_slopes(
+    result: Any,
+    *,
+    shear: float | None = None,
+    normal_force: float | None = None,
+    figure: Figure | SubFigure | None = None,
+) -> Figure:
+    """Draw the local dimension against box size, for increasing load and for increasing shear.
+
+    A power law holds where the curve is level. Dashed lines show the random null: randomly placed cells of
+    equal coverage. At most six curves are drawn.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.box_dimension`, `box_counts`, `correlation_dimension` or
+        `minkowski_dimension` over (shear, step), or without shear or step.
+    shear : float, optional
+        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
+        middle one.
+    normal_force : float, optional
+        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import numpy as np
+    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
+    >>> ax = fc.plotting.local_slopes(fc.domains.box_dimension(mask)).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    box size (mm) | local dimension
+    """
+    data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
+    if "null_count" in data or "null_mass" in data:
+        curve, sign = ("null_count", -1.0) if "null_count" in data else ("null_mass", 1.0)
+        slope = sign * local_slope(data["box_size"].values, data[curve].values)
+        data = data.assign(null_slope=(data[curve].dims, slope))
+    elif "null_fraction" in data:
+        slope = 2.0 - local_slope(data["radius"].values, data["null_fraction"].values)
+        data = data.assign(null_slope=(data["null_fraction"].dims, slope))
+    return draw_families(data, shear, normal_force, figure, "local_slope", "null_slope")

@@ -1,0 +1,148 @@
+"""All figures of a study, written as PNG files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from fractalcontact.base.netcdf import unfinished
+from fractalcontact.base.progress import track
+from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
+from fractalcontact.plotting._closure import closure_laws, contact_area
+from fractalcontact.plotting._contact_maps import contact_domains
+from fractalcontact.plotting._decorrelation import correlation
+from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
+from fractalcontact.plotting._directions import evenly_sampled_reach
+from fractalcontact.plotting._friction import friction
+from fractalcontact.plotting._inputs import words
+from fractalcontact.plotting._islands import islands
+from fractalcontact.plotting._lacunarity import lacunarity
+from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
+from fractalcontact.plotting._transmissivity import hydraulic_aperture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER = {1: "face", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
+
+
+def draw(tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = False) -> list[Path]:
+    """Draw every figure that a study has data for and write each one as a PNG file.
+
+    Parameters
+    ----------
+    tree : DataTree
+        From `fractalcontact.scenes.run` or `fractalcontact.open`.
+    folder : path-like
+        Created if it does not exist. An existing figure of the same name is replaced once the new one is
+        complete.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    list of Path
+        The files in the order in which they were drawn, the figures of the 1998 paper first.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> tree = xr.DataTree.from_dict({"/dimensions": fc.dimensions.estimate(surface, ["default"])})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     print([path.name for path in fc.plotting.draw(tree, folder)])
+    ['dimensions.png']
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, drawing in track(list(_drawings(tree)), progress, "figures", unit="figure"):
+        figure = drawing()
+        written.append(_write(figure, folder / f"{name}.png"))
+        figure.clear()
+    return written
+
+
+def _drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Yield file name (without suffix) and drawing function of every figure with data."""
+    for number, name in PAPER.items():
+        if has_figure(tree, number):
+            yield f"figure_{number}_{name}", _later(paper_figure, tree, number)
+    estimates = group(tree, "dimensions")
+    if estimates is not None and "method" in estimates.dims:
+        yield "dimensions", _later(dimensions, estimates)
+    curves = _scaling_curves(tree)
+    if curves:
+        yield "dimension_curves", _later(dimension_curves, curves, estimates)
+    for path, name, drawing in (
+        ("joints/friction", "friction", _friction),
+        ("domains/box_dimension", "box_dimension", box_dimension),
+        ("domains/minkowski_dimension", "minkowski_dimension", box_dimension),
+        ("domains/correlation_dimension", "correlation_dimension", box_dimension),
+        ("domains/lacunarity", "lacunarity", _lacunarity),
+        ("domains/islands", "islands", islands),
+        ("joints/decorrelation_length", "correlation", correlation),
+        ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
+        ("contact", "closure_law", closure_laws),
+        ("contact", "contact_area", contact_area),
+    ):
+        data = group(tree, path)
+        if data is not None:
+            yield name, _later(drawing, data)
+    counts = group(tree, "domains/box_dimension")
+    if counts is not None and "local_slope" in counts:
+        yield "local_slopes", _later(_local_slopes, counts)
+    contact = group(tree, "contact")
+    if contact is not None and "state" in contact:
+        yield "contact_domains", _later(contact_domains, contact)
+
+
+def _later(drawing: Callable[..., Figure], *arguments: Any) -> Callable[[], Figure]:
+    return lambda: drawing(*arguments)
+
+
+def _scaling_curves(tree: xr.DataTree) -> dict[str, xr.Dataset]:
+    node: Any = tree.children.get("dimensions")
+    children = {} if node is None else node.children
+    datasets = {name: child.to_dataset(inherit=False) for name, child in children.items()}
+    return {name: dataset for name, dataset in datasets.items() if curve_of(dataset)[1]}
+
+
+def _friction(data: xr.Dataset) -> Figure:
+    # with forces only one direction fits in a figure: the first one
+    several = "step" in data.dims and data.sizes.get("direction", 1) > 1
+    direction = words(data["direction"])[0] if several else None
+    return friction(data, direction=direction, reach=evenly_sampled_reach(data))
+
+
+def _lacunarity(data: xr.Dataset) -> Figure:
+    return lacunarity(data, shear=shown_shear(data))
+
+
+def _local_slopes(data: xr.Dataset) -> Figure:
+    return local_slopes(data, shear=shown_shear(data))
+
+
+def _write(figure: Figure, target: Path) -> Path:
+    """Write a figure under a temporary name, then rename it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    # `savefig` would lay out and draw every figure twice
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine("none")
+    temporary = unfinished(target)
+    try:
+        canvas.print_png(temporary)  # type: ignore[no-untyped-call]
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target

@@ -1,0 +1,88 @@
+"""Curves over box size, as a family for increasing load and one for increasing shear."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import table
+from fractalcontact.plotting._paths import (
+    at_force,
+    at_shear,
+    load_text,
+    load_words,
+    loaded_steps,
+    shear_text,
+    shear_words,
+)
+from fractalcontact.plotting._units import name_of, scale_for, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SIZES = ("box_length", "radius_length", "box_size", "radius")
+MAX_CURVES = 6  # more curves than this cross the curves of their random nulls illegibly
+STEEP = 1.5  # ratio of values above which lacunarity is drawn on a logarithmic axis
+
+
+def draw_families(
+    data: xr.Dataset, shear: float | None, force: float | None, figure: Any, name: str, null_name: str
+) -> Figure:
+    """Draw `name` over box size beside its random null, a panel per path that is longer than one."""
+    sheet, axes = path_panels(figure, data)
+    for ax, dim in axes:
+        if dim == "step":
+            path = at_shear(data, shear)
+            path = path.isel(step=loaded_steps(path, MAX_CURVES))
+            ax.set_title(shear_text(path, data))
+            title, labels = load_words(path)
+        else:
+            path = at_force(data, force)
+            path = path.isel(shear=_style.spread_indices(path.sizes["shear"], MAX_CURVES))
+            ax.set_title(load_text(path, data))
+            title, labels = shear_words(path)
+        colours = _style.sequence_colours(path.sizes[dim])
+        _draw_curves(ax, path, dim, colours, name, null_name)
+        _style.sequence_legend(ax, title, labels, colours)
+    if null_name in data:
+        note = _style.legend_line("random null,\nequal coverage", **_style.NULL_LINE)
+        _style.side_legend(axes[-1][0], [note], low=True)
+    return _style.root_figure(sheet)
+
+
+def path_panels(figure: Any, data: xr.Dataset) -> tuple[Any, list[tuple[Axes, str]]]:
+    """Return the figure, and axes for each path dim that is longer than one (`step` if none is)."""
+    dims = [dim for dim in ("step", "shear") if data.sizes[dim] > 1] or ["step"]
+    sheet = _style.figure_or_new(figure, (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL)
+    axes = list(sheet.subplots(1, len(dims), squeeze=False)[0])
+    for ax in axes:
+        _style.style_axes(ax)
+    return sheet, list(zip(axes, dims, strict=True))
+
+
+def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name: str, null_name: str) -> None:
+    over = next(str(last) for last in path[name].dims[::-1] if last not in ("shear", "step"))
+    size = next((s for s in SIZES if s in path.variables and path[s].dims == (over,)), over)
+    curves = table(path, name, (dim, over))
+    null = table(path, null_name, (dim, over)) if null_name in path else None
+    boxes = table(path, size, (over,)) if size in path.variables else np.arange(1.0, curves.shape[1] + 1)
+    scale = scale_of(path[size]) if size in path.variables else scale_for("", 1.0)
+    for i, colour in enumerate(colours):
+        ax.plot(scale(boxes), curves[i], color=colour, marker="o" if curves.shape[1] == 1 else "")
+        if null is not None:
+            ax.plot(scale(boxes), null[i], color=colour, **_style.NULL_LINE)
+    shown = curves[np.isfinite(curves)]
+    steep = name == "lacunarity" and shown.size > 0 and shown.max() > STEEP * shown.min()
+    _style.log_scale(ax, x=boxes, y=curves if steep else None)
+    if name == "local_slope" and shown.size:
+        ax.set_ylim(min(-0.05, shown.min() - 0.05), max(2.05, shown.max() + 0.05))
+    _style.plain_ticks(ax)
+    size_name = "radius" if over == "radius" else "box size"
+    ax.set_xlabel(scale.label(size_name) if size.endswith("_length") else f"{size_name} (cells)")
+    ax.set_ylabel("local dimension" if name == "local_slope" else name_of(path[name]))
+    if not shown.size:
+        _style.write_in_empty_axes(ax, "no contact")

@@ -1,0 +1,119 @@
+"""Friction angle and shear strength of a joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._directions import (
+    direction_name,
+    direction_styles,
+    limit_shear,
+    select_direction,
+)
+from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
+from fractalcontact.plotting._paths import load_words
+from fractalcontact.plotting._units import axis_label, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
+
+
+@_style.styled
+def friction(
+    result: Any,
+    *,
+    direction: str | None = None,
+    reach: float | None = None,
+    figure: Figure | SubFigure | None = None,
+) -> Figure:
+    """Draw friction angle and shear strength against shear displacement, one curve per normal force.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.friction`: friction_angle (degree) over (direction, shear, step), with
+        shear_strength (Pa) if forces are given; basic_friction_angle (degree) is drawn as a line.
+    direction : str, optional
+        Direction to draw; required if there are several directions and forces. Without forces each
+        direction gets a curve.
+    reach : float, optional
+        Largest shear displacement (m) to show.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or there are several directions and none is chosen.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3, basic_friction_angle=35.0)
+    >>> opening = fc.joints.dilatancy(crack, shear=[0.0, 1e-4, 2e-4, 3e-4])
+    >>> ax = fc.plotting.friction(fc.joints.friction(opening)).axes[0]
+    >>> print(ax.get_ylabel())
+    friction angle (°)
+    """
+    selected = limit_shear(as_dataset(result, "friction"), reach)
+    shown = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
+    by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
+    over = "step" if by_force else "direction"
+    if by_force or direction:
+        selected = select_direction(selected, direction, "friction")
+    data = result_of(selected, "friction", (*shown, "shear"), ("shear", over))
+    sheet = _style.figure_or_new(figure, (_style.WIDTH if len(shown) > 1 else _style.PANEL[0], 3.1))
+    axes = sheet.subplots(1, len(shown), squeeze=False, sharex=True)[0]
+    entries, title = _curve_legend(data, over)
+    for ax, name in zip(axes, shown, strict=True):
+        _style.style_axes(ax)
+        _draw_curves(ax, data, name, over, entries)
+    if "basic_friction_angle" in data:
+        basic_angle = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
+        look: dict[str, Any] = {"color": _style.BLACK, "lw": 0.8, "ls": ":"}
+        axes[0].axhline(basic_angle, **look)
+        entries = [*entries, _style.legend_line("basic angle", **look)]
+    remarks = []
+    if over == "step" and "direction" in data.coords:
+        remarks.append(f"block slides {direction_name(words(data['direction'])[0])}")
+    if axes[0].get_ylim()[1] > LOCKED:
+        axes[0].set_ylim(top=LOCKED)
+        remarks.append(f"locked above {LOCKED:g}°")
+    axes[0].set_title(", ".join(remarks))
+    _style.side_legend(axes[-1], entries, title=title)
+    return _style.root_figure(sheet)
+
+
+def _draw_curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any]) -> None:
+    """Draw one variable against shear, with the line styles of the legend entries."""
+    values, shear = table(data, name, ("shear", over)), np.atleast_1d(data["shear"].values).astype(float)
+    along, across = scale_of(data["shear"]), scale_of(data[name])
+    for j, entry in enumerate(entries):
+        ax.plot(along(shear), across(values[:, j]), color=entry.get_color(), ls=entry.get_linestyle(),
+                marker="o" if shear.size <= _style.MAX_MARKED_POINTS else "")  # fmt: skip
+    if name == "shear_strength" and _style.needs_log_axis(values):
+        ax.set_yscale("log")
+        _style.plain_ticks(ax)
+    ax.set_xlabel(axis_label(data["shear"], along))
+    ax.set_ylabel(axis_label(data[name], across))
+
+
+def _curve_legend(data: xr.Dataset, over: str) -> tuple[list[Any], str]:
+    """Return the legend entries of the curves and the title of the legend."""
+    if over == "step":
+        title, labels = load_words(data)
+        colours = _style.sequence_colours(len(labels))
+        return [_style.legend_line(t, color=c) for t, c in zip(labels, colours, strict=True)], title
+    return [_style.legend_line(name, **look) for name, look in direction_styles(data)], "block slides"

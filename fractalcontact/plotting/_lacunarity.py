@@ -1,0 +1,59 @@
+"""Gliding-box lacunarity of a contact domain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._families import draw_families
+from fractalcontact.plotting._inputs import result_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+
+@_style.styled
+def lacunarity(
+    result: Any,
+    *,
+    shear: float | None = None,
+    normal_force: float | None = None,
+    figure: Figure | SubFigure | None = None,
+) -> Figure:
+    r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
+
+    Dashed lines show the random null: randomly placed cells of equal coverage. At most six curves are drawn.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.lacunarity` over (shear, step, box_size), or without shear or step.
+    shear : float, optional
+        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
+        middle one.
+    normal_force : float, optional
+        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import numpy as np
+    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
+    >>> result = fc.domains.lacunarity(mask, box_sizes=[1, 2, 4, 8])
+    >>> ax = fc.plotting.lacunarity(result).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    box size (mm) | lacunarity $\Lambda$
+    """
+    data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
+    return draw_families(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")

@@ -1,0 +1,150 @@
+"""Maps of a surface and of any other field of a result."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.validation import Problems
+from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting._inputs import as_dataset, extent_of
+from fractalcontact.plotting._units import Scale, axis_label, name_of, scale_for, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SIZE = (4.6, 3.8)
+POSITIVE = ("pressure", "gap")
+
+
+@_style.styled
+def surface(
+    surface: Any, *, block: xr.DataArray | None = None, title: str = "", ax: Axes | None = None
+) -> Figure:
+    """Draw a map of heights as a shaded relief, lit from the north-west (upper left).
+
+    Colour shows height. Shading shows slope, exaggerated until it is visible, and is not to scale. If a few
+    heights lie far outside the range of all others, the colour bar is cut and ends in a point.
+
+    Parameters
+    ----------
+    surface : DataArray, Dataset or node of a DataTree
+        Heights (m), dims (y, x); leading dims of length one are dropped. NaN is drawn grey.
+    block : DataArray, optional
+        Any array with the x and y (m) of the sliding block, whose outline is drawn.
+    title : str
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        There is no plane to draw, or several.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> heights = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> figure = fc.plotting.surface(heights)
+    >>> [ax.get_ylabel() for ax in figure.axes]
+    ['$y$ (mm)', 'height (mm)']
+    """
+    plane = plane_of(surface, "surface", "height")
+    figure, ax = _style.axes_or_new(ax, SIZE)
+    length, height = plane_scale(plane), scale_of(plane)
+    extent = extent_of(plane)
+    mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height)
+    if block is not None:
+        draw_outline(ax, extent_of(block), length)
+    _maps.colour_bar(ax, mappable, axis_label(plane, height))
+    label_axes(ax, plane, length)
+    ax.set_title(title)
+    return figure
+
+
+@_style.styled
+def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
+    """Draw a map of one field of a result, for example contact pressure, gap or displacement.
+
+    Parameters
+    ----------
+    data : DataArray
+        Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale.
+    title : str
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        There is no plane to draw, or several.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> heights = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.press(heights, contact_modulus=1e9, nominal_pressure=1e6, keep=("pressure",))
+    >>> figure = fc.plotting.field(result["pressure"])
+    >>> print(figure.axes[1].get_ylabel())
+    contact pressure (MPa)
+    """
+    plane = plane_of(data, "field", "")
+    figure, ax = _style.axes_or_new(ax, SIZE)
+    length, shown = plane_scale(plane), scale_of(plane)
+    mappable = _maps.field(
+        ax, np.asarray(plane.values, float), extent_of(plane), length, shown, positive=plane.name in POSITIVE
+    )
+    _maps.colour_bar(ax, mappable, shown.label(name_of(plane)))
+    label_axes(ax, plane, length)
+    ax.set_title(title)
+    return figure
+
+
+def plane_of(data: Any, where: str, name: str) -> xr.DataArray:
+    """Return the one plane (y, x) in `data`: the variable `name`, or the first one."""
+    dataset = as_dataset(data, where)
+    variable = name if name in dataset.data_vars else next(iter(dataset.data_vars), "")
+    with Problems(f"fc.plotting.{where}") as problems:
+        if problems.require(bool(variable), "result", "a variable with dims (y, x)", "none"):
+            plane = dataset[variable]
+            problems.require({"y", "x"} <= set(plane.dims), str(variable), "dims (y, x)", plane.dims)
+            for dim in plane.dims:
+                if dim not in ("y", "x"):
+                    size = plane.sizes[dim]
+                    problems.require(size == 1, str(variable), f"one {dim}; choose with .sel or .isel", size)
+    plane = dataset[variable]
+    return plane.squeeze([dim for dim in plane.dims if dim not in ("y", "x")]).transpose("y", "x")
+
+
+def plane_scale(plane: xr.DataArray) -> Scale:
+    """Return the scale of positions: metres with a prefix, or cells for a plane without coordinates."""
+    if "x" not in plane.coords:
+        return scale_for("cells", 1.0)
+    left, right, bottom, top = extent_of(plane)
+    return scale_for("m", (right - left, top - bottom))
+
+
+def label_axes(ax: Axes, plane: xr.DataArray, length: Scale) -> None:
+    """Label the axes of a map."""
+    for dim, setter in (("x", ax.set_xlabel), ("y", ax.set_ylabel)):
+        setter(length.label(f"${dim}$") if dim in plane.coords else f"${dim}$ (cells)")
+
+
+def draw_outline(ax: Axes, extent: tuple[float, float, float, float], length: Scale, **style: Any) -> None:
+    """Draw the outline of a block."""
+    from matplotlib.patches import Rectangle
+
+    left, right, bottom, top = (float(v) for v in length(extent))
+    look: dict[str, Any] = {"fill": False, "edgecolor": "white", "linewidth": 1.2} | style
+    ax.add_patch(Rectangle((left, bottom), right - left, top - bottom, **look))

@@ -1,0 +1,90 @@
+"""Box dimension and local slopes beside their random null."""
+
+import numpy as np
+import plotting_synthetic as synthetic
+import pytest
+import xarray as xr
+from plotting_figures import factor, holds
+
+from fractalcontact import plotting
+
+
+@pytest.fixture
+def closed():
+    return synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
+
+
+def test_null_and_interval(closed):
+    result = synthetic.box_dimension(closed)
+    by_load, by_shear = plotting.box_dimension(result).axes
+
+    def lines(ax):
+        fx = factor(ax.get_xlabel())
+        return [np.array([np.asarray(line.get_xdata()) * fx, line.get_ydata()]) for line in ax.lines]
+
+    for name in ("box_dimension", "null_dimension"):
+        for v in result.shear:
+            assert holds(lines(by_load), result.normal_force, result[name].sel(shear=v))
+        assert holds(lines(by_shear), result.shear, result[name].isel(step=-1))
+    assert not by_load.collections  # six bands on each other would tell nothing
+    low, high = (result[name].isel(step=-1) for name in ("ci_low", "ci_high"))
+    band = by_shear.collections[0].get_paths()[0].vertices[:, 1]
+    assert band.min() == pytest.approx(float(low.min()))
+    assert band.max() == pytest.approx(float(high.max()))
+
+
+def test_chosen_force(closed):
+    result = synthetic.box_dimension(closed)
+    ax = plotting.box_dimension(result, normal_force=1e3).axes[1]
+    assert np.allclose(ax.lines[0].get_ydata(), result.box_dimension.sel(step=2))
+    assert "1 kN" in ax.get_title(loc="left")
+
+
+def test_wide_or_missing_interval_is_open_point(closed):
+    result = synthetic.box_dimension(closed).isel(shear=0, step=slice(1, None)).copy(deep=True)
+    result["ci_high"].values[0] += 0.6
+    result["ci_low"].values[1] = np.nan
+    (ax,) = plotting.box_dimension(result).axes
+    _, filled, hollow, _ = ax.lines
+    assert hollow.get_markerfacecolor() == "white"
+    assert np.array_equal(hollow.get_ydata(), result.box_dimension.values[:2])
+    assert np.array_equal(filled.get_ydata(), result.box_dimension.values[2:])
+    assert len(ax.collections) == 1
+
+
+def test_minkowski_dimension():
+    result = xr.Dataset(
+        {
+            "minkowski_dimension": ("step", np.array([0.5, 1.5])),
+            "null_dimension": ("step", np.array([0.2, 1.0])),
+        },
+        coords={"normal_force": ("step", np.array([1.0, 2.0]), {"units": "N"})},
+    )
+    (ax,) = plotting.box_dimension(result).axes
+    assert ax.lines[0].get_ydata() == pytest.approx([0.5, 1.5])
+    assert "inkowski" in ax.get_ylabel()
+    empty = result.assign(minkowski_dimension=result["minkowski_dimension"] * np.nan)
+    assert plotting.box_dimension(empty).axes[0].texts[0].get_text() == "no contact"
+
+
+def test_local_slopes_and_null():
+    sizes = np.array([1, 2, 4, 8])
+    count = 64.0 * sizes[None, :] ** -np.array([[1.2], [1.5]])
+    dust = 64.0 * sizes[None, :] ** -np.array([[0.5], [1.0]])
+    result = xr.Dataset(
+        {
+            "local_slope": (("step", "box_size"), np.array([[1.2] * 4, [1.5] * 4])),
+            "box_count": (("step", "box_size"), count),
+            "null_count": (("step", "box_size"), dust),
+        },
+        coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
+    )
+    (ax,) = plotting.local_slopes(result).axes
+    lines = [line.get_ydata() for line in ax.lines]
+    for line, want in zip(lines, (1.2, 0.5, 1.5, 1.0), strict=True):
+        assert line == pytest.approx(np.full(4, want))
+    low, high = ax.get_ylim()
+    assert low < 0
+    assert high > 2
+    steep = result.assign(local_slope=result["local_slope"] + 2.0)
+    assert plotting.local_slopes(steep).axes[0].get_ylim()[1] > 3.5

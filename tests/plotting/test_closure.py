@@ -1,0 +1,79 @@
+"""Closure laws and contact area: the curves are the values of the result in the unit of the label."""
+
+import numpy as np
+import plotting_synthetic as synthetic
+import pytest
+from plotting_figures import drawn, holds, render
+
+from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
+
+
+@pytest.fixture
+def closed():
+    return synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
+
+
+def test_closure_laws_curves(closed):
+    curves = drawn(plotting.closure_laws(closed).axes[0])
+    for v in closed.shear:
+        for name in ("closure", "interface_closure"):
+            assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
+
+
+def test_marked_points(closed):
+    ax = plotting.closure_laws(closed, shear=1.6e-3, marked=[1, 3]).axes[0]
+    expected = closed.sel(shear=1.6e-3).isel(step=[1, 3])
+    assert holds(drawn(ax), expected.interface_closure, expected.normal_force)
+    assert [text.get_text() for text in ax.texts] == ["A", "B"]
+
+
+def test_contact_area_raw_and_corrected(closed):
+    curves = drawn(plotting.contact_area(closed).axes[0])
+    for v in closed.shear:
+        expected = closed.sel(shear=v)
+        assert holds(curves, expected.normal_force, expected.contact_fraction)
+        assert holds(curves, expected.normal_force, expected.corrected_contact_fraction)
+
+
+def test_contact_area_against_closure(closed):
+    curves = drawn(plotting.contact_area(closed, against="closure").axes[0])
+    assert holds(curves, closed.closure.isel(shear=0), closed.contact_fraction.isel(shear=0))
+
+
+def test_long_legend_is_thinned():
+    shears = np.linspace(8e-4, 8e-3, 10)
+    closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=shears))
+    ax = plotting.closure_laws(closed).axes[0]
+    named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
+    assert "0.8" in named
+    assert "8" in named
+    assert len(named) <= 8 + 2
+    render(ax.figure)
+
+
+def test_draw_into_given_axes(closed):
+    from matplotlib.figure import Figure
+
+    sheet = Figure(layout="constrained")
+    left, right = sheet.subplots(1, 2)
+    assert plotting.closure_laws(closed, ax=left) is sheet
+    assert plotting.contact_area(closed, ax=right) is sheet
+    assert len(sheet.axes) == 2
+
+
+def test_rc_settings_are_restored(closed):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    plotting.closure_laws(closed)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_missing_variables_are_listed():
+    with pytest.raises(InvalidInput, match="'closure'.*\n.*'normal_force'"):
+        plotting.closure_laws(synthetic.estimates())
+    with pytest.raises(InvalidInput, match="labelled result"):
+        plotting.box_dimension([1, 2, 3])
+    with pytest.raises(InvalidInput, match="one of 'E', 'N', 'W', 'S', got 'Q'"):
+        plotting.elastic_dilatancy(synthetic.dilatancy(), direction="Q")

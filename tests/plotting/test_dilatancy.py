@@ -1,0 +1,48 @@
+"""Dilatancy of rigid surfaces and elastic bodies."""
+
+import plotting_synthetic as synthetic
+import pytest
+from plotting_figures import drawn, holds, render
+
+from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
+
+
+def test_rigid_dilatancy_curves():
+    opening = synthetic.dilatancy(forces=())
+    ax = plotting.rigid_dilatancy(opening).axes[0]
+    for word in "ENWS":
+        expected = opening.sel(direction=word)
+        assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
+        end = float(opening.shear.max())
+        assert holds(drawn(ax), [0, end], [0, end * float(expected.mean_slope)])
+
+
+def test_elastic_dilatancy_curves():
+    opening = synthetic.dilatancy()
+    ax = plotting.elastic_dilatancy(opening, direction="N", reach=8e-4).axes[0]
+    expected = opening.sel(direction="N").where(opening.shear < 8.1e-4, drop=True)
+    assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
+    for step in range(3):
+        assert holds(drawn(ax), expected.shear, expected.dilatancy.isel(step=step))
+    assert len(ax.lines) == 4
+
+
+def test_several_directions_are_refused():
+    with pytest.raises(InvalidInput, match=r"one direction; choose with \.sel or \.isel, got 4"):
+        plotting.elastic_dilatancy(synthetic.dilatancy())
+
+
+def test_direction_names_and_styles():
+    opening = synthetic.dilatancy(forces=(), directions=("E", "NE", "30", "33.5"))
+    ax = plotting.rigid_dilatancy(opening).axes[0]
+    named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
+    assert named[:4] == ["East", "NE", "30°", "33.5°"]
+    looks = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:8:2]]
+    assert len(set(looks)) == 4
+    render(ax.figure)
+
+
+def test_single_shear():
+    render(plotting.rigid_dilatancy(synthetic.dilatancy(shears=[8e-4], forces=())))
+    render(plotting.elastic_dilatancy(synthetic.dilatancy(shears=[0.0], directions=("W",))))

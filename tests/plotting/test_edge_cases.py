@@ -1,0 +1,78 @@
+"""Single steps, single shears, NaN, empty and full domains, extreme sizes: a complete figure each time."""
+
+import numpy as np
+import plotting_synthetic as synthetic
+import pytest
+from plotting_figures import render
+
+from fractalcontact import plotting
+from fractalcontact.base.schema import label
+
+CASES = {
+    "one step": {"step": slice(-1, None)},
+    "one step without the dim": {"step": -1},
+    "one shear": {"shear": slice(0, 1)},
+    "one shear without the dim": {"shear": 0},
+    "one of each": {"shear": 0, "step": -1},
+    "unloaded": {"step": slice(0, 1)},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_parts_of_a_study(study, case):
+    for path, drawing in (
+        ("joints/closure", plotting.closure_laws),
+        ("joints/closure", plotting.contact_area),
+        ("joints/transmissivity", plotting.hydraulic_aperture),
+        ("domains/box_dimension", plotting.box_dimension),
+        ("domains/lacunarity", plotting.lacunarity),
+    ):
+        render(drawing(study[path].to_dataset().isel(CASES[case])))
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if "one shear" in case or "one" not in case])
+def test_domain_maps_of_parts(study, case):
+    render(plotting.contact_domains(study["joints/closure"].to_dataset().isel(CASES[case]), shear=0.0))
+
+
+def test_all_nan(study):
+    for path, drawing in (
+        ("joints/closure", plotting.closure_laws),
+        ("joints/closure", plotting.contact_area),
+        ("joints/rigid_dilatancy", plotting.rigid_dilatancy),
+        ("joints/elastic_dilatancy", plotting.elastic_dilatancy),
+        ("joints/friction", plotting.friction),
+        ("joints/transmissivity", plotting.hydraulic_aperture),
+        ("domains/box_dimension", plotting.box_dimension),
+        ("domains/lacunarity", plotting.lacunarity),
+        ("dimensions", plotting.dimensions),
+        ("surfaces", plotting.surface),
+    ):
+        data = study[path].to_dataset()
+        floats = {name: v * np.nan for name, v in data.data_vars.items() if v.dtype.kind == "f"}
+        render(drawing(data.assign(floats)))
+
+
+def test_empty_domain():
+    closed = synthetic.closure(synthetic.delta(synthetic.heights()))
+    empty = closed.assign(state=closed.state * 0)
+    render(plotting.contact_domains(empty, shear=8e-3))
+    render(plotting.islands(synthetic.islands(empty.state.isel(shear=0, step=0))))
+
+
+def test_full_domain():
+    closed = synthetic.closure(synthetic.delta(synthetic.heights()))
+    full = closed.assign(state=closed.state * 0 + 1)
+    render(plotting.contact_domains(full, normal_force=1e3))
+    render(plotting.islands(synthetic.islands(full.state.isel(shear=0, step=0))))
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
+def test_any_size(size):
+    surface = synthetic.heights()
+    grown = label(surface.copy(data=surface.values * size).assign_coords(x=surface.x * size, y=surface.y * size))
+    render(plotting.surface(grown))
+    slid = synthetic.delta(surface, shears=(8e-3,))
+    scaled = slid.copy(data=slid.values * size)
+    grown_slid = label(scaled.assign_coords(x=slid.x * size, y=slid.y * size, shear=slid.shear * size))
+    render(plotting.sliding_scheme(grown, grown_slid))

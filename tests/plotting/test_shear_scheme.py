@@ -1,0 +1,39 @@
+"""Plan and section of the sliding block."""
+
+import numpy as np
+import plotting_synthetic as synthetic
+import pytest
+from plotting_figures import render
+
+from fractalcontact import plotting
+
+
+def test_plan_and_section():
+    surface = synthetic.heights()
+    slid = synthetic.delta(surface, shears=(8e-3,))
+    plan, cut = plotting.sliding_scheme(surface, slid).axes
+    start, moved = plan.patches
+    assert start.get_x() - moved.get_x() == pytest.approx(8.0)  # to West
+    assert start.get_y() == pytest.approx(moved.get_y())
+    ground, block = (np.array([line.get_xdata(), line.get_ydata()]) for line in cut.lines[:2])
+    lift = float(slid.max())
+    row = surface.sel(y=slid.y[slid.sizes["y"] // 2])
+    assert ground[1] == pytest.approx(row.values[::-1] * 1e3)
+    assert block[1] == pytest.approx((row.sel(x=slid.x).values[::-1] + lift) * 1e3)
+    assert f"{lift * 1e6:.3g}" in cut.texts[-1].get_text()
+
+
+def test_block_stays_above_lower_surface():
+    surface = synthetic.heights()
+    _, cut = plotting.sliding_scheme(surface, synthetic.delta(surface)).axes
+    ground, block = (np.array([line.get_xdata(), line.get_ydata()]) for line in cut.lines[:2])
+    below = np.interp(block[0, 1:-1], *ground)
+    assert (block[1, 1:-1] >= below - 1e-9).all()
+
+
+def test_zero_shear_and_other_directions():
+    surface = synthetic.heights()
+    slid = synthetic.delta(surface, shears=(8e-3,))
+    render(plotting.sliding_scheme(surface, synthetic.delta(surface, shears=(0.0,))))
+    render(plotting.sliding_scheme(surface, slid.assign_coords(direction="N", azimuth=90.0)))
+    render(plotting.sliding_scheme(surface, slid.assign_coords(direction="30", azimuth=30.0)))
