@@ -70,7 +70,9 @@ def test_full_domain():
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
 def test_any_size(size):
     surface = synthetic.heights()
-    grown = label(surface.copy(data=surface.values * size).assign_coords(x=surface.x * size, y=surface.y * size))
+    grown = label(
+        surface.copy(data=surface.values * size).assign_coords(x=surface.x * size, y=surface.y * size)
+    )
     render(plotting.surface(grown))
     slid = synthetic.delta(surface, shears=(8e-3,))
     scaled = slid.copy(data=slid.values * size)

@@ -74,7 +74,9 @@ def test_large_planes_are_averaged():
 
 def test_zero_pressure_is_pale():
     surface = synthetic.heights()
-    pressure = label(xr.DataArray(np.maximum(surface.values, 0) * 1e10, coords=surface.coords, name="pressure"))
+    pressure = label(
+        xr.DataArray(np.maximum(surface.values, 0) * 1e10, coords=surface.coords, name="pressure")
+    )
     figure = plotting.field(pressure)
     image = colours(figure.axes[0])
     assert np.array_equal(np.all(image == OPEN, axis=-1), pressure.values == 0)
