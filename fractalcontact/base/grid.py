@@ -104,6 +104,11 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
     return spacing, wraps
 
 
+def core_dims(array: xr.DataArray) -> tuple[str, ...]:
+    """Return the dims of one plane or profile of the array: (y, x), or (x,) where there is no y."""
+    return ("y", "x") if "y" in array.dims else ("x",)
+
+
 def read_grid(array: xr.DataArray, dims: Sequence[str] = ("y", "x")) -> Grid:
     """Return the grid of an array whose `dims` passed `Problems.surface` or `Problems.grid`."""
     spacing, periodic = [], []

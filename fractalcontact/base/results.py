@@ -10,7 +10,8 @@
 
 The function returns plain variables and coordinates under names of `base.schema`. Attributes `comment`,
 `reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
-entries of its provenance, except `title` and `references`, which replace those of the decorator.
+entries of its provenance, except `title` and `references`, which replace those of the decorator, and
+`parameters`, a dict that replaces recorded arguments: a default that depends on others, a path to shorten.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ import json
 import time
 from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
+import xarray as xr
+
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.provenance import PAPER, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 P = ParamSpec("P")
-R = TypeVar("R", "xr.Dataset", "xr.DataArray")
+R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
 
 
@@ -53,6 +54,7 @@ def public_result(
     references: str = PAPER,
     achieved_error: str | None = None,
     check: Callable[..., None] | None = None,
+    error: type[InvalidInput] = InvalidInput,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates, times, labels and documents the result of a public function.
 
@@ -67,6 +69,8 @@ def public_result(
     check : callable, optional
         Called as ``check(problems, **arguments)`` with a `Problems` and every argument, defaults included,
         before the function; its problems are raised together.
+    error : type, default InvalidInput
+        The exception that lists the problems.
     """
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
@@ -77,7 +81,7 @@ def public_result(
             bound = signature.bind(*arguments, **options)
             bound.apply_defaults()
             if check is not None:
-                with Problems(name) as problems:
+                with Problems(name, error) as problems:
                     check(problems, **bound.arguments)
             return bound.arguments
 
@@ -88,6 +92,7 @@ def public_result(
             result = function(*arguments, **options)
             facts: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {}
+            parameters = parameters | facts.pop("parameters", {})
             if achieved_error is not None:
                 facts.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start

@@ -108,7 +108,7 @@ class Problems:
         """Check for one finite real number inside the bounds; `optional` allows None."""
         if value is None and optional:
             return True
-        if _number_of_axes(value) != 0:
+        if number_of_axes(value) != 0:
             self.add(argument, "one number", value)
             return False
         return self.numbers(argument, value, above=above, at_least=at_least, below=below, at_most=at_most)
@@ -187,7 +187,7 @@ class Problems:
         """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""
         words = tuple(allowed)
         if not isinstance(value, str) and (
-            not isinstance(value, (Sequence, np.ndarray)) or _number_of_axes(value) != 1
+            not isinstance(value, (Sequence, np.ndarray)) or number_of_axes(value) != 1
         ):
             self.add(argument, f"a sequence out of {_quoted(words)}", value)
             return False
@@ -305,6 +305,14 @@ def did_you_mean(word: object, words: Iterable[str]) -> str:
     return f" (did you mean {near[0]!r}?)" if near and near[0] != word else ""
 
 
+def number_of_axes(value: Any) -> int | None:
+    """Return the number of axes, 0 for a scalar; None for a ragged sequence."""
+    try:
+        return np.ndim(value)
+    except ValueError:
+        return None
+
+
 def _real_numbers(value: Any) -> np.ndarray | None:
     """Return real numbers as an array of at least one axis, None for anything else."""
     if isinstance(value, (bool, np.bool_, str, bytes, dict)):
@@ -314,14 +322,6 @@ def _real_numbers(value: Any) -> np.ndarray | None:
             return None
         return float_array(value)
     except (TypeError, ValueError, OverflowError):
-        return None
-
-
-def _number_of_axes(value: Any) -> int | None:
-    """Return the number of axes, 0 for a scalar; None for a ragged sequence."""
-    try:
-        return np.ndim(value)
-    except ValueError:
         return None
 
 

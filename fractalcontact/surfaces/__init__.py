@@ -1,16 +1,17 @@
-"""Where heights come in: synthetic surfaces, measured files, and what is done to them first.
+"""Surface input and synthesis: synthetic surfaces, measured files, preparation and statistics.
 
 fbm          exact fractional Brownian surface, the reference for every estimator
 spectral     periodic self-affine surface with cut-offs, the reference for contact
-midpoint     random midpoint displacement, with the errors it has
-weierstrass  a sum of cosines at geometric wavelengths (Ausloos and Berman)
-from_array   your own heights on a uniform grid
-read         a file: NetCDF, npy, csv, or an instrument's format
-sample       surfaces that come with the package
+midpoint     random midpoint displacement, with its known errors
+weierstrass  sum of cosines at geometric wavelengths (Ausloos and Berman)
+SelfAffine   closed forms of the self-affine spectrum
+from_array   heights on a uniform grid as a surface
+read         surface from a file: NetCDF, npy, csv, or an instrument's format
+sample       surfaces installed with the package
 level        remove the mean, a plane or a quadric
-despike      take out points that stand out from all around them
+despike      remove isolated outliers of a scan
 fill         fill small gaps
-describe     heights, slopes and curvature in numbers
+describe     statistics of heights, slopes and curvature
 
 A surface is a DataArray `height` with dims (y, x), in metres, heights up, x and y ascending at cell centres.
 """

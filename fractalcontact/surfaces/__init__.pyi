@@ -1,15 +1,15 @@
-from .brownian import fbm as fbm
-from .despiking import despike as despike
-from .displacement import midpoint as midpoint
-from .measured import from_array as from_array
-from .measured import read as read
-from .preparing import fill as fill
-from .preparing import level as level
-from .samples import sample as sample
-from .statistics import describe as describe
-from .synthesis import SelfAffine as SelfAffine
-from .synthesis import spectral as spectral
-from .waves import weierstrass as weierstrass
+from ._describe import describe as describe
+from ._despike import despike as despike
+from ._fbm import fbm as fbm
+from ._fill import fill as fill
+from ._from_array import from_array as from_array
+from ._level import level as level
+from ._midpoint import midpoint as midpoint
+from ._read import read as read
+from ._sample import sample as sample
+from ._self_affine import SelfAffine as SelfAffine
+from ._spectral import spectral as spectral
+from ._weierstrass import weierstrass as weierstrass
 
 __all__ = [
     "SelfAffine",

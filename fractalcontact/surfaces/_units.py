@@ -1,11 +1,10 @@
-"""Units of length that files and people use, and how to leave them."""
+"""Units of length and their conversion to metres."""
 
 from __future__ import annotations
 
 from typing import Any
 
-# how many of each make one metre, or how many metres one of them is: whichever is a whole number,
-# so that the conversion rounds once
+# units per metre, or metres per unit: whichever is an integer, so that the conversion rounds only once
 PER_METRE = {"dm": 1e1, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "angstrom": 1e10, "pm": 1e12}
 METRES = {"m": 1.0, "km": 1e3}
 SPELLINGS = {
@@ -30,7 +29,7 @@ UNITS = (*METRES, *PER_METRE, *SPELLINGS)
 
 
 def in_metres(values: Any, units: str) -> Any:
-    """Return values that were given in `units`, one of UNITS, in metres."""
+    """Convert values from `units`, one of UNITS, to metres."""
     name = SPELLINGS.get(units, units)
     if name in METRES:
         return values if name == "m" else values * METRES[name]

@@ -113,7 +113,7 @@ def test_nayak_parameter_of_a_ring_and_of_a_wave():
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize("order", [0, 1, 2, 4])
 def test_closed_moments_against_quadrature(hurst, order):
-    spectrum = spectra.SelfAffine(hurst, 1e-3, 3e-4, 2e-6, plateau=4.0)
+    spectrum = SelfAffine(hurst, 1e-3, 3e-4, 2e-6, plateau=4.0)
     low, corner, high = (2 * np.pi / length for length in (1e-3, 3e-4, 2e-6))
 
     def integrand(logarithm):
@@ -128,13 +128,11 @@ def test_closed_moments_against_quadrature(hurst, order):
 
 
 def test_scaled_spectrum_has_the_height_or_slope_asked_for():
-    assert spectra.SelfAffine.scaled(
-        0.8, 1e-3, 1e-3, 1e-6, rms_height=2e-6
-    ).moments().rms_height == pytest.approx(2e-6)
-    assert spectra.SelfAffine.scaled(
-        0.8, 1e-3, 1e-3, 1e-6, rms_slope=0.1
-    ).moments().rms_slope == pytest.approx(0.1)
-    assert spectra.SelfAffine(0.8, 1e-3, 1e-3, 1e-6).psd(np.array([0.0, 1e9])).tolist() == [0.0, 0.0]
+    assert SelfAffine.scaled(0.8, 1e-3, 1e-3, 1e-6, rms_height=2e-6).moments().rms_height == pytest.approx(
+        2e-6
+    )
+    assert SelfAffine.scaled(0.8, 1e-3, 1e-3, 1e-6, rms_slope=0.1).moments().rms_slope == pytest.approx(0.1)
+    assert SelfAffine(0.8, 1e-3, 1e-3, 1e-6).psd(np.array([0.0, 1e9])).tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("library", ["scipy", "ducc0"])
@@ -155,7 +153,7 @@ def test_autocorrelation_is_the_bessel_transform(hurst):
     from scipy.integrate import quad
     from scipy.special import j0
 
-    spectrum = spectra.SelfAffine(hurst, 1e-3, 3e-4, 2e-5, plateau=4.0)
+    spectrum = SelfAffine(hurst, 1e-3, 3e-4, 2e-5, plateau=4.0)
     low, corner, high = (2 * np.pi / length for length in (1e-3, 3e-4, 2e-5))
     lags = np.array([0.0, 1e-7, 3e-6, 2e-5, 1.3e-4, 5e-4])
     for lag, found in zip(lags, spectrum.autocorrelation(lags), strict=True):
@@ -173,7 +171,7 @@ def test_autocorrelation_of_a_wide_band_is_that_of_fractional_brownian_heights()
     from scipy.special import gamma
 
     hurst = 0.4
-    spectrum = spectra.SelfAffine(hurst, 1e3, 1e3, 1e-9)
+    spectrum = SelfAffine(hurst, 1e3, 1e3, 1e-9)
     lags = np.array([1e-4, 1e-3])
     rise = 2 * (spectrum.autocorrelation(0.0) - spectrum.autocorrelation(lags))
     corner = 2 * np.pi / 1e3
@@ -185,7 +183,7 @@ def test_autocorrelation_of_a_wide_band_is_that_of_fractional_brownian_heights()
 def test_profile_spectrum_is_the_integral_across(hurst):
     from scipy.integrate import quad
 
-    spectrum = spectra.SelfAffine(hurst, 1e-3, 3e-4, 2e-6, plateau=4.0)
+    spectrum = SelfAffine(hurst, 1e-3, 3e-4, 2e-6, plateau=4.0)
     low, corner, high = (2 * np.pi / length for length in (1e-3, 3e-4, 2e-6))
     for q in (0.0, 0.3 * low, 0.5 * corner, 3 * corner, 0.9 * high):
         edges = [np.sqrt(max(edge**2 - q**2, 0.0)) for edge in (low, corner, high)]
@@ -221,4 +219,4 @@ def test_aliased_density_of_a_lattice():
 )
 def test_a_spectrum_that_cannot_be_is_refused(given, named):
     with pytest.raises(InvalidInput, match=named):
-        spectra.SelfAffine.scaled(*given, rms_height=1e-6)
+        SelfAffine.scaled(*given, rms_height=1e-6)

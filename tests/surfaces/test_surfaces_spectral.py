@@ -161,7 +161,7 @@ def test_plateau_is_flat_and_the_tail_falls_as_it_should():
 def test_closed_form_moments_agree_with_the_sum_over_modes(hurst, rolloff):
     n, spacing = 512, 1e-6
     long, short = n * spacing / 8, 4 * spacing
-    exact = spectra.SelfAffine.scaled(hurst, long, rolloff or long, short, rms_height=1e-7)
+    exact = SelfAffine.scaled(hurst, long, rolloff or long, short, rms_height=1e-7)
     band = Band((hurst, hurst), 2 * np.pi / long, 2 * np.pi / (rolloff or long), 2 * np.pi / short)
     energies = [
         filtered_modes(

@@ -1,9 +1,11 @@
-"""Exact fractional Brownian surfaces by intrinsic embedding (Stein 2002), arrays only.
+"""Intrinsic circulant embedding of fractional Brownian surfaces (Stein 2002), on plain arrays.
 
-Lengths are divided by the diagonal between the outermost points, so that no two points are farther apart
-than 1. On that disc r^(2H) is the variogram of a stationary field plus that of a random plane; the
-covariance of the stationary field ends at r = R and is smooth enough to be positive definite, so that it
-can be summed over a torus of side R + extent and sampled with Fourier transforms without any error.
+Lengths are divided by the diagonal between the outermost points, so that all distances r are at most 1.
+There r^(2H) is the variogram of a stationary field plus that of a random plane. The covariance of the
+stationary field is zero beyond r = R and smooth enough to be positive definite. Summed over a torus of side
+R + extent it is circulant: Fourier transforms sample it without error.
+
+References: Stein, Journal of Computational and Graphical Statistics 11 (2002) 587-599.
 """
 
 from __future__ import annotations
@@ -19,13 +21,13 @@ from fractalcontact.base.errors import FractalContactError
 
 Array = np.ndarray[Any, np.dtype[Any]]
 ROUNDING = 1e-14  # largest negative eigenvalue, over the largest, that rounding may leave
-KEPT = 1 << 24  # points of a torus whose amplitudes are kept: 34 MB
-BLOCK = 1 << 16  # numbers worked on at a time: they stay in the cache
+CACHED = 1 << 24  # largest number of torus points whose amplitudes are cached: 34 MB
+BLOCK = 1 << 16  # numbers processed at a time, so that they stay in the processor cache
 
 
 @dataclass(frozen=True)
 class Stein:
-    """The covariance of the stationary part: c0 - r^2H + c2 r^2 up to r = 1, beta (R - r)^3 / r up to R."""
+    """Covariance of the stationary field: c0 - r^2H + c2 r^2 up to r = 1, beta (R - r)^3 / r up to R."""
 
     hurst: float
     radius: float
@@ -35,7 +37,7 @@ class Stein:
 
     @classmethod
     def of(cls, hurst: float) -> Stein:
-        """Return the constants for this exponent, with the smaller radius where that is enough."""
+        """Return the constants for an exponent: R = 1 up to 0.75, where it suffices, and R = 2 above."""
         power = 2.0 * hurst
         if hurst <= 0.75:
             return cls(hurst, 1.0, 1.0 - power / 2.0, power / 2.0, 0.0)
@@ -59,7 +61,7 @@ class Stein:
 
 @dataclass(frozen=True)
 class Embedding:
-    """A torus whose modes give the surface.
+    """A torus whose random modes give the surface.
 
     Attributes
     ----------
@@ -70,13 +72,13 @@ class Embedding:
     step : tuple of float
         Spacing over the diagonal of the surface.
     amplitude : ndarray, shape (torus_x//2 + 1, torus_y//2 + 1)
-        Square root of the eigenvalues, one quadrant, x first: the others mirror it.
+        Square root of the eigenvalues on one quadrant, x first; the other quadrants mirror it.
     drift : float
         Standard deviation of the slope of the random plane, per diagonal.
     smallest : float
         Smallest eigenvalue over the largest, before clipping.
     clipped : float
-        Fraction of the eigenvalues that rounding had left below zero.
+        Fraction of the eigenvalues that rounding left below zero.
     """
 
     shape: tuple[int, int]
@@ -88,9 +90,9 @@ class Embedding:
     clipped: float
 
     def variogram(self) -> tuple[Array, Array]:
-        """Return what the amplitudes imply: lags and mean square increments over r^2H, shapes (ny, nx).
+        """Return lags (in diagonals) and the mean square increments implied by the amplitudes.
 
-        Lags are in diagonals; an exact embedding gives 2 lag^(2H).
+        Both have shape (ny, nx); an exact embedding gives 2 lag^(2H).
         """
         axes = tuple(axis for axis, n in enumerate(self.amplitude.shape) if n > 1)
         covariance = fft.dct(self.amplitude**2, 1, axes) / np.prod(self.torus)
@@ -103,16 +105,16 @@ class Embedding:
 def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
     """Return the embedding of a surface of this shape; ny = 1 makes a profile.
 
-    The last one is kept, if it is small, for the many surfaces of a sweep.
+    The last small embedding is cached for the members of an ensemble.
     """
-    torus = torus_of(shape, spacing, hurst)
-    return (_last if torus[0] * torus[1] <= KEPT else _embedded)(shape, spacing, hurst)
+    torus = torus_shape(shape, spacing, hurst)
+    return (_embed_cached if torus[0] * torus[1] <= CACHED else _embed)(shape, spacing, hurst)
 
 
-def _embedded(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
+def _embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
     model = Stein.of(hurst)
-    step = _in_diagonals(shape, spacing)
-    torus = torus_of(shape, spacing, hurst)
+    step = _diagonal_steps(shape, spacing)
+    torus = torus_shape(shape, spacing, hurst)
     covariance = _covariance(model, torus, step)
     axes = tuple(axis for axis, n in enumerate(covariance.shape) if n > 1)
     eigenvalues = fft.dct(covariance, 1, axes)
@@ -120,7 +122,7 @@ def _embedded(shape: tuple[int, int], spacing: tuple[float, float], hurst: float
     if not smallest >= -ROUNDING * largest:
         raise FractalContactError(
             f"fractional Brownian surface: the embedding of shape {shape} with hurst = {hurst:g} is not "
-            f"positive definite (least eigenvalue {smallest / largest:.2g} of the largest): please report it"
+            f"positive definite (smallest over largest eigenvalue {smallest / largest:.2g}): please report it"
         )
     clipped = 0.0
     if smallest < 0.0:
@@ -132,24 +134,24 @@ def _embedded(shape: tuple[int, int], spacing: tuple[float, float], hurst: float
     return Embedding(shape, torus, step, amplitude, drift, smallest / largest, clipped)
 
 
-_last = lru_cache(maxsize=1)(_embedded)
+_embed_cached = lru_cache(maxsize=1)(_embed)
 
 
-def torus_of(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> tuple[int, int]:
-    """Return how many points the torus of such a surface has along each axis."""
-    step = _in_diagonals(shape, spacing)
+def torus_shape(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> tuple[int, int]:
+    """Return the number of points of the torus along each axis."""
+    step = _diagonal_steps(shape, spacing)
     radius = Stein.of(hurst).radius
     return _side(shape[0], step[0], radius), _side(shape[1], step[1], radius)
 
 
-def _in_diagonals(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:
+def _diagonal_steps(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:
     """Return the spacing over the distance between the outermost points."""
     diagonal = float(np.hypot((shape[0] - 1) * spacing[0], (shape[1] - 1) * spacing[1]))
     return spacing[0] / diagonal, spacing[1] / diagonal
 
 
 def _side(n: int, step: float, radius: float) -> int:
-    """Return the even, fast number of points that holds the extent and one radius."""
+    """Return an even number of points, fast to transform, that covers the extent and one radius."""
     if n == 1:
         return 1
     needed = int(np.ceil(radius / step * (1.0 - 1e-12))) + n - 1
@@ -157,7 +159,7 @@ def _side(n: int, step: float, radius: float) -> int:
 
 
 def _covariance(model: Stein, torus: tuple[int, int], step: tuple[float, float]) -> Array:
-    """Return the covariance summed over the torus, on the quadrant (x, y) of its offsets."""
+    """Return the covariance summed over the images of the torus, on the quadrant (x, y) of offsets."""
     y, x = (np.arange(n // 2 + 1) * s for n, s in zip(torus, step, strict=True))
     side_y, side_x = (
         n * s if n > 1 else np.inf for n, s in zip(torus, step, strict=True)
@@ -195,12 +197,12 @@ def draw(embedding: Embedding, rng: np.random.Generator) -> Array:
 
 
 def _columns(embedding: Embedding, rng: np.random.Generator) -> Array:
-    """Draw the modes, undo the transform along y, and keep the rows of the surface: (ny, torus_x//2 + 1)."""
+    """Draw the modes, transform them back along y and keep the rows of the surface: (ny, torus_x//2 + 1)."""
     ny = embedding.shape[0]
     torus_y, torus_x = embedding.torus
     width = torus_x // 2 + 1
     lines = np.empty((ny, width), dtype=np.complex128)
-    # a pair of normal numbers has mean square 2; the columns that mirror themselves keep their real part
+    # a pair of normal numbers has mean square 2; the self-conjugate columns keep their real part only
     scale = np.full(width, np.sqrt(0.5 * torus_x * torus_y))
     scale[[0, -1]] *= np.sqrt(2.0)
     half = torus_y // 2 + 1

@@ -1,4 +1,4 @@
-"""Instrument files, through SurfaceTopography: what it reads is brought to (y, x), metres and NaN."""
+"""Instrument files read by SurfaceTopography, converted to (y, x), metres and NaN."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
-from fractalcontact.surfaces import _files
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._files import file_suffix, open_bytes
 from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
-PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats that are not of microscopes
+PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
 
@@ -37,15 +37,15 @@ class Reading:
     periodic : bool
     microscope : bool
         The format is that of a microscope or a profiler.
-    facts : dict
-        What the file itself says, and what read it.
+    entries : dict
+        For the provenance: what the file states, and the reader.
     """
 
     heights: Array
     spacing: tuple[float, ...]
     periodic: bool
     microscope: bool
-    facts: dict[str, Any]
+    entries: dict[str, Any]
 
 
 def read_instrument(
@@ -56,9 +56,9 @@ def read_instrument(
     Parameters
     ----------
     path : Path
-        An existing file; `.gz` is unpacked on the fly.
+        An existing file; `.gz` is decompressed in memory.
     channel : str, int or None
-        Name or number of the channel; None takes the one the format puts first.
+        Name or number of the channel; None takes the default of the format.
     units : str or None
         Unit of the heights, for a file that states none (or a wrong one).
     spacing : sequence of float or None
@@ -73,36 +73,36 @@ def read_instrument(
     """
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
-    with _quiet() as heard, _files.opened(path) as file:
-        foreign = _foreign_unit(file.read(4096))
+    with _quiet() as messages, open_bytes(path) as file:
+        other_unit = _other_unit(file.read(4096))
         file.seek(0)
         reader = _open(file, path)
         chosen = _channel(reader, channel, path.name)
-        size, unit, lateral = _stated(chosen, foreign, units)
+        size, unit, lateral = _stated(chosen, other_unit, units)
         with Problems(WHERE, UnreadableFile) as problems:
             _check(problems, chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
     points = tuple(int(n) for n in heights.shape)
     steps = _steps(points, size, lateral, spacing)
     name = str(reader.format())
-    facts = {
+    entries = {
         "format": name,
         "channel": str(chosen.name),
-        "stated_unit": foreign or _plain_unit(chosen.unit),
+        "stated_unit": other_unit or _plain_unit(chosen.unit),
         "stated_size": None if size is None else [float(edge) for edge in size],
         "reader": f"SurfaceTopography {_version()}",
-        "reader_warnings": sorted({str(message.message) for message in heard}) or None,
+        "reader_warnings": sorted({str(message.message) for message in messages}) or None,
     }
-    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, facts)
+    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, entries)
 
 
 @contextmanager
 def _quiet() -> Iterator[list[warnings.WarningMessage]]:
-    """Keep the library's warnings for the provenance; those about imports and open files are dropped."""
-    with warnings.catch_warnings(record=True) as heard:
+    """Record the library's warnings for the provenance, except those about imports and open files."""
+    with warnings.catch_warnings(record=True) as messages:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", UserWarning)
-        yield heard
+        yield messages
 
 
 def _open(file: Any, path: Path) -> Any:
@@ -116,15 +116,15 @@ def _open(file: Any, path: Path) -> Any:
 
 
 def _reason(text: str, path: Path) -> str:
-    """Return one line out of the library's long account of every format it tried."""
+    """Return one line from the library's long report of every format it tried."""
     from SurfaceTopography.IO import readers
 
-    suffix = _files.kind(path).lstrip(".")
+    suffix = file_suffix(path).lstrip(".")
     named = {reader.__name__ for reader in readers if suffix in (reader._file_extensions or ())}
     named |= {reader.__name__ for reader in readers if reader._format == suffix}
     tried = re.findall(r"tried (\w+):\s*\n\s*(.*)", text)
     reasons = [
-        f"{name.removesuffix('Reader')} reader: {said.strip()}" for name, said in tried if name in named
+        f"{name.removesuffix('Reader')} reader: {reason.strip()}" for name, reason in tried if name in named
     ]
     expected = f"path: {path.name!r} is corrupt or of an unknown format"
     if reasons:
@@ -133,14 +133,14 @@ def _reason(text: str, path: Path) -> str:
 
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
-    """Return the channel asked for by name or number."""
+    """Return a channel by name or number; None stands for the default of the format."""
     try:
         channels = list(reader.channels)
         if channel is None:
             return reader.default_channel
     except Exception as error:
         raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
-    names = [str(one.name) for one in channels]
+    names = [str(entry.name) for entry in channels]
     if isinstance(channel, str) and channel in names:
         return channels[names.index(channel)]
     if (
@@ -149,27 +149,26 @@ def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
         and 0 <= channel < len(channels)
     ):
         return channels[channel]
-    allowed = ", ".join(f"{number} = {one!r}" for number, one in enumerate(names))
+    allowed = ", ".join(f"{number} = {label!r}" for number, label in enumerate(names))
     raise UnreadableFile(WHERE, [f"channel: expected one of {allowed}, got {channel!r}"])
 
 
-def _foreign_unit(head: bytes) -> str | None:
-    """Return the unit of the data where a text header states one that is not a length.
+def _other_unit(head: bytes) -> str | None:
+    """Return the unit of the data if a text header states one that is not a length.
 
-    The library applies the conversion factor of such a header, a wavelength, and forgets that the data are
-    phases.
+    The library applies the conversion factor of such a header, a wavelength, although the data are phases.
     """
-    found = DATA_UNIT.search(head)
-    unit = found.group(1).decode("utf-8", "replace") if found else None
+    match = DATA_UNIT.search(head)
+    unit = match.group(1).decode("utf-8", "replace") if match else None
     return unit if unit not in UNITS else None
 
 
-def _stated(chosen: Any, foreign: str | None, units: str | None) -> tuple[Any, str | None, str | None]:
-    """Return the lateral size, the unit of the heights in force, and that of the size."""
+def _stated(chosen: Any, other_unit: str | None, units: str | None) -> tuple[Any, str | None, str | None]:
+    """Return the lateral size, the effective unit of the heights, and the unit of the size."""
     unit = chosen.unit
     lateral, vertical = unit if isinstance(unit, tuple) else (unit, unit)
-    if foreign is not None:
-        vertical = foreign
+    if other_unit is not None:
+        vertical = other_unit
     return chosen.physical_sizes, units or vertical, lateral or units
 
 
@@ -181,7 +180,7 @@ def _check(
     lateral: str | None,
     spacing: Sequence[float] | None,
 ) -> None:
-    """Note what the file does not tell and the caller did not either."""
+    """Note what neither the file nor the caller states."""
     name = f"channel {chosen.name!r}"
     problems.require(bool(chosen.is_uniform), name, "points on a uniform grid", "scattered points")
     if unit not in UNITS:
@@ -194,7 +193,7 @@ def _check(
 
 
 def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, bool]:
-    """Return the values of a channel as (y, x) with NaN for masked ones, and whether they are periodic."""
+    """Return the values of a channel as (y, x), masked ones as NaN, and whether they are periodic."""
     options: dict[str, Any] = {"channel_index": chosen.index}
     if size is None:
         options["physical_sizes"] = tuple(float(n) for n in np.atleast_1d(chosen.nb_grid_pts))
@@ -215,7 +214,7 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
 def _steps(
     points: tuple[int, ...], size: Any, lateral: str | None, spacing: Sequence[float] | None
 ) -> tuple[float, ...]:
-    """Return the spacing (y, x): the extent is n times it."""
+    """Return the spacing (y, x); the extent is n * spacing."""
     if spacing is not None:
         return tuple(float(step) for step in np.broadcast_to(spacing, len(points)))
     edges = [in_metres(float(edge), str(lateral)) for edge in np.atleast_1d(size)][::-1]

@@ -1,0 +1,159 @@
+"""Exact fractional Brownian surfaces."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.rng import RNGLike
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._circulant_embedding import draw, embed, torus_shape
+from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
+from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
+
+STEIN = (
+    "Stein, Fast and exact simulation of fractional Brownian surfaces, "
+    "Journal of Computational and Graphical Statistics 11 (2002) 587-599"
+)
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def _check(
+    problems: Problems,
+    *,
+    shape: Any,
+    spacing: Any,
+    hurst: Any,
+    rms_increment: Any,
+    lag: Any,
+    members: Any,
+    rng: Any,
+) -> None:
+    valid_plane = check_plane(problems, shape, spacing)
+    valid_hurst = problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
+    check_length(problems, "rms_increment", rms_increment)
+    check_length(problems, "lag", lag, optional=True)
+    check_ensemble(problems, members, rng)
+    if valid_plane and valid_hurst:
+        _check_memory(problems, *_plane(shape, spacing), float(hurst))
+
+
+@public_result(title="Fractional Brownian surface", references=STEIN, check=_check)
+def fbm(
+    shape: int | Sequence[int],
+    spacing: float | Sequence[float],
+    *,
+    hurst: float,
+    rms_increment: float,
+    lag: float | None = None,
+    members: int | None = None,
+    rng: RNGLike = None,
+) -> xr.DataArray:
+    """Return an exact fractional Brownian surface.
+
+    Every increment has mean square E[(z(a) - z(b))^2] = rms_increment^2 (|a - b| / lag)^(2 hurst), in every
+    direction and at every distance; the fractal dimension is 3 - hurst. There is no cut-off, and the surface
+    is not periodic. It is the reference for estimators of the dimension.
+
+    Parameters
+    ----------
+    shape : (ny, nx), or int
+        Points along each axis, at least 3; one number makes a profile with dim x.
+    spacing : float, or (y, x)
+        Distance between points in metres.
+    hurst : float
+        Hurst exponent, 0.01 to 0.99.
+    rms_increment : float
+        Root mean square height difference in metres of two points `lag` apart.
+    lag : float, optional
+        In metres; default: the x spacing.
+    members : int, optional
+        Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Random stream (SPEC 7). Its record, `json.loads(surface.attrs["provenance"])["random"]`, given as
+        `rng` makes the same surface again.
+
+    Returns
+    -------
+    DataArray
+        `height` with dims ([member,] y, x) in metres; the first point (smallest y and x) has height 0. The
+        provenance has the torus, its smallest eigenvalue over the largest, and the clipped fraction.
+
+    Raises
+    ------
+    InvalidInput
+        An argument is out of range, or the torus does not fit into memory.
+
+    Notes
+    -----
+    Stein's embedding: a stationary field on a torus plus a random plane. Torus size and memory are in the
+    documentation, "Theory: surfaces".
+
+    References
+    ----------
+    Stein (2002), Journal of Computational and Graphical Statistics 11, 587-599.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    >>> increment = surface.diff("x")
+    >>> print(f"{float((increment**2).mean() ** 0.5):.0e} m")
+    1e-06 m
+    """
+    (ny, nx), (dy, dx) = _plane(shape, spacing)
+    sizes = axis_sizes(shape)
+    embedding = embed((ny, nx), (dy, dx), float(hurst))
+    lag = dx if lag is None else float(lag)
+    lag_over_diagonal = lag / (dx / embedding.step[1])
+    scale = float(rms_increment) * (np.sqrt(0.5) * lag_over_diagonal ** -float(hurst))
+    clipped = max(embedding.clipped, np.finfo(float).eps)
+    entries = {
+        "torus": embedding.torus,
+        "smallest_eigenvalue": embedding.smallest,
+        "clipped_fraction": embedding.clipped,
+        "achieved_error": f"{clipped:.1e} of the covariances",
+        "parameters": {"lag": lag},
+    }
+
+    def draw_heights(stream: np.random.Generator) -> tuple[Array, dict[str, Any]]:
+        heights = draw(embedding, stream)
+        heights -= heights[0, 0]
+        heights *= scale
+        return heights.reshape(sizes), entries
+
+    return draw_ensemble(draw_heights, axis_spacing(spacing, len(sizes)), members=members, rng=rng)
+
+
+def _plane(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return (ny, nx) and (dy, dx); a profile has ny = 1 and dy = 1."""
+    sizes = axis_sizes(shape)
+    steps = axis_spacing(spacing, len(sizes))
+    (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]
+    return (ny, nx), (dy, dx)
+
+
+def _check_memory(
+    problems: Problems, shape: tuple[int, int], spacing: tuple[float, float], hurst: float
+) -> None:
+    """Note a problem where the torus does not fit into the memory of this machine."""
+    memory = _physical_memory()
+    torus = torus_shape(shape, spacing, hurst)
+    needed = 8.0 * (0.5 * torus[0] * torus[1] + shape[0] * torus[1] + shape[0] * shape[1])
+    if needed > memory:
+        size = f"{torus[0]} x {torus[1]} points, {needed / 2**30:.3g} GiB"
+        problems.add("shape / spacing", f"a torus that fits into {memory / 2**30:.3g} GiB of memory", size)
+
+
+def _physical_memory() -> float:
+    """Return the memory of this machine in bytes; infinity where the system does not report it."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return math.inf

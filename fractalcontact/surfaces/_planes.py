@@ -1,0 +1,28 @@
+"""Planes of measured heights, with gaps: their check, and their values as one stack."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.grid import core_dims
+from fractalcontact.base.validation import Problems
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def check_planes(problems: Problems, surface: Any) -> bool:
+    """Check for planes or profiles of heights that may have gaps (NaN) but no infinite values."""
+    if not problems.surface("surface", surface, finite=False, smallest=2, leading=True, profile=True):
+        return False
+    infinite = int(np.count_nonzero(np.isinf(surface.values)))
+    expected = "finite heights, or NaN where missing"
+    return problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+
+
+def height_planes(surface: xr.DataArray) -> Array:
+    """Return a copy of the heights as float64, shape (planes, ny, nx) or (planes, nx)."""
+    values = np.array(surface.values, dtype=np.float64)
+    return values.reshape(-1, *values.shape[values.ndim - len(core_dims(surface)) :])

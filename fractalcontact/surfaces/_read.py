@@ -1,0 +1,309 @@
+"""Surfaces read from files: NetCDF, npy, tables of numbers and instrument formats."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base import netcdf
+from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
+from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
+from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._files import EmptyTable, NotATable, file_suffix, read_npy, read_table
+from fractalcontact.surfaces._from_array import check_heights, labelled_heights
+from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
+from fractalcontact.surfaces._units import UNITS, in_metres
+
+Array = np.ndarray[Any, np.dtype[Any]]
+WHERE = "fractalcontact.surfaces.read"
+NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+RELIEF = (1e-6, 10.0)  # plausible range of heights over lateral extent
+WIDEST = 1.0  # m: wider than the field of any microscope
+
+
+@dataclass(frozen=True)
+class FileContent:
+    """A surface with metadata of its file: entries of the provenance, and whether it is a microscope's."""
+
+    surface: xr.DataArray
+    entries: dict[str, Any] = field(default_factory=dict)
+    is_microscope: bool = False
+
+
+def _check(problems: Problems, *, path: Any, channel: Any, units: Any, spacing: Any, first_row: Any) -> None:
+    if spacing is not None:
+        check_spacing(problems, spacing)
+    problems.choice("units", units, UNITS, optional=True)
+    problems.choice("first_row", first_row, ("bottom", "top"))
+    if not problems.path("path", path):
+        return
+    source = Path(path)
+    problems.require(source.is_file(), "path", "an existing file", source.name)
+    if file_suffix(source) in NETCDF:
+        expected = "'bottom' for a NetCDF file, which has its y"
+        problems.require(first_row == "bottom", "first_row", expected, first_row)
+        problems.require(
+            channel is None or isinstance(channel, str), "channel", "the name of a variable", channel
+        )
+
+
+@public_result(
+    title="Surface read from a file",
+    achieved_error="exact: heights as the file states them",
+    check=_check,
+    error=UnreadableFile,
+)
+def read(
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    units: str | None = None,
+    spacing: float | Sequence[float] | None = None,
+    first_row: str = "bottom",
+) -> xr.DataArray:
+    """Read a measured surface from a file.
+
+    Parameters
+    ----------
+    path : path-like
+        NetCDF (`.nc`), numpy (`.npy`), a table of numbers in text (`.csv`, `.txt` ...; rows are y), or an
+        instrument's file (extra `io`); a gzip file (`.gz`) of these is decompressed. `.npy` and tables need
+        `spacing`.
+    channel : str or int, optional
+        Channel of an instrument's file, or variable of a NetCDF file. Default: the first height channel.
+    units : str, optional
+        Unit of the heights: "m", "mm", "um", "nm" ... Default: that of the file, or metres for `.npy` and
+        tables. A unit other than that of the file replaces it, with a warning.
+    spacing : float, or (y, x), optional
+        Distance between points in metres; replaces that of the file.
+    first_row : {"bottom", "top"}
+        Whether the first row of the file has the smallest y, or is the top of an image, which is flipped.
+        NetCDF files have their own y.
+
+    Returns
+    -------
+    DataArray
+        `height` with dims (y, x) in metres, y ascending, heights up, NaN where missing. The provenance has
+        the name of the file, its unit and size as stated, and the library that read it.
+
+    Raises
+    ------
+    UnreadableFile
+        The file is corrupt, of an unknown format, states no unit or size, or is not a uniform grid.
+    MissingExtra
+        An instrument's file, and SurfaceTopography is not installed.
+
+    Warns
+    -----
+    ScaleWarning
+        The range of the heights over the extent is outside 1e-6 ... 10, or a microscope's field is wider than
+        1 m: some files, and some readers, are wrong by factors of 1000.
+
+    Notes
+    -----
+    The formats of tables are described in the documentation, "Theory: surfaces".
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import fractalcontact as fc
+    >>> path = Path(tempfile.mkdtemp()) / "scan.csv"
+    >>> size = path.write_text("0.0, 1.5, 0.5; 0.2, nan, 0.1".replace(";", chr(10)))
+    >>> surface = fc.surfaces.read(path, spacing=1e-6, units="um")
+    >>> surface.sizes["x"], float(surface[0, 1]), int(surface.isnull().sum())
+    (3, 1.5e-06, 1)
+    """
+    source = Path(path)
+    content = file_content(source, channel=channel, units=units, spacing=spacing, first_row=first_row)
+    stated = content.entries["stated_unit"]
+    if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
+        message = f"{source.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
+        warnings.warn(message, ScaleWarning, stacklevel=3)
+    _warn_of_scale(content, source.name)
+    surface = content.surface
+    surface.attrs = {
+        "title": f"Surface read from {source.name}",
+        "parameters": {"path": source.name},
+        **content.entries,
+    }
+    return surface
+
+
+def file_content(
+    path: Path,
+    *,
+    channel: str | int | None = None,
+    units: str | None = None,
+    spacing: Any = None,
+    first_row: str = "bottom",
+) -> FileContent:
+    """Read a file with the reader of its format."""
+    suffix = file_suffix(path)
+    if suffix in NETCDF:
+        return _netcdf_content(path, channel, units, spacing)
+    if suffix == ".npy" or (suffix in TABLES and spacing is not None):
+        return _table_content(path, channel, units, spacing, first_row)
+    return _instrument_content(path, channel, units, spacing, first_row)
+
+
+def _table_content(
+    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str
+) -> FileContent:
+    """Read an array of numbers.
+
+    Text that is not a table may be the file of an instrument that states its size.
+    """
+    is_text = file_suffix(path) != ".npy"
+    try:
+        values = read_table(path) if is_text else read_npy(path)
+    except ValueError as error:
+        if isinstance(error, NotATable) and not isinstance(error, EmptyTable):
+            with contextlib.suppress(UnreadableFile, MissingExtra):
+                content = _instrument_content(path, channel, units, spacing, first_row)
+                # a list of points has a size too, whatever its lines are
+                if content.entries["stated_size"] is not None and content.entries["format"] != "xyz":
+                    return content
+        fault = "is not a table of numbers" if is_text else "is corrupt"
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault} ({error})"]) from error
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = f"the spacing in metres, which {path.name!r} does not state"
+        problems.require(spacing is not None, "spacing", expected, None)
+        infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
+        problems.require(
+            infinite == 0, "path", "finite heights, or NaN where missing", f"{infinite} infinite"
+        )
+        if is_text:
+            expected = "a grid of heights, one row to a line"
+            problems.require(min(values.shape) > 1, "path", expected, f"shape {values.shape}")
+            is_list = values.shape[1] == 3 and values.shape[0] > 9
+            points = "three columns, which look like x, y, z points"
+            problems.require(not is_list, "path", expected, points)
+        with problems.collect():
+            _check_array(values, spacing)
+    heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")
+    return FileContent(heights, {"stated_unit": None})
+
+
+def _check_array(values: Array, spacing: Any) -> None:
+    with Problems(WHERE) as problems:
+        check_spacing(problems, spacing, check_heights(problems, values)) if spacing is not None else None
+
+
+def _from_bottom(values: Array, first_row: str) -> Array:
+    """Return heights with the first row at the smallest y."""
+    return values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
+
+
+def _instrument_content(
+    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str
+) -> FileContent:
+    # SurfaceTopography is optional and slow to import
+    from fractalcontact.surfaces._instruments import read_instrument
+
+    try:
+        reading = read_instrument(path, channel, units, spacing)
+    except MissingExtra:
+        if file_suffix(path) in TABLES and spacing is None:
+            expected = f"the spacing in metres, for {path.name!r} as a table of heights"
+            raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
+        raise
+    periodic = (reading.periodic,) * len(reading.spacing)
+    heights = surface_array(_from_bottom(reading.heights, first_row), reading.spacing, periodic)
+    return FileContent(heights, reading.entries, reading.microscope)
+
+
+def _netcdf_content(path: Path, channel: Any, units: str | None, spacing: Any) -> FileContent:
+    """Read `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x)."""
+    with Problems(WHERE, UnreadableFile) as problems:
+        candidates = _height_variables(netcdf.open(path))
+        name = next(iter(candidates)) if channel is None and len(candidates) == 1 else channel or "height"
+        expected = (
+            f"one of {', '.join(map(repr, candidates))}" if candidates else "a variable with dims (y, x)"
+        )
+        if problems.require(name in candidates, "channel", f"{expected} in {path.name!r}", name):
+            array = _in_metres(candidates[name], units, spacing, problems)
+            problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
+    stated = candidates[name].attrs.get("units")
+    source = candidates[name].attrs.get("provenance")
+    array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
+    return FileContent(array, {"stated_unit": stated, "before": json.loads(source) if source else None})
+
+
+def _height_variables(content: Any) -> dict[str, xr.DataArray]:
+    """Return the numeric variables with a dim x; those of the root group replace others of the same name."""
+    if isinstance(content, xr.DataArray):
+        content = content.to_dataset(name="height" if content.name is None else str(content.name))
+    is_tree = isinstance(content, xr.DataTree)
+    groups = [node.to_dataset() for node in content.subtree] if is_tree else [content]
+    return {
+        str(name): array
+        for group in reversed(groups)
+        for name, array in group.data_vars.items()
+        if "x" in array.dims and array.dtype.kind in "fiu"
+    }
+
+
+def _in_metres(array: xr.DataArray, units: str | None, spacing: Any, problems: Problems) -> xr.DataArray:
+    """Return heights and ascending coordinates in metres: those of the file, or from `spacing`."""
+    core = core_dims(array)
+    array = array.transpose(..., *core)
+    stated = array.attrs.get("units")
+    unit = units or ("m" if stated in METRES else stated)
+    expected = 'a unit of length, or give `units` ("m", "um" ...)'
+    if problems.require(unit in UNITS, f"{array.name}.units", expected, stated or "none"):
+        array = array.copy(data=in_metres(np.asarray(array.values, dtype=np.float64), str(unit)))
+    array.attrs["units"] = "m"
+    for dim in set(core) & set(array.coords):
+        array = _ascending_metres(array, dim)
+    if spacing is not None:
+        sizes = [array.sizes[dim] for dim in core]
+        array = array.assign_coords(
+            plane_coords(sizes, axis_spacing(spacing, len(core)), [False] * len(core), core)
+        )
+    return array
+
+
+def _ascending_metres(array: xr.DataArray, dim: str) -> xr.DataArray:
+    """Convert the coordinate of a dim to metres, and reverse the array if it descends."""
+    axis = array.coords[dim]
+    unit = axis.attrs.get("units", "m")
+    if unit not in METRES and unit in UNITS:
+        attributes = dict(axis.attrs) | {"units": "m"}
+        if "period" in attributes:
+            attributes["period"] = in_metres(float(attributes["period"]), unit)
+        centres = in_metres(axis.values.astype(np.float64), unit)
+        array = array.assign_coords({dim: (dim, centres, attributes)})
+    descends = axis.size > 1 and axis.values[0] > axis.values[-1]
+    return array.isel({dim: slice(None, None, -1)}) if descends else array
+
+
+def _warn_of_scale(content: FileContent, name: str) -> None:
+    """Warn where heights and extent do not fit each other, or a microscope's field is too wide."""
+    heights = content.surface.values
+    widest = max(read_grid(content.surface, core_dims(content.surface)).extent)
+    faults = []
+    if content.is_microscope and widest > WIDEST:
+        faults.append(f"the field is {widest:g} m wide, more than any microscope has")
+    observed = heights[np.isfinite(heights)]
+    relief = float(observed.max() - observed.min()) / widest if observed.size else 0.0
+    if relief > 0 and not RELIEF[0] <= relief <= RELIEF[1]:
+        expected = f"{RELIEF[0]:g} ... {RELIEF[1]:g}"
+        faults.append(
+            f"heights span {relief:.1g} of the extent of {widest:.3g} m, a ratio outside {expected}"
+        )
+    if faults:
+        message = f"{name}: {'; '.join(faults)}; if the unit in the file is wrong, give `units` or `spacing`"
+        warnings.warn(message, ScaleWarning, stacklevel=4)
