@@ -1,13 +1,14 @@
-"""What the tests of surfaces share."""
+"""Fixtures shared by the tests of surfaces."""
 
 import numpy as np
 import pytest
 
 
-class OneNumber:
-    """Stands in for a random stream: all its normal numbers are 0 but one."""
+class UnitImpulse(np.random.Generator):
+    """A random stream whose normal numbers are all 0 except the one at `place`, which is 1."""
 
     def __init__(self, place):
+        super().__init__(np.random.PCG64(0))
         self.place = place
         self.drawn = 0
 
@@ -23,15 +24,15 @@ class OneNumber:
 
 @pytest.fixture
 def covariance_of():
-    """Return a function that gives the exact covariance of what a linear generator draws.
+    """Return a function that computes the exact covariance of a generator linear in its normal numbers.
 
-    The generator is called once for each normal number it uses; no statistics are involved.
+    The generator is called with `rng`, once for each normal number it uses; no statistics are involved.
     """
 
-    def covariance(draw):
-        counter = OneNumber(-1)
-        draw(counter)
-        columns = [np.ravel(draw(OneNumber(place))) for place in range(counter.drawn)]
+    def covariance(generate):
+        counter = UnitImpulse(-1)
+        generate(counter)
+        columns = [np.ravel(generate(UnitImpulse(place))) for place in range(counter.drawn)]
         return sum(np.multiply.outer(column, column) for column in columns)
 
     return covariance

@@ -8,7 +8,7 @@ import pytest
 import fractalcontact as fc
 from fractalcontact.base import spectra, threads
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.surfaces._filtering import Band, filtered_modes
+from fractalcontact.surfaces import SelfAffine
 
 
 def spectral(shape=(24, 30), spacing=1e-6, hurst=0.7, rng=5, **options):
@@ -39,102 +39,96 @@ SHAPES = [
 
 
 @pytest.mark.parametrize(("shape", "spacing"), SHAPES)
-def test_this_surface_has_the_rms_asked_for(shape, spacing):
+def test_realisation_has_the_exact_rms(shape, spacing):
     surface = spectral(shape, spacing, rms_height=2.0)
     assert surface.values.std() == pytest.approx(2.0, rel=1e-14)
     assert abs(surface.values.mean()) < 1e-15
     assert slope_by_modes(spectral(shape, spacing, rms_slope=0.1)) == pytest.approx(0.1, rel=1e-13)
 
 
-@pytest.mark.parametrize("slope", [False, True])
-@pytest.mark.parametrize("shape", [(6, 8), (5, 7), (6, 7), (1, 8)])
-def test_expected_energy_is_exact(covariance_of, shape, slope):
-    # the covariance of the modes is exact, so its trace is the expectation without any statistics
-    band = Band((0.6, 0.6), 0.0, 1.0, np.inf, axes=2 if shape[0] > 1 else 1)
-    spacing = (1.0, 0.5)
-
-    def heights(stream):
-        modes, _ = filtered_modes(shape, spacing, band, stream, slope=slope, expected=True)
-        return np.fft.irfft2(modes, s=shape)
-
-    covariance = covariance_of(heights)
-    _, energy = filtered_modes(shape, spacing, band, np.random.default_rng(1), slope=slope, expected=True)
-    if not slope:
-        np.testing.assert_allclose(np.diag(covariance), energy, rtol=1e-13)
+@pytest.mark.parametrize("target", ["rms_height", "rms_slope"])
+@pytest.mark.parametrize("shape", [(6, 8), (5, 7), (6, 7), 8])
+def test_expected_rms_is_exact(covariance_of, shape, target):
+    # the covariance is exact, so its trace is the expectation without any statistics
+    spacing = (1.0, 0.5) if np.ndim(shape) else 0.5
+    options = {"hurst": 0.6, "rolloff": 2 * np.pi, "normalise": "expectation", target: 1.0}
+    covariance = covariance_of(lambda rng: spectral(shape, spacing, rng=rng, **options).values)
+    if target == "rms_height":
+        np.testing.assert_allclose(np.diag(covariance), 1.0, rtol=1e-13)
         return
-    qy = 2 * np.pi * np.fft.fftfreq(shape[0], spacing[0])[:, None]
-    qx = 2 * np.pi * np.fft.fftfreq(shape[1], spacing[1])
+    shape = shape if np.ndim(shape) else (1, shape)
+    qy = 2 * np.pi * np.fft.fftfreq(shape[0], 1.0)[:, None]
+    qx = 2 * np.pi * np.fft.fftfreq(shape[1], 0.5)
     power = np.fft.fft2(covariance[0].reshape(shape)).real / covariance[0].size
-    assert np.sum((qx**2 + qy**2) * power) == pytest.approx(energy, rel=1e-12)
+    assert np.sum((qx**2 + qy**2) * power) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(
     "band",
     [
-        Band((0.6, 0.6), 0.0, 1.0, np.inf),
-        Band((0.6, 0.6), 0.9, 2.0, 5.0),
-        Band((0.4, 0.9), 0.0, 1.0, np.inf),
-        Band((0.6, 0.6), 0.0, 1.0, np.inf, 3.0, 0.4),
+        {"hurst": (0.6, 0.6), "corner": 1.0},
+        {"hurst": (0.6, 0.6), "low": 0.9, "corner": 2.0, "high": 5.0},
+        {"hurst": (0.4, 0.9), "corner": 1.0},
+        {"hurst": (0.6, 0.6), "corner": 1.0, "anisotropy_ratio": 3.0, "azimuth": 0.4},
     ],
 )
 @pytest.mark.parametrize("shape", [(6, 8), (5, 8), (6, 7)])
 def test_every_mode_has_its_density(covariance_of, shape, band):
     spacing = (1.0, 0.5)
-
-    def heights(stream):
-        return np.fft.irfft2(
-            filtered_modes(shape, spacing, band, stream, slope=False, expected=False)[0], s=shape
-        )
-
-    covariance = covariance_of(heights).reshape(*shape, *shape)
-    # stationary: the covariance depends on the offset alone, wrapped
+    wavenumbers = {"long_cutoff": "low", "rolloff": "corner", "short_cutoff": "high"}
+    options = {name: 2 * np.pi / band[wave] for name, wave in wavenumbers.items() if wave in band}
+    if "azimuth" in band:
+        options |= {"anisotropy_ratio": band["anisotropy_ratio"], "azimuth": np.rad2deg(band["azimuth"])}
+    covariance = covariance_of(
+        lambda rng: spectral(shape, spacing, band["hurst"], rng, normalise="expectation", **options).values
+    ).reshape(*shape, *shape)
+    scale = covariance[0, 0, 0, 0]
+    # stationary: the covariance depends only on the offset, modulo the period
     for y in range(shape[0]):
-        moved = np.roll(covariance[y, 2], (-y, -2), axis=(0, 1))
-        np.testing.assert_allclose(moved, covariance[0, 0], atol=1e-14)
-    found = np.fft.fft2(covariance[0, 0]).real
+        shifted = np.roll(covariance[y, 2], (-y, -2), axis=(0, 1))
+        np.testing.assert_allclose(shifted, covariance[0, 0], atol=1e-14 * scale)
+    power = np.fft.fft2(covariance[0, 0]).real
     qy = 2 * np.pi * np.fft.fftfreq(shape[0], spacing[0])[:, None]
     qx = 2 * np.pi * np.fft.fftfreq(shape[1], spacing[1])
-    wanted = _density(band, qy, qx)
+    expected = _density(band, qy, qx)
     # a Nyquist mode stands for two waves: it has the mean of their densities
-    doubtful = np.zeros(shape, bool)
+    is_nyquist = np.zeros(shape, bool)
     for axis, q in enumerate((qy, qx)):
         if shape[axis] % 2 == 0:
-            doubtful |= np.isclose(np.abs(q), np.pi / spacing[axis])
-    wanted = np.where(doubtful, 0.5 * (wanted + _density(band, -qy, qx)), wanted)
-    wanted[0, 0] = 0.0
-    scale = wanted.sum() / found.sum()
-    np.testing.assert_allclose(found * scale, wanted, atol=1e-13 * wanted.max())
-
-
-def test_a_profile_falls_as_a_section_of_the_surface(covariance_of):
-    surface = _spectrum_of_profile(covariance_of, 0.7)
-    k = np.arange(1, 16)
-    np.testing.assert_allclose(surface[k] / surface[1], k ** (-1 - 2 * 0.7), rtol=1e-11)
-
-
-def _spectrum_of_profile(covariance_of, hurst):
-    def heights(stream):
-        band = Band((hurst, hurst), 0.0, 1e-6, np.inf, axes=1)
-        modes, _ = filtered_modes((1, 32), (1.0, 1.0), band, stream, slope=False, expected=False)
-        return np.fft.irfft2(modes, s=(1, 32))
-
-    return np.fft.fft(covariance_of(heights)[0]).real
+            is_nyquist |= np.isclose(np.abs(q), np.pi / spacing[axis])
+    expected = np.where(is_nyquist, 0.5 * (expected + _density(band, -qy, qx)), expected)
+    expected[0, 0] = 0.0
+    power *= expected.sum() / power.sum()
+    np.testing.assert_allclose(power, expected, atol=1e-13 * expected.max())
 
 
 def _density(band, qy, qx):
     """Return the density written out, up to a factor."""
-    mean = 2 / (1 / band.hurst[0] + 1 / band.hurst[1])
-    along = (qx * np.cos(band.azimuth) + qy * np.sin(band.azimuth)) * np.sqrt(band.anisotropy_ratio)
-    across = (qy * np.cos(band.azimuth) - qx * np.sin(band.azimuth)) / np.sqrt(band.anisotropy_ratio)
-    if band.hurst[0] != band.hurst[1]:
-        along = band.corner * np.abs(qx / band.corner) ** (band.hurst[1] / mean)
-        across = band.corner * np.abs(qy / band.corner) ** (band.hurst[0] / mean)
+    (hurst_y, hurst_x), corner = band["hurst"], band["corner"]
+    ratio, azimuth = band.get("anisotropy_ratio", 1.0), band.get("azimuth", 0.0)
+    low, high = band.get("low", 0.0), band.get("high", np.inf)
+    mean = 2 / (1 / hurst_y + 1 / hurst_x)
+    along = (qx * np.cos(azimuth) + qy * np.sin(azimuth)) * np.sqrt(ratio)
+    across = (qy * np.cos(azimuth) - qx * np.sin(azimuth)) / np.sqrt(ratio)
+    if hurst_y != hurst_x:
+        along = corner * np.abs(qx / corner) ** (hurst_x / mean)
+        across = corner * np.abs(qy / corner) ** (hurst_y / mean)
     q = np.hypot(along, across)
-    density = (np.maximum(q, band.corner) / band.corner) ** (-2 - 2 * mean)
-    return np.where((q >= band.low * (1 - 1e-9)) & (q <= band.high * (1 + 1e-9)), density, 0.0)
+    density = (np.maximum(q, corner) / corner) ** (-2 - 2 * mean)
+    return np.where((q >= low * (1 - 1e-9)) & (q <= high * (1 + 1e-9)), density, 0.0)
 
 
-def test_cutoffs_hold_and_their_edges_are_inside():
+def test_profile_spectrum_falls_as_that_of_a_section(covariance_of):
+    hurst = 0.7
+    covariance = covariance_of(
+        lambda rng: spectral(32, 1.0, hurst, rng, rolloff=2e6 * np.pi, normalise="expectation").values
+    )
+    power = np.fft.fft(covariance[0]).real
+    k = np.arange(1, 16)
+    np.testing.assert_allclose(power[k] / power[1], k ** (-1 - 2 * hurst), rtol=1e-11)
+
+
+def test_cutoffs_include_their_edges():
     n, spacing = 64, 1e-6
     surface = spectral((n, n), spacing, long_cutoff=n * spacing / 4, short_cutoff=4 * spacing)
     modes = np.abs(np.fft.fft2(surface.values))
@@ -144,7 +138,7 @@ def test_cutoffs_hold_and_their_edges_are_inside():
     assert modes[inside].min() > 0
 
 
-def test_plateau_is_flat_and_the_tail_falls_as_it_should():
+def test_plateau_and_tail():
     heights = spectral((128, 128), 1.0, hurst=0.5, rms_height=1.0, rolloff=16.0, members=40).values
     psd, _ = spectra.periodogram(heights, (1.0, 1.0))
     edges = 2 * np.pi / 128 * np.array([1.5, 4, 7.9, 16, 24, 32, 48])
@@ -162,20 +156,19 @@ def test_closed_form_moments_agree_with_the_sum_over_modes(hurst, rolloff):
     n, spacing = 512, 1e-6
     long, short = n * spacing / 8, 4 * spacing
     exact = SelfAffine.scaled(hurst, long, rolloff or long, short, rms_height=1e-7)
-    band = Band((hurst, hurst), 2 * np.pi / long, 2 * np.pi / (rolloff or long), 2 * np.pi / short)
-    energies = [
-        filtered_modes(
-            (n, n), (spacing, spacing), band, np.random.default_rng(0), slope=slope, expected=True
-        )[1]
-        for slope in (False, True)
-    ]
-    found = 1e-7 * np.sqrt(energies[1] / energies[0])
+    options = {"long_cutoff": long, "rolloff": rolloff or long, "short_cutoff": short}
+    by_height, by_slope = (
+        spectral((n, n), spacing, hurst, 0, normalise="expectation", **options, **target)
+        for target in ({"rms_height": 1e-7}, {"rms_slope": 1.0})
+    )
+    # the same noise: the surfaces differ by the factor between expected height and expected slope
+    rms_slope = float(by_height.std() / by_slope.std())
     # the sum and the integral differ by the modes on the edges of the band
-    assert found == pytest.approx(exact.moments().rms_slope, rel=0.02)
+    assert rms_slope == pytest.approx(exact.moments().rms_slope, rel=0.02)
     assert exact.moments().rms_height == pytest.approx(1e-7, rel=1e-12)
 
 
-def test_stretch_lengthens_along_its_azimuth():
+def test_anisotropy_lengthens_along_its_azimuth():
     surface = spectral(
         (128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, azimuth=0.0
     )
@@ -187,17 +180,17 @@ def test_stretch_lengthens_along_its_azimuth():
     assert float(turned.rms_slope_x / turned.rms_slope_y) > 2.0
 
 
-def test_two_exponents_make_two_slopes_of_the_spectrum():
+def test_two_exponents_give_two_spectral_slopes():
     heights = spectral((128, 128), 1.0, hurst=(0.3, 0.9), rms_height=1.0, members=60).values
     power = np.mean(np.abs(np.fft.fft2(heights)) ** 2, axis=0)
     k = np.arange(4, 60)
     mean = 2 / (1 / 0.3 + 1 / 0.9)
-    found = [np.polyfit(np.log(k), np.log(line[k]), 1)[0] for line in (power[:, 0], power[0])]
+    slopes = [np.polyfit(np.log(k), np.log(line[k]), 1)[0] for line in (power[:, 0], power[0])]
     # along an axis C falls as q^(-(2 + 2 H) H_axis / H)
-    np.testing.assert_allclose(found, [-(2 + 2 * mean) * own / mean for own in (0.3, 0.9)], rtol=0.04)
+    np.testing.assert_allclose(slopes, [-(2 + 2 * mean) * own / mean for own in (0.3, 0.9)], rtol=0.04)
 
 
-def test_axes_are_periodic_and_the_surface_has_no_seam():
+def test_surface_is_periodic_without_a_seam():
     surface = spectral((64, 64), 1e-6, rms_height=1.0, short_cutoff=1.6e-5)
     assert surface.x.attrs["period"] == pytest.approx(64e-6, rel=1e-14)
     seam = np.abs(surface.values[0] - surface.values[-1]).max()
@@ -205,7 +198,7 @@ def test_axes_are_periodic_and_the_surface_has_no_seam():
     assert seam < 1.5 * inner
 
 
-def test_expectation_leaves_each_realisation_its_own_rms():
+def test_rms_scatters_about_its_expectation():
     heights = spectral((16, 16), rms_height=2.0, normalise="expectation", members=2000).values
     mean_squares = np.mean(heights**2, axis=(1, 2))
     assert mean_squares.std() > 0.1
@@ -213,13 +206,13 @@ def test_expectation_leaves_each_realisation_its_own_rms():
 
 
 def test_units_by_powers_of_two_change_no_bit():
-    for wanted, factor in (({"rms_height": 1e-7}, 1.0), ({"rms_slope": 0.1}, 2.0**-30)):
-        base = spectral(spacing=(1e-3, 3e-3), short_cutoff=1e-2, **wanted)
-        moved = spectral(spacing=(1e-3 * 2.0**-30, 3e-3 * 2.0**-30), short_cutoff=1e-2 * 2.0**-30, **wanted)
+    for target, factor in (({"rms_height": 1e-7}, 1.0), ({"rms_slope": 0.1}, 2.0**-30)):
+        base = spectral(spacing=(1e-3, 3e-3), short_cutoff=1e-2, **target)
+        moved = spectral(spacing=(1e-3 * 2.0**-30, 3e-3 * 2.0**-30), short_cutoff=1e-2 * 2.0**-30, **target)
         np.testing.assert_array_equal(moved.values, base.values * factor)
 
 
-def test_any_number_of_threads_gives_the_same_bits():
+def test_thread_count_changes_no_bit():
     surfaces = []
     for count in (1, 2, 3):
         with threads.limit(count):
@@ -228,13 +221,13 @@ def test_any_number_of_threads_gives_the_same_bits():
     np.testing.assert_array_equal(surfaces[0], surfaces[2])
 
 
-def test_members_have_streams_of_their_own():
+def test_members_have_their_own_streams():
     few, many = spectral(members=2), spectral(members=4)
     np.testing.assert_array_equal(few.values, many.values[:2])
     assert json.loads(few.attrs["provenance"])["random"]["entropy"] == "5"
 
 
-def test_every_problem_is_told_at_once():
+def test_all_problems_are_reported_together():
     with pytest.raises(InvalidInput) as caught:
         fc.surfaces.spectral(
             (8, 8),
@@ -262,6 +255,6 @@ def test_every_problem_is_told_at_once():
         ({"shape": 64, "hurst": (0.5, 0.6)}, "hurst"),
     ],
 )
-def test_what_cannot_be_made_is_refused(options, word):
+def test_invalid_arguments_are_refused(options, word):
     with pytest.raises(InvalidInput, match=word):
         spectral(**options)

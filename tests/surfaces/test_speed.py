@@ -1,4 +1,4 @@
-"""Time of a surface over that of its transforms and of drawing its random numbers, one thread, scipy."""
+"""Run time of the generators relative to their transforms and random numbers, one thread, scipy."""
 
 import json
 import statistics
@@ -33,7 +33,7 @@ def one_scipy_thread(monkeypatch):
         yield
 
 
-def test_spectral_costs_its_transform_and_its_numbers():
+def test_spectral_run_time():
     rng = np.random.default_rng(0)
     modes = scipy.fft.rfft2(rng.standard_normal((2048, 2048)))
     parts = (lambda: scipy.fft.irfft2(modes, workers=1), lambda: rng.standard_normal((2048, 2048)))
@@ -44,7 +44,7 @@ def test_spectral_costs_its_transform_and_its_numbers():
 
 
 @pytest.mark.parametrize("hurst", [0.5, 0.9])
-def test_fbm_costs_its_transforms_and_its_numbers(hurst):
+def test_fbm_run_time(hurst):
     def make():
         return fc.surfaces.fbm((1024, 1024), 1e-6, hurst=hurst, rms_increment=1e-6, rng=1)
 

@@ -1,4 +1,4 @@
-"""Surfaces in numbers: closed forms, gaps, units, constant faces, labels."""
+"""Statistics of surfaces: closed forms, gaps, units, constant surfaces, labels."""
 
 import numpy as np
 import pytest
@@ -14,86 +14,88 @@ def wave(n=64, step=0.1, amplitude=2.0, waves=3, periodic=True):
     return fc.surfaces.from_array(heights, step, periodic=periodic)
 
 
-def test_one_wave_by_its_modes():
-    found = fc.surfaces.describe(wave())
+def test_one_wave_by_modes():
+    statistics = fc.surfaces.describe(wave())
     k = 2 * np.pi * 3 / 6.4
-    assert float(found.mean_height) == pytest.approx(5.0)
-    assert float(found.rms_height) == pytest.approx(2 / np.sqrt(2))
-    assert float(found.peak_to_valley) == pytest.approx(4.0, rel=0.01)
-    assert float(found.rms_slope) == pytest.approx(2 * k / np.sqrt(2))
-    assert float(found.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2))
-    assert float(found.rms_slope_y) == pytest.approx(0.0, abs=1e-12)
-    assert float(found.rms_curvature) == pytest.approx(k**2 / np.sqrt(2))
-    assert float(found.nayak_parameter) == pytest.approx(1.5)
-    assert float(found.skewness) == pytest.approx(0.0, abs=1e-12)
-    assert float(found.kurtosis) == pytest.approx(1.5)
+    assert float(statistics.mean_height) == pytest.approx(5.0)
+    assert float(statistics.rms_height) == pytest.approx(2 / np.sqrt(2))
+    assert float(statistics.peak_to_valley) == pytest.approx(4.0, rel=0.01)
+    assert float(statistics.rms_slope) == pytest.approx(2 * k / np.sqrt(2))
+    assert float(statistics.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2))
+    assert float(statistics.rms_slope_y) == pytest.approx(0.0, abs=1e-12)
+    assert float(statistics.rms_curvature) == pytest.approx(k**2 / np.sqrt(2))
+    assert float(statistics.nayak_parameter) == pytest.approx(1.5)
+    assert float(statistics.skewness) == pytest.approx(0.0, abs=1e-12)
+    assert float(statistics.kurtosis) == pytest.approx(1.5)
 
 
 def test_one_wave_by_differences():
-    found = fc.surfaces.describe(wave(periodic=False))
+    statistics = fc.surfaces.describe(wave(periodic=False))
     step, k = 0.1, 2 * np.pi * 3 / 6.4
-    seen = np.sin(k * step / 2) / (k * step / 2)  # what a difference sees of a wave
-    assert float(found.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2) * seen, rel=0.02)
-    assert float(found.rms_curvature) == pytest.approx(k**2 / np.sqrt(2) * seen**2, rel=0.05)
+    response = np.sin(k * step / 2) / (k * step / 2)  # response of a difference to a wave
+    assert float(statistics.rms_slope_x) == pytest.approx(2 * k / np.sqrt(2) * response, rel=0.02)
+    assert float(statistics.rms_curvature) == pytest.approx(k**2 / np.sqrt(2) * response**2, rel=0.05)
 
 
-def test_a_plane():
+def test_plane():
     zero = fc.surfaces.from_array(np.zeros((20, 30)), (2.0, 0.5))
     tilted = zero + 0.3 * zero.x - 0.4 * zero.y
     tilted.attrs = {"units": "m"}
-    found = fc.surfaces.describe(tilted)
-    assert float(found.mean_slope_x) == pytest.approx(0.3)
-    assert float(found.mean_slope_y) == pytest.approx(-0.4)
-    assert float(found.rms_slope) == pytest.approx(0.5)
-    assert float(found.rms_curvature) == pytest.approx(0.0, abs=1e-12)
-    assert float(found.developed_area_ratio) == pytest.approx(np.sqrt(1.25))
+    statistics = fc.surfaces.describe(tilted)
+    assert float(statistics.mean_slope_x) == pytest.approx(0.3)
+    assert float(statistics.mean_slope_y) == pytest.approx(-0.4)
+    assert float(statistics.rms_slope) == pytest.approx(0.5)
+    assert float(statistics.rms_curvature) == pytest.approx(0.0, abs=1e-12)
+    assert float(statistics.developed_area_ratio) == pytest.approx(np.sqrt(1.25))
 
 
-def test_a_paraboloid_has_its_mean_curvature():
+def test_mean_curvature_of_a_paraboloid():
     x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
-    found = fc.surfaces.describe(fc.surfaces.from_array(0.5 * 0.2 * x**2 + 0.5 * 0.6 * y**2, 1.0))
-    assert float(found.rms_curvature) == pytest.approx(0.4)
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(0.5 * 0.2 * x**2 + 0.5 * 0.6 * y**2, 1.0))
+    assert float(statistics.rms_curvature) == pytest.approx(0.4)
 
 
-def test_rms_slope_is_that_asked_of_the_generator():
+def test_rms_slope_of_a_spectral_surface():
     surface = fc.surfaces.spectral((50, 64), (1e-6, 2e-6), hurst=0.8, rms_slope=0.1, rng=1)
     assert float(fc.surfaces.describe(surface).rms_slope) == pytest.approx(0.1, rel=1e-12)
 
 
-def test_differences_of_a_brownian_surface_are_its_increments():
+def test_slope_of_a_brownian_surface_by_its_increments():
     surface = fc.surfaces.fbm((400, 400), 1e-3, hurst=0.5, rms_increment=2e-5, rng=1)
-    found = fc.surfaces.describe(surface)
-    assert float(found.rms_slope_x) == pytest.approx(0.02, rel=0.02)
-    assert float(found.rms_slope) == pytest.approx(0.02 * np.sqrt(2), rel=0.02)
+    statistics = fc.surfaces.describe(surface)
+    assert float(statistics.rms_slope_x) == pytest.approx(0.02, rel=0.02)
+    assert float(statistics.rms_slope) == pytest.approx(0.02 * np.sqrt(2), rel=0.02)
 
 
 def test_against_plain_numpy_with_gaps():
     rng = np.random.default_rng(0)
     heights = rng.standard_normal((20, 30))
     heights[rng.random(heights.shape) < 0.2] = np.nan
-    found = fc.surfaces.describe(fc.surfaces.from_array(heights, (0.5, 2.0)))
-    assert int(found.missing_points) == np.isnan(heights).sum()
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(heights, (0.5, 2.0)))
+    assert int(statistics.missing_points) == np.isnan(heights).sum()
     centred = heights - np.nanmean(heights)
-    assert float(found.rms_height) == pytest.approx(np.sqrt(np.nanmean(centred**2)))
-    assert float(found.mean_absolute_height) == pytest.approx(np.nanmean(np.abs(centred)))
-    assert float(found.peak_height) == pytest.approx(np.nanmax(heights) - np.nanmean(heights))
-    assert float(found.valley_depth) == pytest.approx(np.nanmean(heights) - np.nanmin(heights))
-    assert float(found.peak_height + found.valley_depth) == pytest.approx(float(found.peak_to_valley))
-    assert float(found.skewness) == pytest.approx(np.nanmean(centred**3) / np.nanmean(centred**2) ** 1.5)
-    assert float(found.kurtosis) == pytest.approx(np.nanmean(centred**4) / np.nanmean(centred**2) ** 2)
-    assert float(found.rms_slope_x) == pytest.approx(
+    assert float(statistics.rms_height) == pytest.approx(np.sqrt(np.nanmean(centred**2)))
+    assert float(statistics.mean_absolute_height) == pytest.approx(np.nanmean(np.abs(centred)))
+    assert float(statistics.peak_height) == pytest.approx(np.nanmax(heights) - np.nanmean(heights))
+    assert float(statistics.valley_depth) == pytest.approx(np.nanmean(heights) - np.nanmin(heights))
+    assert float(statistics.peak_height + statistics.valley_depth) == pytest.approx(
+        float(statistics.peak_to_valley)
+    )
+    assert float(statistics.skewness) == pytest.approx(np.nanmean(centred**3) / np.nanmean(centred**2) ** 1.5)
+    assert float(statistics.kurtosis) == pytest.approx(np.nanmean(centred**4) / np.nanmean(centred**2) ** 2)
+    assert float(statistics.rms_slope_x) == pytest.approx(
         np.sqrt(np.nanmean((np.diff(heights, axis=1) / 2.0) ** 2))
     )
-    assert float(found.rms_slope_y) == pytest.approx(
+    assert float(statistics.rms_slope_y) == pytest.approx(
         np.sqrt(np.nanmean((np.diff(heights, axis=0) / 0.5) ** 2))
     )
     inner = heights[1:-1, 1:-1]
     laplacian = (heights[1:-1, 2:] - 2 * inner + heights[1:-1, :-2]) / 4.0
     laplacian += (heights[2:, 1:-1] - 2 * inner + heights[:-2, 1:-1]) / 0.25
-    assert float(found.rms_curvature) == pytest.approx(0.5 * np.sqrt(np.nanmean(laplacian**2)))
+    assert float(statistics.rms_curvature) == pytest.approx(0.5 * np.sqrt(np.nanmean(laplacian**2)))
 
 
-def test_developed_area_is_that_of_triangles_cut_both_ways():
+def test_developed_area_by_triangles():
     rng = np.random.default_rng(5)
     heights = rng.standard_normal((7, 9))
     heights[2, 3] = np.nan
@@ -107,17 +109,17 @@ def test_developed_area_is_that_of_triangles_cut_both_ways():
                 np.linalg.norm(np.cross(corners[q] - corners[p], corners[r] - corners[p])) for p, q, r in cuts
             ]
             areas.append(0.25 * sum(halves) / (dy * dx))
-    found = fc.surfaces.describe(fc.surfaces.from_array(heights, (dy, dx)))
-    assert float(found.developed_area_ratio) == pytest.approx(np.nanmean(areas), rel=1e-12)
-    assert float(found.developed_area_excess) == pytest.approx(np.nanmean(areas) - 1.0, rel=1e-12)
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(heights, (dy, dx)))
+    assert float(statistics.developed_area_ratio) == pytest.approx(np.nanmean(areas), rel=1e-12)
+    assert float(statistics.developed_area_excess) == pytest.approx(np.nanmean(areas) - 1.0, rel=1e-12)
 
 
-def test_a_face_of_small_slopes_keeps_its_developed_area():
+def test_developed_area_of_small_slopes():
     heights = np.random.default_rng(5).standard_normal((40, 40))
-    found = fc.surfaces.describe(fc.surfaces.from_array(1e-9 * heights, 1.0))
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(1e-9 * heights, 1.0))
     square = np.mean(np.diff(heights, axis=0) ** 2) + np.mean(np.diff(heights, axis=1) ** 2)
-    assert float(found.developed_area_excess) == pytest.approx(0.5e-18 * square, rel=0.05)
-    assert float(found.developed_area_ratio) == 1.0
+    assert float(statistics.developed_area_excess) == pytest.approx(0.5e-18 * square, rel=0.05)
+    assert float(statistics.developed_area_ratio) == 1.0
 
 
 def test_mirrors_and_transposes():
@@ -147,7 +149,7 @@ def test_units_by_powers_of_two_change_no_bit(periodic):
         assert float(moved[name]) == float(base[name]) * 2.0**power, name
 
 
-def test_an_offset_of_a_billion_changes_the_mean_alone():
+def test_large_offset_changes_only_the_mean():
     heights = np.round(np.random.default_rng(1).standard_normal((12, 15)) * 64) / 64  # exact beside 1e9
     base = fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
     lifted = fc.surfaces.describe(fc.surfaces.from_array(heights + 1e9, 1.0))
@@ -157,20 +159,20 @@ def test_an_offset_of_a_billion_changes_the_mean_alone():
     assert float(lifted.mean_height) == pytest.approx(1e9, rel=1e-9)
 
 
-def test_a_constant_face_has_no_skewness_and_says_why():
-    found = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), 3.0), 1.0))
+def test_constant_surface_has_no_skewness():
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), 3.0), 1.0))
     for name in ("skewness", "kurtosis", "nayak_parameter"):
-        assert np.isnan(found[name])
-        assert "equal" in found[name].attrs["reason"]
+        assert np.isnan(statistics[name])
+        assert "equal" in statistics[name].attrs["reason"]
     for name in ("rms_height", "rms_slope", "rms_curvature", "peak_to_valley", "mean_slope_x"):
-        assert float(found[name]) == 0.0
-    assert float(found.developed_area_ratio) == 1.0
-    assert "reason" not in found.rms_slope.attrs
+        assert float(statistics[name]) == 0.0
+    assert float(statistics.developed_area_ratio) == 1.0
+    assert "reason" not in statistics.rms_slope.attrs
 
 
-def test_a_face_without_any_point_is_nan_with_a_reason():
-    found = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), np.nan), 1.0))
-    for name, variable in found.data_vars.items():
+def test_surface_without_points_is_nan_with_a_reason():
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(np.full((5, 6), np.nan), 1.0))
+    for name, variable in statistics.data_vars.items():
         if name not in ("run_time", "missing_points"):
             assert np.isnan(variable), name
             assert variable.attrs["reason"] == "no point was observed"
@@ -179,21 +181,21 @@ def test_a_face_without_any_point_is_nan_with_a_reason():
 def test_isolated_points_have_heights_but_no_slopes():
     heights = np.full((7, 7), np.nan)
     heights[::2, ::2] = np.random.default_rng(0).random((4, 4))
-    found = fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
-    assert np.isfinite(found.rms_height)
-    assert np.isfinite(found.mean_slope_x)
+    statistics = fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))
+    assert np.isfinite(statistics.rms_height)
+    assert np.isfinite(statistics.mean_slope_x)
     for name in ("rms_slope", "rms_curvature", "developed_area_ratio"):
-        assert np.isnan(found[name])
-        assert "neighbouring" in found[name].attrs["reason"]
+        assert np.isnan(statistics[name])
+        assert "neighbouring" in statistics[name].attrs["reason"]
 
 
 def test_members_profiles_and_labels():
     stack = fc.surfaces.fbm((8, 9), 1.0, hurst=0.5, rms_increment=1.0, rng=1, members=3)
-    found = fc.surfaces.describe(stack)
-    assert found.rms_height.dims == ("member",)
+    statistics = fc.surfaces.describe(stack)
+    assert statistics.rms_height.dims == ("member",)
     one = fc.surfaces.describe(stack.isel(member=2, drop=True))
-    assert float(found.rms_slope[2]) == float(one.rms_slope)
-    for name, variable in {**found.data_vars, **found.coords}.items():
+    assert float(statistics.rms_slope[2]) == float(one.rms_slope)
+    for name, variable in {**statistics.data_vars, **statistics.coords}.items():
         assert variable.attrs["units"] == QUANTITIES[name].units
         assert variable.attrs["long_name"]
     profile = fc.surfaces.describe(stack.isel(member=0, y=0, drop=True))
@@ -201,7 +203,7 @@ def test_members_profiles_and_labels():
     assert float(profile.rms_slope) == float(profile.rms_slope_x)
 
 
-def test_what_is_no_surface_is_refused():
+def test_invalid_surfaces_are_refused():
     with pytest.raises(InvalidInput, match="DataArray"):
         fc.surfaces.describe(np.zeros((3, 3)))
     bad = fc.surfaces.from_array(np.zeros((4, 4)), 1.0).copy(data=np.full((4, 4), np.inf))
@@ -209,9 +211,9 @@ def test_what_is_no_surface_is_refused():
         fc.surfaces.describe(bad)
 
 
-def test_a_stack_with_names_of_the_user():
+def test_stack_with_its_own_dim_name():
     stack = fc.surfaces.fbm((8, 9), 1.0, hurst=0.5, rms_increment=1.0, rng=1, members=2)
     named = stack.drop_vars("member").rename(member="specimen").assign_coords(specimen=["p", "q"])
-    found = fc.surfaces.describe(named)
-    assert found.rms_height.dims == ("specimen",)
-    np.testing.assert_array_equal(found.rms_height, fc.surfaces.describe(stack).rms_height)
+    statistics = fc.surfaces.describe(named)
+    assert statistics.rms_height.dims == ("specimen",)
+    np.testing.assert_array_equal(statistics.rms_height, fc.surfaces.describe(stack).rms_height)

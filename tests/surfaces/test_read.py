@@ -1,4 +1,4 @@
-"""Arrays and files: orientation, units, gaps, corruption, scale, and what is kept of where they come from."""
+"""Files: formats, orientation, units, gaps, corruption, scale, and provenance."""
 
 import gzip
 import json
@@ -9,89 +9,13 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput, MissingExtra, ScaleWarning, UnreadableFile
+from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 
 HEIGHTS = np.arange(12.0).reshape(3, 4) * 1e-6
 
 
 def provenance(surface):
     return json.loads(surface.attrs["provenance"])
-
-
-def test_an_array_becomes_a_surface():
-    surface = fc.surfaces.from_array(HEIGHTS, (2e-3, 1e-3), periodic=(True, False))
-    assert surface.dims == ("y", "x")
-    assert surface.dtype == np.float64
-    np.testing.assert_array_equal(surface.values, HEIGHTS)
-    np.testing.assert_allclose(surface.y.values, [1e-3, 3e-3, 5e-3])
-    np.testing.assert_allclose(surface.x.values, [0.5e-3, 1.5e-3, 2.5e-3, 3.5e-3])
-    assert surface.y.attrs["period"] == pytest.approx(6e-3)
-    assert "period" not in surface.x.attrs
-    assert surface.attrs["units"] == surface.x.attrs["units"] == "m"
-
-
-@pytest.mark.parametrize(
-    ("units", "metre"),
-    [("m", 1), ("mm", 1e3), ("um", 1e6), ("µm", 1e6), ("μm", 1e6), ("nm", 1e9), ("km", 1e-3)],
-)
-def test_heights_come_in_metres(units, metre):
-    surface = fc.surfaces.from_array([[1.0, 2.0], [3.0, 5.0]], 1.0, units=units)
-    np.testing.assert_allclose(surface.values, np.array([[1.0, 2.0], [3.0, 5.0]]) / metre, rtol=1e-15)
-
-
-def test_missing_values_masks_and_integers():
-    masked = np.ma.masked_greater(np.arange(6, dtype=np.int16).reshape(2, 3), 4)
-    surface = fc.surfaces.from_array(masked, 1.0)
-    assert surface.dtype == np.float64
-    assert np.isnan(surface.values[1, 2])
-    assert np.isnan(fc.surfaces.from_array([[1.0, np.nan], [0, 1]], 1.0).values[0, 1])
-
-
-def test_profiles_members_and_labelled_arrays():
-    assert fc.surfaces.from_array(np.zeros(5), 1.0).dims == ("x",)
-    stack = fc.surfaces.from_array(np.zeros((2, 3, 4)), 1.0)
-    assert stack.dims == ("member", "y", "x")
-    shear = xr.DataArray(np.zeros((2, 3, 4)), dims=("shear", "y", "x"), coords={"shear": [0.0, 1e-3]})
-    surface = fc.surfaces.from_array(shear, 1.0)
-    np.testing.assert_array_equal(surface.shear.values, [0.0, 1e-3])
-    assert surface.shear.attrs["units"] == "m"
-    with pytest.raises(InvalidInput, match="leading dims"):
-        fc.surfaces.from_array(shear.rename(shear="weather"), 1.0)
-
-
-def test_a_dask_array_stays_lazy():
-    dask = pytest.importorskip("dask.array")
-    surface = fc.surfaces.from_array(dask.zeros((8, 8), chunks=4), 1.0, units="um")
-    assert hasattr(surface.data, "dask")
-
-
-def test_the_input_is_not_changed():
-    heights = HEIGHTS.copy()
-    surface = fc.surfaces.from_array(heights, 1.0)
-    surface.values[0, 0] = 99.0
-    np.testing.assert_array_equal(heights, HEIGHTS)
-
-
-@pytest.mark.parametrize(
-    ("heights", "options", "word"),
-    [
-        (np.full((3, 3), np.inf), {}, "infinite"),
-        (np.zeros((3, 3), complex), {}, "real numbers"),
-        (np.zeros((3, 3), bool), {}, "real numbers"),
-        ("heights", {}, "real numbers"),
-        ([[1.0, 2.0], [3.0]], {}, "real numbers"),
-        (5.0, {}, "shape"),
-        (np.zeros((2, 2, 2, 2)), {}, "shape"),
-        (np.zeros((1, 5)), {}, "at least 2"),
-        (np.zeros((3, 3)), {"spacing": -1.0}, "spacing"),
-        (np.zeros((3, 3)), {"spacing": (1.0, 2.0, 3.0)}, "spacing"),
-        (np.zeros((3, 3)), {"units": "furlong"}, "units"),
-        (np.zeros((3, 3)), {"periodic": "x"}, "periodic"),
-    ],
-)
-def test_what_is_no_surface_is_refused(heights, options, word):
-    with pytest.raises(InvalidInput, match=word):
-        fc.surfaces.from_array(heights, **{"spacing": 1.0, **options})
 
 
 def test_npy_needs_its_spacing(tmp_path):
@@ -103,7 +27,7 @@ def test_npy_needs_its_spacing(tmp_path):
         fc.surfaces.read(tmp_path / "a.npy")
 
 
-def test_an_image_is_turned_the_right_way_up(tmp_path):
+def test_image_is_flipped(tmp_path):
     np.save(tmp_path / "a.npy", HEIGHTS)
     surface = fc.surfaces.read(tmp_path / "a.npy", spacing=1e-5, first_row="top")
     np.testing.assert_array_equal(surface.values, HEIGHTS[::-1])
@@ -128,7 +52,7 @@ def test_empty_cells_are_missing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "problem"),
     [
         ("1,2,3\n4,abc,6\n7,8,9\n", "line 2, column 2: expected a number, got 'abc'"),
         ("left,right\n1,2\n3,4\n", "line 1, column 1: expected a number, got 'left'"),
@@ -145,26 +69,26 @@ def test_empty_cells_are_missing(tmp_path):
     ],
 )
 @pytest.mark.parametrize("units", [None, "um"])
-def test_what_is_no_table_is_refused_at_its_cell(tmp_path, text, told, units):
+def test_invalid_table_names_its_cell(tmp_path, text, problem, units):
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(UnreadableFile, match=told) as caught:
+    with pytest.raises(UnreadableFile, match=problem) as caught:
         fc.surfaces.read(tmp_path / "a.csv", spacing=1.0, units=units)
     assert "reader" not in str(caught.value)
 
 
-def test_missing_marks_quotes_and_marks_at_the_end_of_lines(tmp_path):
+def test_missing_marks_quotes_and_trailing_separators(tmp_path):
     (tmp_path / "a.csv").write_text('"1", NA ,null,\n--,"nan",6,\n')
     surface = fc.surfaces.read(tmp_path / "a.csv", spacing=1.0)
     np.testing.assert_array_equal(surface.values, [[1, np.nan, np.nan], [np.nan, np.nan, 6]])
 
 
-def test_a_list_of_points_is_not_taken_for_a_grid(tmp_path):
+def test_list_of_points_is_refused(tmp_path):
     np.savetxt(tmp_path / "points.csv", np.random.default_rng(0).random((50, 3)), delimiter=",")
     with pytest.raises(UnreadableFile, match="x, y, z"):
         fc.surfaces.read(tmp_path / "points.csv", spacing=1.0)
 
 
-def test_netcdf_comes_back_as_it_was(tmp_path):
+def test_netcdf_round_trip(tmp_path):
     surface = fc.surfaces.spectral((6, 8), (1e-6, 2e-6), hurst=0.5, rms_height=1e-7, rng=1)
     fc.save(surface, tmp_path / "a.nc")
     again = fc.surfaces.read(tmp_path / "a.nc")
@@ -174,7 +98,7 @@ def test_netcdf_comes_back_as_it_was(tmp_path):
     assert provenance(again)["before"]["call"] == "fractalcontact.surfaces.spectral"
 
 
-def test_foreign_netcdf_is_turned_and_converted(tmp_path):
+def test_other_netcdf_is_transposed_and_converted(tmp_path):
     heights = xr.DataArray(
         HEIGHTS.T * 1e6,
         dims=("x", "y"),
@@ -223,21 +147,21 @@ def test_netcdf_without_units_or_grid_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.npy", "a.nc", "a.sur", "a.csv", "a.di.gz"])
-def test_damaged_files_are_refused_with_a_reason(tmp_path, name):
+def test_damaged_files_are_refused(tmp_path, name):
     pytest.importorskip("SurfaceTopography")
     (tmp_path / name).write_bytes(b"\x93NUMPY not really a surface" * 3)
     with pytest.raises(UnreadableFile, match=name.split(".")[1]):
         fc.surfaces.read(tmp_path / name, spacing=1.0)
 
 
-def test_a_file_that_is_not_there(tmp_path):
+def test_missing_file(tmp_path):
     with pytest.raises(UnreadableFile) as caught:
         fc.surfaces.read(tmp_path / "nowhere.nc", units="ell", first_row="left")
     assert len(caught.value.problems) >= 3
     assert str(tmp_path) not in str(caught.value)
 
 
-def test_an_instrument_without_its_reader(tmp_path, monkeypatch):
+def test_instrument_file_without_its_reader(tmp_path, monkeypatch):
     (tmp_path / "a.sur").write_bytes(b"DIGITAL SURF")
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     import importlib.util
@@ -247,7 +171,7 @@ def test_an_instrument_without_its_reader(tmp_path, monkeypatch):
         fc.surfaces.read(tmp_path / "a.sur")
 
 
-def test_an_implausible_scale_is_warned_of(tmp_path):
+def test_implausible_scale_warns(tmp_path):
     np.save(tmp_path / "a.npy", HEIGHTS * 1e6)
     with pytest.warns(ScaleWarning, match="ratio"):
         fc.surfaces.read(tmp_path / "a.npy", spacing=1e-6)
@@ -283,12 +207,12 @@ def test_instrument_files(measured, name):
 def test_orientation_of_a_microscope_scan(measured):
     pytest.importorskip("SurfaceTopography")
     surface = fc.surfaces.read(measured / "instruments" / "di-3.di")
-    known = fc.surfaces.read(measured / "afm_10um_di3.npy", spacing=3.90625e-8)
-    np.testing.assert_allclose(surface.values, known.values, rtol=1e-15)
-    assert np.abs(surface.values - known.values.T).max() > 1e-8
+    reference = fc.surfaces.read(measured / "afm_10um_di3.npy", spacing=3.90625e-8)
+    np.testing.assert_allclose(surface.values, reference.values, rtol=1e-15)
+    assert np.abs(surface.values - reference.values.T).max() > 1e-8
 
 
-def test_an_instrument_file_is_flipped_on_request_alone(tmp_path):
+def test_instrument_file_is_flipped_on_request_only(tmp_path):
     pytest.importorskip("SurfaceTopography")
     text = "# Channel: Height\n# Width: 4 um\n# Height: 3 um\n# Value units: nm\n"
     (tmp_path / "a.asc").write_text(text + "1 2 3 4\n5 6 7 8\n9 10 11 13\n")
@@ -299,7 +223,7 @@ def test_an_instrument_file_is_flipped_on_request_alone(tmp_path):
     assert provenance(flipped)["parameters"]["first_row"] == "top"
 
 
-def test_netcdf_is_never_flipped_for_it_has_its_y(tmp_path):
+def test_netcdf_is_never_flipped(tmp_path):
     fc.save(fc.surfaces.from_array(HEIGHTS, 1e-5), tmp_path / "a.nc")
     with pytest.raises(UnreadableFile, match="first_row: .*NetCDF"):
         fc.surfaces.read(tmp_path / "a.nc", first_row="top")
@@ -317,7 +241,7 @@ def test_channels_of_a_microscope_scan(measured):
         fc.surfaces.read(path, channel="Phase")
 
 
-def test_a_unit_against_that_of_the_file_is_warned_of(measured):
+def test_unit_other_than_that_of_the_file_warns(measured):
     pytest.importorskip("SurfaceTopography")
     with pytest.warns(ScaleWarning, match="states 'mm'"):
         surface = fc.surfaces.read(measured / "instruments" / "tmd-1.tmd", units="um")
@@ -335,7 +259,7 @@ def test_phases_need_a_unit(measured):
     np.testing.assert_allclose(surface.values[0], first * 2.91818e-8, rtol=1e-12)
 
 
-def test_a_corrupt_file_is_refused_in_one_line(measured):
+def test_corrupt_file_has_a_short_message(measured):
     pytest.importorskip("SurfaceTopography")
     with pytest.raises(UnreadableFile, match="corrupt") as caught:
         fc.surfaces.read(measured / "instruments" / "di_corrupted.di")
@@ -343,21 +267,21 @@ def test_a_corrupt_file_is_refused_in_one_line(measured):
     assert len(str(caught.value)) < 300
 
 
-def test_a_microscope_field_of_160_m_is_warned_of_and_mended_by_spacing(measured):
+def test_microscope_field_of_160_m_warns_and_spacing_corrects_it(measured):
     pytest.importorskip("SurfaceTopography")
     path = measured / "instruments" / "nms-1.nms"
     with pytest.warns(ScaleWarning, match="160 m wide.*ratio"):
         wide = fc.surfaces.read(path)
     assert wide.shape == (512, 512)
-    mended = fc.surfaces.read(path, spacing=160e-6 / 512)
-    assert float(mended.x[-1]) < 160e-6
-    assert float(mended.max() - mended.min()) == pytest.approx(3.318e-6, rel=1e-3)
+    corrected = fc.surfaces.read(path, spacing=160e-6 / 512)
+    assert float(corrected.x[-1]) < 160e-6
+    assert float(corrected.max() - corrected.min()) == pytest.approx(3.318e-6, rel=1e-3)
 
 
 @pytest.mark.parametrize("side", ["a", "b"])
 def test_measured_crack_faces(measured, side):
     surface = fc.surfaces.read(measured / f"freiberg_gneiss_side_{side}.npy", spacing=3e-4)
     assert int(surface.isnull().sum()) == {"a": 9, "b": 18}[side]
-    wanted = json.loads((measured / f"freiberg_gneiss_side_{side}.json").read_text())["check"]["rms_plane"]
-    assert float(fc.surfaces.level(surface).std()) == pytest.approx(wanted, rel=0.01)
+    expected = json.loads((measured / f"freiberg_gneiss_side_{side}.json").read_text())["check"]["rms_plane"]
+    assert float(fc.surfaces.level(surface).std()) == pytest.approx(expected, rel=0.01)
     assert int(fc.surfaces.fill(surface).filled_points) == {"a": 9, "b": 18}[side]

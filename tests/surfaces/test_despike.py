@@ -1,0 +1,54 @@
+"""Despiking: inserted spikes are removed, and the surface itself is unchanged."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return fc.surfaces.fbm((120, 90), 3e-4, hurst=0.75, rms_increment=1e-4, rng=4)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_spikes_are_removed_and_nothing_else(surface, seed):
+    rng = np.random.default_rng(seed)
+    spiked = surface.copy(deep=True)
+    places = rng.choice(surface.size, 60, replace=False)
+    spiked.values.ravel()[places] += rng.choice([-1, 1], 60) * rng.uniform(1.2e-3, 5e-3, 60)
+    clean = fc.surfaces.despike(spiked, threshold=8.0)
+    removed = np.isnan(clean.values)
+    assert removed.ravel()[places].mean() > 0.95
+    assert removed.sum() <= 65
+    assert clean.removed_points == removed.sum()
+    np.testing.assert_array_equal(clean.values[~removed], spiked.values[~removed])
+
+
+def test_wide_spike_is_removed_from_its_edge_inwards(surface):
+    spiked = surface.copy(deep=True)
+    spiked.values[50:53, 40:43] += 3e-3
+    spiked.values[70, 10] = np.nan
+    removed = np.isnan(fc.surfaces.despike(spiked, window=7).values)
+    assert removed[50:53, 40:43].all()
+    assert removed[70, 10]
+
+
+def test_slope_is_no_spike_and_units_do_not_matter(surface):
+    x = np.arange(90) * 3e-4
+    tilted = surface + 2.0 * x
+    assert fc.surfaces.despike(tilted, threshold=9.0).removed_points == 0
+    first, second = (fc.surfaces.despike(surface * factor, threshold=4.0) for factor in (1.0, 2.0**20))
+    assert first.removed_points > 0
+    np.testing.assert_array_equal(np.isnan(first), np.isnan(second))
+    flat = fc.surfaces.from_array(np.zeros((9, 9)), 1.0)
+    assert fc.surfaces.despike(flat).removed_points == 0
+
+
+def test_invalid_arguments_are_refused(surface):
+    with pytest.raises(ValueError, match=r"(?s)threshold.*window"):
+        fc.surfaces.despike(surface, threshold=0.0, window=4)
+    with pytest.raises(ValueError, match="infinite"):
+        fc.surfaces.despike(surface.where(surface > surface.min(), np.inf))
+    with pytest.raises(ValueError, match="surface: expected heights"):
+        fc.surfaces.despike(surface * np.nan)

@@ -1,0 +1,89 @@
+"""Properties of every generator: shape, streams, members, units, files; and lean import."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+
+GENERATORS = {
+    "fbm": {"hurst": 0.6, "rms_increment": 1e-6},
+    "midpoint": {"hurst": 0.6, "rms_increment": 1e-6},
+    "spectral": {"hurst": 0.6, "rms_height": 1e-6},
+    "weierstrass": {"hurst": 0.6, "rms_height": 1e-6},
+}
+
+
+def generate(name, shape=(9, 14), spacing=1e-3, rng=1, **options):
+    return getattr(fc.surfaces, name)(shape, spacing, rng=rng, **{**GENERATORS[name], **options})
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+@pytest.mark.parametrize("shape", [(3, 3), (3, 17), (11, 7), (16, 16)])
+def test_shape_and_labels(name, shape):
+    surface = generate(name, shape)
+    assert surface.shape == shape
+    assert surface.dims == ("y", "x")
+    assert np.isfinite(surface.values).all()
+    assert surface.values.std() > 0
+    assert surface.attrs["units"] == "m"
+    assert json.loads(surface.attrs["provenance"])["random"]["entropy"] == "1"
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_same_stream_gives_same_surface(name):
+    np.testing.assert_array_equal(generate(name).values, generate(name).values)
+    assert np.abs(generate(name, rng=2).values - generate(name).values).max() > 0
+    np.testing.assert_array_equal(generate(name, members=3).values[:2], generate(name, members=2).values)
+
+
+@pytest.mark.parametrize("members", [None, 2])
+@pytest.mark.parametrize("name", GENERATORS)
+def test_file_has_the_record_to_repeat_its_surface(name, members, tmp_path):
+    # also for a stream that was drawn from and has spawned
+    stream = np.random.default_rng(8)
+    stream.random(3)
+    stream.spawn(1)
+    surface = generate(name, rng=stream, members=members)
+    reopened = fc.open(fc.save(surface, tmp_path / "surface.nc"))
+    again = generate(name, rng=json.loads(reopened.attrs["provenance"])["random"], members=members)
+    np.testing.assert_array_equal(again.values, surface.values)
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_powers_of_two_change_no_bit(name):
+    lengths = {key: 2.0**20 * value for key, value in GENERATORS[name].items() if key != "hurst"}
+    scaled = generate(name, spacing=1e-3 * 2.0**-20, **lengths)
+    np.testing.assert_array_equal(scaled.values, generate(name).values * 2.0**20)
+
+
+RESULTS = {
+    **{name: lambda name=name: generate(name, members=2) for name in GENERATORS},
+    "from_array": lambda: fc.surfaces.from_array(np.eye(5), 1e-3, periodic=True),
+    "level": lambda: fc.surfaces.level(generate("fbm")),
+    "fill": lambda: fc.surfaces.fill(generate("fbm").where(generate("fbm").x > 2e-3)),
+    "describe": lambda: fc.surfaces.describe(generate("fbm", members=2)),
+    "flat": lambda: fc.surfaces.describe(0.0 * generate("fbm").assign_attrs(units="m")),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_are_cf_compliant_and_round_trip(name, tmp_path, compliance):
+    result = RESULTS[name]()
+    fc.save(result, tmp_path / "a.nc")
+    assert compliance(tmp_path / "a.nc") == []
+    xr.testing.assert_identical(fc.open(tmp_path / "a.nc"), result)
+
+
+def test_subpackage_loads_no_heavy_library():
+    code = (
+        "import sys, numpy, fractalcontact.surfaces as s; [getattr(s, n) for n in s.__all__];"
+        "heavy = {'numba', 'matplotlib', 'skimage', 'dask', 'netCDF4', 'SurfaceTopography'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
