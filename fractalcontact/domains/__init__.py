@@ -1,8 +1,8 @@
-"""What touches: islands of contact, their dimension, their gaps, and how they change.
+"""Geometry of the contact set: islands, dimensions, lacunarity, percolation, and their evolution.
 
-A mask says which cells of the plane are in contact: booleans, or integer flags where contact means a value
-above zero, with dims (..., y, x). Any leading dims, such as the steps of a load path, are kept by every
-function. Start with `describe`, which gives every scalar at once.
+A mask marks the cells of the plane that are in contact: booleans, or integer flags where contact means a
+value above zero, with dims (..., y, x). Every function keeps leading dims, such as the steps of a load path.
+Start with `describe`, which gives all scalars at once.
 """
 
 import lazy_loader

@@ -1,16 +1,16 @@
-from .counting import box_counts as box_counts
-from .counting import box_dimension as box_dimension
-from .crossing import percolation as percolation
-from .descending import lineage as lineage
-from .edges import boundary_dimension as boundary_dimension
-from .following import evolution as evolution
-from .gliding import lacunarity as lacunarity
-from .growing import minkowski_dimension as minkowski_dimension
-from .labelling import islands as islands
-from .moments import generalised_dimensions as generalised_dimensions
-from .pairing import correlation_dimension as correlation_dimension
-from .resolving import area_dimension as area_dimension
-from .summary import describe as describe
+from ._area_scaling import area_dimension as area_dimension
+from ._boundary import boundary_dimension as boundary_dimension
+from ._box_counting import box_counts as box_counts
+from ._box_counting import box_dimension as box_dimension
+from ._correlation import correlation_dimension as correlation_dimension
+from ._describe import describe as describe
+from ._evolution import evolution as evolution
+from ._islands import islands as islands
+from ._lacunarity import lacunarity as lacunarity
+from ._lineage import lineage as lineage
+from ._minkowski import minkowski_dimension as minkowski_dimension
+from ._multifractal import generalised_dimensions as generalised_dimensions
+from ._percolation import percolation as percolation
 
 __all__ = [
     "area_dimension",

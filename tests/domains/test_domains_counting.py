@@ -20,8 +20,8 @@ from domains.sets import (
 from scipy import ndimage
 
 import fractalcontact as fc
-from fractalcontact.domains import _dust
-from fractalcontact.domains._covers import default_sizes
+from fractalcontact.domains import _random_null as _dust
+from fractalcontact.domains._scaling_fit import default_sizes
 
 SIDE = {"carpet": 5, "cantor_dust": 5, "vicsek": 5, "gasket": 8}
 
@@ -287,7 +287,7 @@ def test_dust_probability_against_exact_fractions():
         observed = int(rng.integers(2, 4000))
         cells, region = (int(rng.integers(0, min(observed, top) + 1)) for top in (observed, 60))
         exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
-        assert _dust.missed(cells, observed, np.array(region)) == pytest.approx(exact, rel=1e-11, abs=1e-14)
+        assert _dust.miss_probability(cells, observed, np.array(region)) == pytest.approx(exact, rel=1e-11, abs=1e-14)
 
 
 def test_dust_counts_and_their_spread_against_dusts():
@@ -378,7 +378,7 @@ def test_wrong_calls_list_everything():
     with pytest.raises(fc.base.errors.InvalidInput) as caught:
         fc.domains.box_dimension(mask, scales=[0, 2.5, 99], cover="most", periodic=True)
     text = str(caught.value)
-    for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "whole numbers"):
+    for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "expected integers"):
         assert word in text
 
 

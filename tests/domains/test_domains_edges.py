@@ -6,7 +6,7 @@ import xarray as xr
 from domains.sets import as_mask, level_set
 
 import fractalcontact as fc
-from fractalcontact.domains import _edges
+from fractalcontact.domains import _boundary as _edges
 
 
 def brownian_level_set(n, hurst, rng, coverage=0.5):
@@ -22,7 +22,7 @@ def test_pairs_against_shifted_planes(wraps):
 
     grid = Grid((13, 17), (1.0, 1.0), wraps)
     seen = (cells & valid).astype(np.uint8)
-    pairs, differing = _edges.count(seen, valid.astype(np.uint8), grid)
+    pairs, differing = _edges.count_pairs(seen, valid.astype(np.uint8), grid)
     for place, (down, right) in enumerate(_edges.OFFSETS):
         other, known = (np.roll(a, (-down, -right), (0, 1)) for a in (cells & valid, valid))
         both = valid & known

@@ -102,12 +102,12 @@ def test_many_sizes_by_one_transform_equal_sizes_one_by_one(library, monkeypatch
 
 
 def test_large_boxes_do_not_overflow(monkeypatch):
-    from fractalcontact.domains import _gliding
+    from fractalcontact.domains import _lacunarity as _gliding
 
     cells = np.random.default_rng(6).random((40, 40)) < 0.4
     mask = as_mask(cells, periodic=ROUND)
     whole = fc.domains.lacunarity(mask, np.arange(1, 41)).lacunarity.values
-    monkeypatch.setattr(_gliding, "EXACT", 1000)  # as if the sums were too large for integers
+    monkeypatch.setattr(_gliding, "LARGEST_INT64", 1000)  # as if the sums were too large for integers
     assert fc.domains.lacunarity(mask, np.arange(1, 41)).lacunarity.values == pytest.approx(whole, rel=1e-13)
     some = fc.domains.lacunarity(mask, [1, 20, 40]).lacunarity.values
     assert some == pytest.approx(whole[[0, 19, 39]], rel=1e-13)

@@ -83,7 +83,7 @@ def columns(result, shift):
 @pytest.mark.parametrize("connectivity", [1, 2])
 @pytest.mark.parametrize("wraps", [(False, False), (True, True), (False, True)])
 def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, monkeypatch):
-    from fractalcontact.domains import _labels
+    from fractalcontact.domains import _connected_components as _labels
 
     rng = np.random.default_rng(6)
     for density in (0.2, 0.5, 0.7):
@@ -91,7 +91,7 @@ def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, m
         whole = fc.domains.islands(mask, connectivity=connectivity)
         crossed = fc.domains.percolation(mask, connectivity=connectivity)
         with monkeypatch.context() as patch:
-            patch.setattr(_labels, "BAND", 3 * 17)
+            patch.setattr(_labels, "BAND_CELLS", 3 * 17)
             bands = fc.domains.islands(mask, connectivity=connectivity, keep=())
             assert crossed.percolates.identical(
                 fc.domains.percolation(mask, connectivity=connectivity).percolates
@@ -106,7 +106,7 @@ TABLE = ["cells", "area", "perimeter", "centroid_x", "centroid_y", "x_min", "x_m
 
 
 def test_only_the_wanted_columns_are_measured(monkeypatch):
-    from fractalcontact.domains import _labels
+    from fractalcontact.domains import _connected_components as _labels
 
     mask = as_mask(np.random.default_rng(9).random((2, 30, 20)) < 0.4, periodic=(True, False))
     whole = fc.domains.islands(mask, keep=()).drop_vars("run_time")
@@ -119,8 +119,8 @@ def test_only_the_wanted_columns_are_measured(monkeypatch):
         fc.domains.islands(mask, table=["hue"])
     most = int(whole.n_islands.max())
     with monkeypatch.context() as patch:
-        patch.setattr(_labels, "BAND", 3 * 20)
-        patch.setattr(_labels, "MANY", most - 1)
+        patch.setattr(_labels, "BAND_CELLS", 3 * 20)
+        patch.setattr(_labels, "MANY_ISLANDS", most - 1)
         few = fc.domains.islands(mask, keep=()).drop_vars("run_time")
         assert "name the columns" in few.n_islands.comment
         del few.n_islands.attrs["comment"]

@@ -1,0 +1,144 @@
+"""Area scaling: how the area of contact shrinks as the surface is resolved more finely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.grid import contact_edges
+from fractalcontact.base.results import public_result
+from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.validation import Problems
+from fractalcontact.domains._mask_input import (
+    Array,
+    Planes,
+    build_dataset,
+    check_mask,
+    mask_grid,
+    read_mask,
+)
+from fractalcontact.domains._scaling_fit import ROUNDING, fit_line
+
+# share of a cell by which each side on the boundary makes the area too large (Yastrebov et al. 2017)
+EXCESS_PER_SIDE = (np.pi - 1.0 + np.log(2.0)) / 24.0
+SOURCE = (
+    "Borri-Brunetto, Carpinteri and Chiaia, Int. J. Fracture 95:221 (1999); Ciavarella et al., Proc. R. Soc. "
+    "A 456:387 (2000); Yastrebov, Anciaux and Molinari, Tribology Int. 114:161 (2017) (correction)"
+)
+
+
+def _check(problems: Problems, *, masks: Any, corrected: Any) -> None:
+    problems.boolean("corrected", corrected)
+    is_list = isinstance(masks, (list, tuple)) and len(masks) > 1
+    if not problems.require(is_list, "masks", "a list of two masks or more", masks):
+        return
+    are_valid = [check_mask(problems, mask, argument=f"masks[{k}]") for k, mask in enumerate(masks)]
+    if all(are_valid):
+        _check_same_extent(problems, masks)
+
+
+def _check_same_extent(problems: Problems, masks: Sequence[xr.DataArray]) -> None:
+    """Check that the masks have one extent, the same leading dims, and each its own spacing."""
+    grids = [mask_grid(mask) for mask in masks]
+    first = grids[0]
+    leading = masks[0].dims[:-2], masks[0].shape[:-2]
+    coarsest = max(max(grid.spacing) for grid in grids)
+    for k, (mask, grid) in enumerate(zip(masks, grids, strict=True)):
+        name = f"masks[{k}]"
+        problems.require(grid.known, name, "x and y coordinates", "none")
+        own = mask.dims[:-2], mask.shape[:-2]
+        problems.require(own == leading, f"{name}.dims", f"leading dims {leading[0]} {leading[1]}", own)
+        difference = max(abs(a - b) for a, b in zip(grid.extent, first.extent, strict=True))
+        expected = f"the extent {first.extent} of the first"
+        problems.require(difference <= coarsest, name, expected, grid.extent)
+    sides = [float(np.sqrt(grid.cell_area)) for grid in grids]
+    problems.require(len(set(sides)) == len(sides), "masks", "a spacing of its own for each", sides)
+
+
+@public_result(title="Area of a contact domain by resolution", references=SOURCE, check=_check)
+def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) -> xr.Dataset:
+    """Dimension of a contact domain from its area at several resolutions, A ~ s^(2 - D).
+
+    The masks are solutions of the same contact, each on a surface resolved to another spacing s. This is not
+    the box dimension of one mask, which has a single resolution. For elastic contact of self-affine surfaces
+    theory gives 1 + H, at any load.
+
+    Parameters
+    ----------
+    masks : sequence of DataArray, dims (..., y, x)
+        Boolean, or integer flags where contact means value > 0; with coordinates, of the same extent (to one
+        cell of the coarsest) and the same leading dims.
+    corrected : bool
+        Subtract from each area the excess of the pixels on its boundary (Yastrebov et al.). The correction is
+        for spots that are smooth at the scale of a cell.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims: `area_dimension`, with `ci_low` and `ci_high`, two standard deviations of the
+        local slopes to either side (NaN for two resolutions). Over `resolution` (m; the side of a square with
+        the area of a cell) too: `contact_fraction`, `corrected_contact_fraction`, and `local_slope`,
+        2 - d ln A / d ln s. NaN where a mask is empty.
+
+    Raises
+    ------
+    InvalidInput
+        Fewer than two masks, no coordinates, or extents, leading dims or spacings that do not match.
+
+    Examples
+    --------
+    A Sierpinski carpet, resolved to 27 and to 81 cells a side:
+
+    >>> import numpy as np, xarray as xr, fractalcontact as fc
+    >>> generator, cells = [[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.ones((1, 1), int)
+    >>> masks = []
+    >>> for level in range(1, 5):
+    ...     cells = np.kron(generator, cells)
+    ...     axis = (np.arange(3**level) + 0.5) / 3**level
+    ...     masks.append(xr.DataArray(cells, dims=("y", "x"), coords={"y": axis, "x": axis}))
+    >>> result = fc.domains.area_dimension(masks[2:])
+    >>> round(float(result.area_dimension), 4)  # ln 8 / ln 3
+    1.8928
+    """
+    stacks = sorted((read_mask(mask) for mask in masks), key=lambda planes: planes.side)
+    fractions = [_contact_fractions(planes) for planes in stacks]
+    counted, improved = (np.stack(values, axis=-1) for values in zip(*fractions, strict=True))
+    resolution = np.array([planes.side for planes in stacks])
+    used = improved if corrected else counted
+    with np.errstate(divide="ignore"):
+        logs = np.where(used > 0, np.log(np.maximum(used, 0.0)), np.nan)
+    slope, spread, _ = fit_line(np.log(resolution / resolution[0]), logs)
+    half_width = 2.0 * spread + ROUNDING
+    planes = stacks[0]
+    variables = {
+        "area_dimension": planes.variable(2.0 - slope),
+        "ci_low": planes.variable(2.0 - slope - half_width),
+        "ci_high": planes.variable(2.0 - slope + half_width),
+        "contact_fraction": planes.variable(counted, "resolution"),
+        "corrected_contact_fraction": planes.variable(improved, "resolution"),
+        "local_slope": planes.variable(2.0 - local_slope(resolution, used), "resolution"),
+    }
+    coords = {"resolution": ("resolution", resolution)}
+    return build_dataset(planes, variables, coords, notes=_notes(slope))
+
+
+def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
+    """Return the share of cells in contact, as counted and corrected for its boundary."""
+    cells = float(np.prod(planes.grid.shape))
+    sides = contact_edges(planes.cells, planes.grid.periodic).sum(-1)
+    return planes.occupied / cells, (planes.occupied - EXCESS_PER_SIDE * sides) / cells
+
+
+def _notes(slope: Array) -> dict[str, dict[str, Any]]:
+    interval = "dimension by area (two standard deviations of the local slopes)"
+    notes = {
+        "ci_low": {"long_name": f"lower end of the interval of the {interval}"},
+        "ci_high": {"long_name": f"upper end of the interval of the {interval}"},
+        "local_slope": {"long_name": "local dimension, 2 - d ln(area)/d ln(resolution)"},
+    }
+    if np.isnan(slope).any():
+        notes["area_dimension"] = {"comment": "NaN where the set is empty at some resolution"}
+    return notes

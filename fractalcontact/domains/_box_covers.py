@@ -1,0 +1,324 @@
+"""Numbers of boxes that meet a set, for three covers: fewest, mean and aligned; arrays in and out.
+
+Two numbers are kept for every size. The count is of whole boxes. The measure, which the fit uses, counts a
+box cut by the edge of the mask by its part inside, where the set continues in the next box; a set that fills
+the mask then has n/s boxes along each axis and not the next integer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fractalcontact.base.jit import kernel
+from fractalcontact.domains._mask_input import Array, Planes, parallel_map
+
+COVERS = ("minimum", "mean", "aligned")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Count and measure of the boxes, each of shape (planes, sizes)."""
+
+    sizes: Array
+    count: Array
+    area: Array  # of the boxes that meet the set, in cells
+
+    @property
+    def measure(self) -> Array:
+        """Boxes that meet the set, those cut by the edge by their part inside."""
+        return np.asarray(self.area / self.sizes.astype(float) ** 2)
+
+
+def cover_curve(planes: Planes, sizes: Array, cover: str) -> Curve:
+    """Return the curve of the named cover, its measure corrected for cells that were not observed.
+
+    The measure is divided by the share of the boxes' area that was observed, where the boxes are those that
+    hold an observed cell; a set that fills what was observed then has the dimension 2.
+    """
+    by_name = {"minimum": _minimum_cover, "mean": _mean_cover, "aligned": _aligned_cover}
+    curve = by_name[cover](planes, sizes)
+    if planes.valid is None:
+        return curve
+    everything = Planes(planes.valid, None, planes.grid)
+    seen = by_name[cover](everything, sizes).area
+    return Curve(
+        sizes, curve.count, curve.area * everything.occupied[:, None] / np.where(seen > 0, seen, np.nan)
+    )
+
+
+def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
+    """Fewest boxes over all offsets of the grid."""
+
+    def fewest(task: tuple[Array, int]) -> tuple[int, int]:
+        count, area = _counts_by_offset(task[0], task[1], planes.grid.periodic)
+        return int(count.min()), int(area.min())
+
+    tasks = [(cells, int(size)) for cells in planes.cells for size in sizes]
+    values = np.array(parallel_map(fewest, tasks), np.int64).reshape(planes.count, sizes.size, 2)
+    return Curve(sizes, values[..., 0], values[..., 1].astype(float))
+
+
+def _counts_by_offset(cells: Array, size: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
+    """Return the boxes that meet the set, and their area in cells, for every offset of the grid (y, x)."""
+    nx = cells.shape[1]
+    row_bands, column_bands = (_bands(n, size, wraps) for n, wraps in zip(cells.shape, periodic, strict=True))
+    # ascending, so that the column sums of a band follow from those of the band before it
+    row_bands = row_bands[np.lexsort((row_bands[:, 1], row_bands[:, 0]))]
+    is_full = column_bands[:, 1] - column_bands[:, 0] == size
+    count, area = np.zeros((2, size, size), np.int64)
+    summed_rows = np.zeros((2, 2), np.int64)
+    columns = np.zeros((3, nx), np.int32)
+    prefix = np.zeros((2, nx + 1 + (2 * size if periodic[1] else 0)), np.int32)
+    met, lost = np.zeros((2, size, int(is_full.sum())), np.int32)
+    count_boxes_in_bands(
+        cells, size, row_bands, column_bands[~is_full], summed_rows, columns, prefix, met, lost, count, area
+    )
+    count += _sum_by_offset(met, size)
+    area += size * (size * _sum_by_offset(met, size) - _sum_by_offset(lost, size))
+    return count, area
+
+
+def _sum_by_offset(values: Array, size: int) -> Array:
+    """Add up the positions of boxes that belong to the same offset in x."""
+    ends = -values.shape[1] % size
+    padded = np.pad(values, ((0, 0), (0, ends)))
+    return np.asarray(padded.reshape(size, -1, size).sum(1, dtype=np.int64))
+
+
+def _bands(n: int, size: int, wraps: bool) -> Array:
+    """Cut an axis of n cells into bands of `size`, for every offset of the grid.
+
+    Each row is (start, stop, start and stop including the neighbouring bands, offset). Full bands come first,
+    in order. On a free axis the bands at the ends are cut; on a periodic one there is a remainder between the
+    last band and the first, where starts and stops may lie beyond n. Neighbours are given for cut bands only.
+    """
+    start = np.arange(n // size * size if wraps else n - size + 1)
+    full = np.stack([start, start + size, 0 * start, 0 * start, start % size], axis=-1)
+    if wraps:
+        offset = np.arange(size)
+        start, stop = offset + n // size * size, offset + n
+        beyond = size if n >= size else 0
+        ends = np.stack([start, stop, start - beyond, stop + beyond, offset], axis=-1)[start < stop]
+    else:
+        cut = np.arange(1, size)  # cells of the band at the low end, or of that at the high end
+        top = np.stack([0 * cut, cut, 0 * cut, cut + size, cut], axis=-1)
+        bottom = np.stack([n - cut, 0 * cut + n, n - cut - size, 0 * cut + n, (n - cut) % size], axis=-1)
+        ends = np.concatenate([top, bottom[cut <= n]])
+        ends[:, :4] = np.clip(ends[:, :4], 0, n)
+    return np.concatenate([full, ends]).astype(np.int64)
+
+
+def _mean_cover(planes: Planes, sizes: Array) -> Curve:
+    """Number of boxes averaged over all offsets of the grid.
+
+    The mean has a measure of its own: boxes that hang over opposite edges by the same cut count once.
+    """
+    largest = int(sizes.max())
+    positions = parallel_map(
+        lambda cells: _positions_that_meet(cells, largest, planes.grid.periodic), planes.cells
+    )
+    every, folded = (np.array([pair[k][sizes] for pair in positions], float) for k in (0, 1))
+    return Curve(sizes, every / sizes.astype(float) ** 2, folded)
+
+
+def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
+    """Return the positions at which a box meets the set, for all sizes up to `largest` (index 0 is unused).
+
+    Divided by size^2 they are the number of boxes averaged over the offsets of the grid. The first array has
+    every box that hangs over a free edge; in the second, boxes that hang over opposite edges by the same cut
+    count once. No free axis is shorter than `largest`.
+    """
+    ny, nx = cells.shape
+    ahead = [(0, largest if wraps else 0) for wraps in periodic]
+    distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
+    histogram = np.zeros(largest + 2, np.int64)
+    nearest_ahead(np.pad(cells, ahead, mode="wrap"), ny, nx, distance, histogram)
+    every = np.cumsum(histogram)[: largest + 1]  # with the boxes that hang over the far edges
+    folded = every.copy()
+    free = {axis: _from_edges(cells, axis, largest) for axis in (0, 1) if not periodic[axis]}
+    for axis, (low, high) in free.items():
+        hanging = _over_edge(np.stack([low, high, np.minimum(low, high)]), largest, periodic[1 - axis])
+        every += hanging[0]
+        folded += hanging[2] - hanging[1]
+    if len(free) == 2:
+        left, right = free[1]
+        nearer = np.minimum(left, right)
+        nearer = np.minimum(nearer, nearer[::-1])
+        corners = _over_corner(np.stack([left, right, left[::-1], right[::-1], nearer]), largest)
+        every += corners[:3].sum(axis=0)
+        folded += corners[4] - corners[3]
+    return every, folded
+
+
+def _from_edges(cells: Array, axis: int, reach: int) -> Array:
+    """Return the cells from both ends of each line along `axis` to the set, `reach` where there are more."""
+    lines = np.moveaxis(cells.view(np.bool_), axis, 0)
+    ends = np.stack([lines[:reach], lines[: -reach - 1 : -1]])
+    return np.where(ends.any(axis=1), ends.argmax(axis=1), reach)
+
+
+def _over_edge(first: Array, largest: int, wrap: bool) -> Array:
+    """Count the positions of boxes of all sizes that hang over one edge and meet the set, (edges, sizes).
+
+    `first` (edges, n) is how far from the edge each line of cells across it meets the set.
+    """
+    n = first.shape[1]
+    totals = np.zeros((len(first), largest + 1), np.int64)
+    following = np.pad(first, ((0, 0), (0, largest - 1)), mode="wrap") if wrap else first
+    nearest = following
+    for size in range(2, largest + 1):
+        last = n if wrap else n - size + 1
+        nearest = np.minimum(nearest[:, :last], following[:, size - 1 : size - 1 + last])
+        totals[:, size] = np.maximum(size - 1 - nearest, 0).sum(axis=1)
+    return totals
+
+
+def _over_corner(first: Array, largest: int) -> Array:
+    """Count the positions of boxes of all sizes that hang over two edges and meet the set, (corners, sizes).
+
+    `first` (corners, n) is how far from one edge each line of cells meets the set, from the other edge
+    inwards.
+    """
+    nearest = np.minimum.accumulate(first[:, :largest], axis=1)
+    needed = np.maximum(np.arange(nearest.shape[1]), nearest) + 2  # the size from which on they meet it
+    places = np.minimum(needed, largest + 1) + (largest + 2) * np.arange(len(first))[:, None]
+    number, less = (
+        np.bincount(places.ravel(), weight, len(first) * (largest + 2)).reshape(len(first), -1).cumsum(axis=1)
+        for weight in (None, nearest.ravel())
+    )
+    totals = (np.arange(largest + 2) - 1) * number - less
+    return np.asarray(totals[:, : largest + 1], np.int64)
+
+
+def _aligned_cover(planes: Planes, sizes: Array) -> Curve:
+    """Boxes of the one grid that starts at the first cell."""
+
+    def counts(cells: Array) -> list[int]:
+        levels = {1: cells}
+        for size in map(int, sizes):
+            coarsest = max(other for other in levels if size % other == 0)
+            levels[size] = (
+                levels[coarsest] if coarsest == size else _coarsen(levels[coarsest], size // coarsest)
+            )
+        return [int(np.count_nonzero(levels[int(size)].view(np.bool_))) for size in sizes]
+
+    values = np.array(parallel_map(counts, planes.cells), np.int64).reshape(planes.count, sizes.size)
+    return Curve(sizes, values, values * sizes.astype(float) ** 2)
+
+
+def _coarsen(cells: Array, factor: int) -> Array:
+    """Mark the boxes of `factor` cells, on the grid from the first cell, that hold a cell of the set."""
+    ny, nx = cells.shape
+    if factor == 2 and nx % 2 == 0:
+        coarse = np.empty((-(-ny // 2), nx // 2), np.uint8)
+        halve(cells.view(np.uint16), coarse)
+        return coarse
+    rows = np.bitwise_or.reduceat(cells, np.arange(0, ny, factor), axis=0)
+    return np.bitwise_or.reduceat(rows, np.arange(0, nx, factor), axis=1)
+
+
+@kernel
+def count_boxes_in_bands(
+    mask: Array,
+    size: int,
+    rows: Array,
+    cut: Array,
+    summed_rows: Array,
+    columns: Array,
+    prefix: Array,
+    met: Array,
+    lost: Array,
+    count: Array,
+    area: Array,
+) -> None:
+    """Add the boxes that meet the set in all bands of rows; `mask` is uint8 (0 or 1), shape (ny, nx).
+
+    `rows` lists the bands of rows by their start, then by their stop, `cut` the bands of columns that are
+    cut by the edge (see `_bands`). `met` and `lost` (size, positions) get for each full band of columns the
+    boxes met, and the rows that those of them lose that count by their part inside; `count` and `area`
+    (size, size) the boxes cut in x and their area in cells. All sums are integers, so that no result depends
+    on their order.
+
+    The others are zeros to work in, for the band and, where it is cut in y, for it with its neighbours:
+    `summed_rows` (2, 2) the range of rows in `columns`, `columns` (3, nx) the cells of the set in each column
+    (and, last, none), `prefix` (2, at least nx + 1) how many columns left of each position hold any, or hold
+    more than in the band; it continues periodically where it is longer.
+    """
+    ny, nx = mask.shape
+    ahead = np.uint32(size)  # unsigned: no test for negative indices
+    for k in range(rows.shape[0]):
+        first, end, offset = rows[k, 0], rows[k, 1], rows[k, 4]
+        missing = size - (end - first)
+        for w in range(2 if missing > 0 else 1):
+            start, stop = rows[k, 2 * w], rows[k, 2 * w + 1]
+            if stop < summed_rows[w, 1]:  # periodic: the remainder ends before the last full band
+                summed_rows[w, 0] = summed_rows[w, 1] = start
+                for j in range(nx):
+                    columns[w, j] = 0
+            for i in range(summed_rows[w, 0], start):
+                for j in range(nx):
+                    columns[w, j] -= mask[i % ny, j]
+            for i in range(summed_rows[w, 1], stop):
+                for j in range(nx):
+                    columns[w, j] += mask[i % ny, j]
+            summed_rows[w, 0], summed_rows[w, 1] = start, stop
+            total = 0
+            for j in range(nx):
+                total += columns[w, j] > columns[2 - 2 * w, j]
+                prefix[w, j + 1] = total
+            for j in range(nx + 1, prefix.shape[1]):
+                prefix[w, j] = total + prefix[w, j - nx]
+        if missing > 0:
+            for j in range(met.shape[1]):
+                inside = prefix[0, j + ahead] > prefix[0, j] and prefix[1, j + ahead] > prefix[1, j]
+                lost[offset, j] += missing * inside
+        for j in range(met.shape[1]):
+            met[offset, j] += prefix[0, j + ahead] > prefix[0, j]
+        for c in range(cut.shape[0]):
+            left, right, column = cut[c, 0], cut[c, 1], cut[c, 4]
+            here = prefix[0, right] - prefix[0, left]
+            if here > 0:
+                alone = prefix[0, cut[c, 3]] - prefix[0, cut[c, 2]] == here
+                above = missing == 0 or prefix[1, right] == prefix[1, left]
+                count[offset, column] += 1
+                area[offset, column] += (size if alone else right - left) * (size if above else end - first)
+
+
+@kernel
+def nearest_ahead(cells: Array, rows: int, columns: int, distance: Array, histogram: Array) -> None:
+    """Count the positions in the first `rows` and `columns` by the size from which on a box meets the set.
+
+    A box at (i, j) of size s meets the set if s >= d(i, j), where d is one on the set and elsewhere one more
+    than the smallest d of the three neighbours ahead: a one-sided chessboard distance. Beyond an edge the set
+    is empty; a periodic axis is continued for the longest box. `distance` (nx + 1) int32 holds largest + 1
+    everywhere, `histogram` (largest + 2) zeros.
+    """
+    nx = cells.shape[1]
+    far = distance[nx]
+    for i in range(cells.shape[0] - 1, -1, -1):
+        beyond, corner = far, far  # values at j + 1, in this row and in the row below
+        for j in range(nx - 1, -1, -1):
+            below = distance[j]
+            nearest = corner if corner < below else below
+            nearest = beyond if beyond < nearest else nearest
+            beyond = 1 if cells[i, j] else nearest + 1
+            corner = below
+            distance[j] = beyond
+        if i < rows:
+            for j in range(columns):
+                histogram[distance[j] if distance[j] < far else far] += 1
+
+
+@kernel
+def halve(pairs: Array, coarse: Array) -> None:
+    """Halve the resolution: join two rows and, with two cells in each 16-bit word, two columns."""
+    ny = pairs.shape[0]
+    for i in range(coarse.shape[0]):
+        upper, lower = pairs[2 * i], pairs[min(2 * i + 1, ny - 1)]
+        out = coarse[i]
+        for j in range(pairs.shape[1]):
+            both = upper[j] | lower[j]
+            out[j] = np.uint8((both | (both >> np.uint16(8))) & np.uint16(1))

@@ -1,0 +1,345 @@
+"""Connected components of a plane, joined across periodic edges by union-find, and their measures.
+
+Each band of rows is labelled by `scipy.ndimage.label`. Union-find with displacements then joins the labelled
+parts across the borders of the bands and across periodic edges, so that islands that wrap around a period
+are recognised; arrays in and out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from fractalcontact.base.grid import Grid
+from fractalcontact.base.jit import kernel
+from fractalcontact.domains._mask_input import Array, Planes, parallel_map
+
+STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
+BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept
+MANY_ISLANDS = 2**22  # of a plane, above which only their cells are measured by default
+INT64_MAX = np.iinfo(np.int64).max
+
+PLAIN_COLUMNS = ("cells", "area")
+COLUMNS = (*PLAIN_COLUMNS, "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
+
+
+@dataclass(frozen=True)
+class PartMeasures:
+    """Sums over every part (see `measure_parts`); the part k is at index k - 1."""
+
+    sums: Array
+    sides: Array
+    box: Array
+
+
+@dataclass(frozen=True)
+class Components:
+    """Islands of one plane.
+
+    The connected parts of each band of rows are numbered from 1 (0 outside). The part `merged[k]` (ascending)
+    belongs to the island that begins with the part `root[k]`, and is displaced by `shift[k]` periods (y, x)
+    from where it continues the rest of it; every other part begins an island of its own. The island that
+    begins with the part `wrapping[k]` wraps around the period along the axes (y, x) where `wraps[k]` is True.
+    `cells` counts those of every part, and `details` holds its other measures where they were requested.
+    `ends` are the parts at the first and last row and column; `parts` is the map of parts, (ny, nx) int32, or
+    None where it was not kept.
+    """
+
+    merged: Array
+    root: Array
+    shift: Array
+    wrapping: Array
+    wraps: Array
+    cells: Array
+    details: PartMeasures | None
+    ends: tuple[Array, Array, Array, Array]
+    parts: Array | None
+
+    @property
+    def count(self) -> int:
+        """Number of islands."""
+        return int(self.cells.size - self.merged.size)
+
+    @property
+    def sizes(self) -> Array:
+        """Number of cells of every island."""
+        return self.reduce(self.cells)
+
+    @property
+    def wraps_by_island(self) -> Array:
+        """Whether each island wraps around the period, (islands, 2) for (y, x)."""
+        wraps = np.zeros((self.count, 2), bool)
+        wraps[self.number(self.wrapping) - 1] = self.wraps
+        return wraps
+
+    @property
+    def map(self) -> Array:
+        """Number of the island at every cell, (ny, nx) int32."""
+        if self.parts is None:
+            raise ValueError("the map of the islands was not kept")
+        return np.asarray(self.number(np.arange(self.cells.size + 1)).astype(np.int32)[self.parts])
+
+    def number(self, parts: Array) -> Array:
+        """Return the islands, numbered from 1 in the order of their first cells, that parts belong to."""
+        first_part = parts.copy()
+        is_merged = np.isin(parts, self.merged)
+        first_part[is_merged] = self.root[np.searchsorted(self.merged, parts[is_merged])]
+        return first_part - np.searchsorted(self.merged, first_part)
+
+    def reduce(self, values: Array, ufunc: np.ufunc = np.add) -> Array:
+        """Reduce a measure of the parts over every island."""
+        if self.merged.size == 0:
+            return values
+        total = values.copy()
+        ufunc.at(total, self.root - 1, values[self.merged - 1])
+        return np.delete(total, self.merged - 1)
+
+    def part_shift(self, axis: int) -> Array:
+        """Return the shift of every part along an axis, in periods."""
+        shift = np.zeros(self.cells.size, np.int64)
+        shift[self.merged - 1] = self.shift[:, axis]
+        return shift
+
+    def percolates(self, axis: int, periodic: bool) -> bool:
+        """Return whether an island wraps around a periodic axis, or touches both ends of a free one."""
+        if periodic:
+            return bool(self.wraps[:, axis].any())
+        first, last = (np.unique(self.number(end[end > 0])) for end in self.ends[2 * axis : 2 * axis + 2])
+        return bool(np.intersect1d(first, last).size)
+
+
+def label_planes(
+    planes: Planes, connectivity: int, *, keep: bool = True, detailed: bool | None = False
+) -> list[Components]:
+    """Find the islands of every plane; see `label_plane`."""
+    periodic = planes.grid.periodic
+    return parallel_map(
+        lambda cells: label_plane(cells, connectivity, periodic, keep=keep, detailed=detailed), planes.cells
+    )
+
+
+def label_plane(
+    cells: Array, connectivity: int, periodic: Sequence[bool], *, keep: bool, detailed: bool | None = False
+) -> Components:
+    """Find the islands of a plane; connectivity 1 joins 4 neighbours, 2 joins 8.
+
+    Without `keep` no map is made, and the plane is labelled in bands of rows. `detailed` measures more than
+    cells; None does so for at most `MANY_ISLANDS`.
+    """
+    wrap_y, wrap_x = periodic
+    ny, nx = cells.shape
+    height = ny if keep else max(1, BAND_CELLS // nx)
+    steps = (0,) if connectivity == 1 else (-1, 0, 1)
+    count_dtype = np.int32 if cells.size < 2**31 else np.int64
+    measures = detailed is not False
+    count, links, counts, columns = 0, [], [], []
+    rows: list[Array] = []
+    details: list[tuple[Array, ...]] = []
+    for start in range(0, ny, height):
+        parts, number = ndimage.label(cells[start : start + height], STRUCTURES[connectivity])
+        counts.append(np.bincount(parts.ravel(), minlength=number + 1)[1:].astype(count_dtype))
+        measures &= detailed is not None or count + number <= MANY_ISLANDS
+        if measures:
+            arrays = _empty_measures(number + 1)
+            measure_parts(parts, cells, start, wrap_y, wrap_x, *arrays)
+            details.append(tuple(values[1:] for values in arrays))
+        else:
+            details.clear()
+        parts[parts > 0] += count
+        links += [_links(rows[-1], parts[0], step, wrap_x, down=0) for step in steps if rows]
+        rows += [parts[0].copy(), parts[-1].copy()]
+        columns.append(parts[:, [0, -1]].copy())
+        count += number
+    left, right = np.concatenate(columns).T
+    ends = (rows[0], rows[-1], left, right)
+    links += [_links(rows[-1], rows[0], step, wrap_x, down=1) for step in steps if wrap_y]
+    links += [_links(right, left, step, wrap_y, down=1)[:, [0, 1, 3, 2]] for step in steps if wrap_x]
+    joined = _join(np.concatenate([np.empty((0, 4), np.int64), *links]))
+    measured = (
+        PartMeasures(*(np.concatenate(each) for each in zip(*details, strict=True))) if measures else None
+    )
+    return Components(*joined, np.concatenate(counts), measured, ends, parts if keep else None)
+
+
+def _join(links: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Join parts by links; return `merged`, `root`, `shift`, `wrapping` and `wraps` of `Components`."""
+    linked, places = np.unique(links[:, :2], return_inverse=True)
+    parent, shift = np.arange(linked.size), np.zeros((linked.size, 2), np.int64)
+    wraps = np.zeros((linked.size, 2), bool)
+    union_find(np.concatenate([places.reshape(-1, 2), links[:, 2:]], axis=1), parent, shift, wraps)
+    is_root = parent == np.arange(linked.size)
+    wrapping = is_root & wraps.any(1)
+    return linked[~is_root], linked[parent[~is_root]], shift[~is_root], linked[wrapping], wraps[wrapping]
+
+
+def _empty_measures(parts: int) -> tuple[Array, Array, Array]:
+    box = np.tile(np.array([INT64_MAX, -INT64_MAX, INT64_MAX, -INT64_MAX]), (parts, 1))
+    return np.zeros((parts, 3), np.int64), np.zeros((parts, 2), np.int64), box
+
+
+def _links(edge: Array, facing: Array, step: int, wraps: bool, *, down: int) -> Array:
+    """Return links (part, part, periods y, periods x) from cell k of an edge to cell k + step of the next."""
+    n = edge.size
+    target = np.arange(n) + step
+    inside = np.ones(n, bool) if wraps else (target >= 0) & (target < n)
+    other = facing[target % n]
+    good = inside & (edge > 0) & (other > 0)
+    links = np.stack([edge, other, np.full(n, down), target // n], axis=-1)[good]
+    return np.unique(links.astype(np.int64), axis=0)
+
+
+def component_table(
+    components: Components, grid: Grid, origin: Sequence[float], columns: Sequence[str]
+) -> dict[str, Array]:
+    """Return columns out of `COLUMNS` for every island, in metres.
+
+    `origin` holds the first cell centres (y, x). The perimeter is along sides of cells, towards open cells
+    inside the extent. An island that wraps around a period has no centroid along it (NaN), and spans it.
+    """
+    size = components.sizes
+    table: dict[str, Array] = {}
+    if "cells" in columns:
+        table["cells"] = size.astype(np.int64)
+    if "area" in columns:
+        table["area"] = size * grid.cell_area
+    if components.details is None:
+        return table
+    dy, dx = grid.spacing
+    sides = components.details.sides
+    table["perimeter"] = components.reduce(sides[:, 0]) * dx + components.reduce(sides[:, 1]) * dy
+    for axis, name in enumerate(("y", "x")):
+        table |= _positions(components, components.details, size, grid, origin, axis, name)
+    return {name: table[name] for name in columns}
+
+
+def _positions(
+    components: Components,
+    details: PartMeasures,
+    size: Array,
+    grid: Grid,
+    origin: Sequence[float],
+    axis: int,
+    name: str,
+) -> dict[str, Array]:
+    """Return centroid and bounding box of every island along an axis."""
+    n, spacing, wraps = grid.shape[axis], grid.spacing[axis], components.wraps_by_island[:, axis]
+    first = origin[axis] - 0.5 * spacing
+    shift = components.part_shift(axis) * n
+    low = components.reduce(details.box[:, 2 * axis] + shift, np.minimum)
+    high = components.reduce(details.box[:, 2 * axis + 1] + shift + 1, np.maximum)
+    turn = low // n * n  # back to where the first cell lies inside the extent
+    centre = components.reduce(details.sums[:, axis + 1] + details.sums[:, 0] * shift) / size + 0.5
+    return {
+        f"centroid_{name}": np.where(wraps, np.nan, first + centre % n * spacing),
+        f"{name}_min": first + np.where(wraps, 0, low - turn) * spacing,
+        f"{name}_max": first + np.where(wraps, n, high - turn) * spacing,
+    }
+
+
+def euler_number(cells: Array, connectivity: int, periodic: Sequence[bool]) -> int:
+    """Return the number of islands less that of holes, from counts of cells, sides and corners."""
+    wrap_y, wrap_x = periodic
+    ny, nx = cells.shape
+    corners = ny if wrap_y else ny + 1  # rows of corners, each between a row of cells and the one before
+    height = max(1, BAND_CELLS // nx)
+    total = int(np.count_nonzero(cells))
+    for start in range(0, corners, height):
+        rows = np.arange(start - 1, min(start + height, corners))
+        inside = cells[rows % ny] > 0
+        if not wrap_y:
+            inside[(rows < 0) | (rows >= ny)] = False
+        before = inside[:, -1:] if wrap_x else np.zeros_like(inside[:, :1])
+        inside = np.concatenate([before, inside, *([] if wrap_x else [before])], axis=1)
+        total += _corners_less_sides(inside, connectivity)
+    return total
+
+
+def _corners_less_sides(inside: Array, connectivity: int) -> int:
+    """Count at every corner of four cells: the corner, less the side after it and the side below it."""
+    a, b, c, d = inside[:-1, :-1], inside[:-1, 1:], inside[1:, :-1], inside[1:, 1:]
+    if connectivity == 2:  # closed cells: every side and corner they touch
+        return int(np.count_nonzero(a | b | c | d) - np.count_nonzero(b | d) - np.count_nonzero(c | d))
+    return int(np.count_nonzero(a & b & c & d) - np.count_nonzero(b & d) - np.count_nonzero(c & d))
+
+
+@kernel
+def _find_root(parent: Array, shift: Array, part: int) -> int:
+    """Follow a part to the root of its island; its shift becomes that from the root."""
+    root = part
+    down, right = 0, 0
+    while parent[root] != root:
+        down += shift[root, 0]
+        right += shift[root, 1]
+        root = parent[root]
+    while parent[part] != root and part != root:  # path compression
+        above = parent[part]
+        step_down, step_right = shift[part, 0], shift[part, 1]
+        parent[part] = root
+        shift[part, 0], shift[part, 1] = down, right
+        down -= step_down
+        right -= step_right
+        part = above
+    return root
+
+
+@kernel
+def union_find(links: Array, parent: Array, shift: Array, wraps: Array) -> None:
+    """Join parts by links (part, part, periods y, periods x), the displacement of the second part.
+
+    `parent` (parts), each at first its own, gets the root of every part; `shift` (parts, 2) its displacement
+    in periods (y, x) from the root; `wraps` (parts, 2), for every root, whether the island closes on itself
+    along y and along x: two paths between its parts then differ in their displacement.
+    """
+    for link in range(links.shape[0]):
+        first, second = links[link, 0], links[link, 1]
+        root, other_root = _find_root(parent, shift, first), _find_root(parent, shift, second)
+        down = shift[first, 0] + links[link, 2] - shift[second, 0]
+        right = shift[first, 1] + links[link, 3] - shift[second, 1]
+        if root == other_root:
+            wraps[root, 0] |= down != 0
+            wraps[root, 1] |= right != 0
+        else:
+            top, under = (root, other_root) if root < other_root else (other_root, root)
+            sign = 1 if top == root else -1
+            parent[under] = top
+            shift[under, 0], shift[under, 1] = sign * down, sign * right
+            wraps[top, 0] |= wraps[under, 0]
+            wraps[top, 1] |= wraps[under, 1]
+    for part in range(parent.size):
+        _find_root(parent, shift, part)
+
+
+@kernel
+def measure_parts(
+    parts: Array, cells: Array, start: int, wrap_y: bool, wrap_x: bool, sums: Array, sides: Array, box: Array
+) -> None:
+    """Add up the parts of a band of rows that begins at row `start` of the plane.
+
+    `sums` (parts, 3) gets cells, rows and columns; `sides` (parts, 2) the sides across y and across x that
+    face open cells; `box` (parts, 4) the first and last row and column, and holds wide limits before.
+    """
+    ny, nx = cells.shape
+    for k in range(parts.shape[0]):
+        i = start + k
+        for j in range(nx):
+            part = parts[k, j]
+            if part == 0:
+                continue
+            sums[part, 0] += 1
+            sums[part, 1] += i
+            sums[part, 2] += j
+            box[part, 0] = min(box[part, 0], i)
+            box[part, 1] = max(box[part, 1], i)
+            box[part, 2] = min(box[part, 2], j)
+            box[part, 3] = max(box[part, 3], j)
+            if (i > 0 or wrap_y) and cells[i - 1, j] == 0:
+                sides[part, 0] += 1
+            if (i < ny - 1 or wrap_y) and cells[(i + 1) % ny, j] == 0:
+                sides[part, 0] += 1
+            if (j > 0 or wrap_x) and cells[i, j - 1] == 0:
+                sides[part, 1] += 1
+            if (j < nx - 1 or wrap_x) and cells[i, (j + 1) % nx] == 0:
+                sides[part, 1] += 1

@@ -1,0 +1,177 @@
+"""Description of a set: the measures of every function of this subpackage, collected in one dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.grid import contact_edges
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.domains import _boundary, _box_counting, _correlation, _lacunarity, _minkowski
+from fractalcontact.domains._connected_components import Components, label_planes
+from fractalcontact.domains._islands import island_scalars
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_mask, read_mask
+from fractalcontact.domains._percolation import AXES, crossings, percolation_name
+
+ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
+    "box_dimension": _box_counting.analyse,
+    "minkowski_dimension": _minkowski.analyse,
+    "correlation_dimension": _correlation.analyse,
+    "boundary_dimension": _boundary.analyse,
+    "lacunarity": _lacunarity.analyse,
+}
+MEASURES = ("islands", "percolation", *ANALYSES)
+LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
+
+Variable = tuple[tuple[str, ...], Array]
+
+
+def _check(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
+    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
+    check_mask(problems, mask, valid=valid, periodic=periodic)
+
+
+@public_result(title="Description of a set", check=_check)
+def describe(
+    mask: xr.DataArray,
+    *,
+    connectivity: int = 1,
+    periodic: bool | None = None,
+    valid: xr.DataArray | None = None,
+) -> xr.Dataset:
+    """Describe a set by all scalar measures of this subpackage, along any leading dims.
+
+    Parameters
+    ----------
+    mask : DataArray, dims (..., y, x)
+        Boolean, or integer flags where contact means value > 0.
+    connectivity : {1, 2}
+        1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
+    periodic : bool, optional
+        Whether the set continues across the edges; by default as the axes say. True needs periodic axes.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Observed cells.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims: `coverage`; `total_perimeter` (m), along the sides of cells inside the extent;
+        `n_islands`, `largest_cells`, `largest_island`, `mean_island_area` (m2), `euler_number` (see
+        `islands`); `largest_share` and, over `axis`, `percolates` (see `percolation`); `box_dimension`,
+        `null_dimension`, `null_spread`, `differs_from_random` (see `box_dimension`); `minkowski_dimension`,
+        `correlation_dimension`, `boundary_dimension`; each dimension with its interval (`_low`, `_high`);
+        `minkowski_null_dimension`, `correlation_null_dimension` of the random null; `boundary_sides`;
+        `lacunarity` and `null_lacunarity` at the `box_size` of 8 cells, or of the shorter side if that is
+        less; `lacunarity_slope`, `lacunarity_area` and those of the null (see `lacunarity`).
+
+    Raises
+    ------
+    InvalidInput
+        The mask, `connectivity`, `periodic` or `valid` is not as described.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr, fractalcontact as fc
+    >>> mask = xr.DataArray(np.indices((32, 32)).sum(0) < 16, dims=("y", "x"))
+    >>> result = fc.domains.describe(mask)
+    >>> int(result.n_islands), round(float(result.coverage), 3), result.percolates.values.tolist()
+    (1, 0.133, [False, False])
+    """
+    planes = read_mask(mask, valid=valid, periodic=periodic)
+    components = label_planes(planes, connectivity, keep=False)
+    measurements = measure_planes(planes, MEASURES, components, connectivity)
+    size = min(LACUNARITY_BOX, *planes.grid.shape)
+    at_size = _lacunarity.analyse(planes, [size]).isel(box_size=0)
+    variables: dict[str, Any] = {
+        **measurements.scalars(),
+        "percolates": measurements.variables["percolates"],
+        **{name: (planes.dims, at_size[name].values) for name in ("lacunarity", "null_lacunarity")},
+    }
+    coords = {"axis": measurements.coords["axis"], "box_size": ((), np.int64(size))}
+    notes = {name: note for name, note in measurements.notes.items() if name in variables}
+    return build_dataset(planes, variables, coords, notes=notes)
+
+
+class Measurements:
+    """Variables, coordinates and notes of several analyses of the same planes."""
+
+    def __init__(self, planes: Planes) -> None:
+        self.planes = planes
+        self.variables: dict[str, Variable] = {"coverage": planes.variable(planes.coverage)}
+        self.coords: dict[str, Any] = {}
+        self.notes: dict[str, dict[str, str]] = {}
+
+    def scalars(self) -> dict[str, Variable]:
+        """Return the variables that have one value for each plane."""
+        return {
+            name: variable for name, variable in self.variables.items() if variable[0] == self.planes.dims
+        }
+
+
+def measure_planes(
+    planes: Planes, wanted: Sequence[str], components: Sequence[Components], connectivity: int
+) -> Measurements:
+    """Measure what is wanted out of `MEASURES`; `components` are needed for islands and percolation."""
+    result = Measurements(planes)
+    if "islands" in wanted:
+        spacing = planes.grid.spacing if planes.grid.known else (np.nan, np.nan)
+        perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
+        values = {"total_perimeter": perimeter, **island_scalars(components, planes, connectivity)}
+        result.variables.update({name: planes.variable(array) for name, array in values.items()})
+    if "percolation" in wanted:
+        values = crossings(components, planes)
+        result.variables["largest_share"] = planes.variable(values["largest_share"])
+        result.variables["percolates"] = planes.variable(values["percolates"], "axis")
+        result.coords["axis"] = ("axis", np.array(AXES))
+        result.notes["percolates"] = {"long_name": percolation_name(connectivity)}
+    datasets = {name: analyse(planes) for name, analyse in ANALYSES.items() if name in wanted}
+    box_sizes = [dataset["box_size"].values for dataset in datasets.values() if "box_size" in dataset.coords]
+    all_sizes = np.unique(np.concatenate([np.empty(0, np.int64), *box_sizes]))
+    if all_sizes.size:
+        result.coords["box_size"] = ("box_size", all_sizes)
+        result.coords["box_length"] = ("box_size", all_sizes * planes.side)
+    for name, dataset in datasets.items():
+        _add_analysis(result, name, dataset, all_sizes)
+    return result
+
+
+def _add_analysis(result: Measurements, name: str, dataset: xr.Dataset, all_sizes: Array) -> None:
+    """Add the variables of one analysis, under names that are unique among all of them."""
+    for key, variable in dataset.variables.items():
+        if key in dataset.coords or key in ("scale_min", "scale_max"):
+            continue
+        new, dims, values = _unique_name(name, str(key)), tuple(map(str, variable.dims)), variable.values
+        if "box_size" in dims:
+            values = _on_sizes(all_sizes, dataset["box_size"].values, values)
+        result.variables[new] = dims, values
+        if "comment" in variable.attrs:
+            result.notes[new] = {"comment": variable.attrs["comment"]}
+    if "radius" in dataset.coords:
+        result.coords["radius"] = ("radius", dataset["radius"].values)
+        result.coords["radius_length"] = ("radius", dataset["radius_length"].values)
+    if "scale_min" in dataset and np.isfinite(dataset["scale_min"]).any():
+        low, high = float(dataset["scale_min"].max()), float(dataset["scale_max"].max())
+        note = result.notes.setdefault(name, {})
+        reason = f"{note['comment']}; " if "comment" in note else ""
+        note["comment"] = f"{reason}fitted over {low:.3g} to {high:.3g} cells"
+
+
+def _unique_name(analysis: str, name: str) -> str:
+    """Return the name of a variable of an analysis beside those of the others."""
+    if name in ("ci_low", "ci_high"):
+        return f"{analysis}_{name.removeprefix('ci_')}"
+    prefix = analysis.removesuffix("_dimension")
+    if name == "local_slope" or (name == "null_dimension" and prefix != "box"):
+        return f"{prefix}_{name}"
+    return name
+
+
+def _on_sizes(all_sizes: Array, sizes: Array, values: Array) -> Array:
+    """Spread a curve over all sizes; NaN where it was not measured."""
+    result = np.full((*values.shape[:-1], all_sizes.size), np.nan)
+    result[..., np.searchsorted(all_sizes, sizes)] = values
+    return result

@@ -1,0 +1,161 @@
+"""Islands of contact: their number, their sizes and perimeters, where they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.domains._connected_components import (
+    COLUMNS,
+    PLAIN_COLUMNS,
+    Components,
+    component_table,
+    euler_number,
+    label_planes,
+)
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_mask, read_mask
+
+SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
+
+
+def _check(
+    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, keep: Any, table: Any
+) -> None:
+    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
+    problems.choices("keep", keep, ("label",))
+    if table is not None:
+        problems.choices("table", table, COLUMNS)
+    check_mask(problems, mask, valid=valid, periodic=periodic)
+
+
+@public_result(title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check)
+def islands(
+    mask: xr.DataArray,
+    *,
+    connectivity: int = 1,
+    periodic: bool | None = None,
+    valid: xr.DataArray | None = None,
+    keep: Sequence[str] = ("label",),
+    table: Sequence[str] | None = None,
+) -> xr.Dataset:
+    """Islands of a set of cells: their number, their map, and a table of their sizes.
+
+    Parameters
+    ----------
+    mask : DataArray, dims (..., y, x)
+        Boolean, or integer flags where contact means value > 0.
+    connectivity : {1, 2}
+        1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
+    periodic : bool, optional
+        Whether islands continue across the edges; by default as the axes say. True needs periodic axes.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Observed cells; the others are in no island.
+    keep : sequence of str
+        Maps to keep: ("label",) or (). Without the map a plane is labelled band by band, in little memory.
+    table : sequence of str, optional
+        Columns of the table; () for no table. By default all of them, but `cells` and `area` alone where a
+        plane has more than 2^22 islands: the full table takes some 200 bytes for each.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims: `n_islands`; `largest_island`, `mean_island_area` (m2); `largest_cells`;
+        `euler_number`, islands less holes; `label` over (y, x), the number of the island, 0 outside. Over
+        `island`, for the islands of all planes: `cells`; `area` (m2); `perimeter` (m), along the sides of
+        cells towards open cells inside the extent; `centroid_x`, `centroid_y` (m); the bounding box `x_min`,
+        `x_max`, `y_min`, `y_max` (m), which extends over the edge of a periodic plane where the island does;
+        coordinates `island_label`, the number in the map, and `island_<dim>` for every leading dim.
+
+    Raises
+    ------
+    InvalidInput
+        The mask, `connectivity`, `keep`, `table`, `periodic` or `valid` is not as described.
+
+    Notes
+    -----
+    Lengths are NaN for a mask without coordinates, and so is the centroid, along a periodic axis, of an
+    island that wraps around it. The largest and the mean area of an empty plane are NaN too.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr, fractalcontact as fc
+    >>> mask = xr.DataArray(np.eye(5, dtype=bool), dims=("y", "x"))
+    >>> int(fc.domains.islands(mask).n_islands)
+    5
+    >>> int(fc.domains.islands(mask, connectivity=2).n_islands)
+    1
+    """
+    maps = word_tuple(keep)
+    columns = COLUMNS if table is None else word_tuple(table)
+    planes = read_mask(mask, valid=valid, periodic=periodic)
+    detailed = None if table is None else bool(set(columns) - set(PLAIN_COLUMNS))
+    components = label_planes(planes, connectivity, keep="label" in maps, detailed=detailed)
+    too_many = table is None and any(plane.details is None for plane in components)
+    columns = PLAIN_COLUMNS if too_many else columns
+    counts = [plane.count if columns else 0 for plane in components]
+    scalars = island_scalars(components, planes, connectivity)
+    variables = {
+        **{name: planes.variable(values) for name, values in scalars.items()},
+        **{name: planes.variable(np.array([plane.map for plane in components]), "y", "x") for name in maps},
+        **{name: ("island", values) for name, values in _table(components, planes, columns).items()},
+    }
+    coords: dict[str, Any] = {}
+    if columns:
+        coords["island_label"] = ("island", _chain([np.arange(1, n + 1, dtype=np.int32) for n in counts]))
+    rows = ("island", np.repeat(np.arange(planes.count), counts)) if columns and planes.dims else None
+    notes = _notes(planes, too_many=too_many)
+    return build_dataset(planes, variables, coords, on_plane="label" in maps, notes=notes, rows=rows)
+
+
+def island_scalars(components: Sequence[Components], planes: Planes, connectivity: int) -> dict[str, Array]:
+    """Return the numbers of every plane: islands, their sizes, the Euler number."""
+    sizes = [plane.sizes for plane in components]
+    euler = [euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
+    area = planes.grid.cell_area if planes.grid.known else np.nan
+    largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
+    mean = np.array([cells.mean() if cells.size else np.nan for cells in sizes])
+    return {
+        "n_islands": np.array([cells.size for cells in sizes], np.int64),
+        "largest_cells": largest,
+        "largest_island": np.where(largest > 0, largest * area, np.nan),
+        "mean_island_area": mean * area,
+        "euler_number": np.array(euler, np.int64),
+    }
+
+
+def _table(components: Sequence[Components], planes: Planes, columns: Sequence[str]) -> dict[str, Array]:
+    """Return the table of all planes; lengths are NaN where the mask has no coordinates."""
+    if not columns:
+        return {}
+    axes = planes.plane_coords or {}
+    origin = [float(axes[dim].values[0]) if axes else 0.0 for dim in ("y", "x")]
+    tables = [component_table(plane, planes.grid, origin, columns) for plane in components]
+    joined = {name: _chain([table.pop(name) for table in tables]) for name in columns}
+    if planes.grid.known:
+        return joined
+    return {
+        name: values if name == "cells" else np.full(values.shape, np.nan) for name, values in joined.items()
+    }
+
+
+def _chain(arrays: Sequence[Array]) -> Array:
+    """Join arrays end to end, without a copy of a single one."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _notes(planes: Planes, *, too_many: bool) -> dict[str, dict[str, str]]:
+    reasons = []
+    if not planes.grid.known:
+        reasons.append("the mask has no coordinates")
+    if np.any(planes.occupied == 0):
+        reasons.append("the set is empty")
+    comment = {"comment": "NaN where " + " or where ".join(reasons)}
+    notes = {"largest_island": comment, "mean_island_area": comment} if reasons else {}
+    if too_many:
+        notes["n_islands"] = {"comment": "too many for the full table: name the columns to have them all"}
+    return notes

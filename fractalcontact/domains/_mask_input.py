@@ -1,0 +1,262 @@
+"""Masks of contact: their validation, their planes as plain arrays, and datasets on their leading dims.
+
+A mask is boolean, or integer flags where contact means value > 0, with dims (..., y, x). Every analysis works
+on a stack of planes; its results carry the leading dims of the mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.grid import Grid, periodic_axes, read_grid
+from fractalcontact.base.schema import CORE_DIMS, QUANTITIES
+from fractalcontact.base.threads import thread_count
+from fractalcontact.base.validation import Problems, float_array
+
+Array = np.ndarray[Any, np.dtype[Any]]
+S = TypeVar("S")
+R = TypeVar("R")
+
+RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius")  # dims that results add
+EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
+
+
+@dataclass(frozen=True)
+class Planes:
+    """The planes of a mask, their grid, and the leading dims they came from.
+
+    `cells` is uint8 of 0 and 1, shape (planes, ny, nx), C order. `valid` is None, or uint8 of shape
+    (1 or planes, ny, nx): cells that were not observed are 0 there, and 0 in `cells`.
+    """
+
+    cells: Array
+    valid: Array | None
+    grid: Grid
+    dims: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
+    coords: dict[str, xr.Variable] | None = None
+    plane_coords: dict[str, xr.Variable] | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of planes."""
+        return int(self.cells.shape[0])
+
+    @cached_property
+    def observed(self) -> Array:
+        """Observed cells of each plane, int64."""
+        ny, nx = self.grid.shape
+        if self.valid is None:
+            return np.full(self.count, ny * nx, np.int64)
+        counts = [np.count_nonzero(plane) for plane in self.valid.view(np.bool_)]
+        return np.array(np.broadcast_to(counts, self.count), np.int64)
+
+    @cached_property
+    def occupied(self) -> Array:
+        """Cells of the set in each plane, int64."""
+        return np.array([np.count_nonzero(plane) for plane in self.cells.view(np.bool_)], np.int64)
+
+    @property
+    def coverage(self) -> Array:
+        """Share of the observed cells in the set; NaN where nothing was observed."""
+        return np.where(self.observed > 0, self.occupied / np.maximum(self.observed, 1), np.nan)
+
+    @property
+    def side(self) -> float:
+        """Edge in metres of a square with the area of one cell; NaN without coordinates."""
+        return float(np.sqrt(self.grid.cell_area)) if self.grid.known else float("nan")
+
+    def valid_of(self, plane: int) -> Array | None:
+        """Return the observed cells of one plane, or None if all of them are."""
+        return None if self.valid is None else self.valid[min(plane, self.valid.shape[0] - 1)]
+
+    def variable(self, values: Any, *new_dims: str) -> tuple[tuple[str, ...], Array]:
+        """Return (dims, values) with the first axis of `values` spread over the leading dims."""
+        values = np.asarray(values)
+        return (*self.dims, *new_dims), values.reshape(self.shape + values.shape[1:])
+
+
+def check_mask(
+    problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, argument: str = "mask"
+) -> bool:
+    """Check a mask, its observed cells and the choice of periodicity; `read_mask` then reads them."""
+    if not _check_cells(problems, mask, argument):
+        problems.boolean("periodic", periodic, optional=True)
+        return False
+    has_grid = any(dim in mask.coords for dim in CORE_DIMS)
+    if has_grid and not problems.grid(argument, mask):
+        return False
+    is_periodic_valid = problems.periodic("periodic", periodic, mask_grid(mask))
+    return (valid is None or _check_valid(problems, valid, mask)) and is_periodic_valid
+
+
+def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
+    """Check the type, the dims and the size of a mask."""
+    if not isinstance(mask, xr.DataArray):
+        problems.add(argument, EXPECTED, mask)
+    elif mask.dtype.kind not in "biu":
+        expected = f"{EXPECTED}; compare numbers first, as in `pressure > 0`"
+        problems.add(argument, expected, f"type {mask.dtype}")
+    elif tuple(mask.dims[-2:]) != CORE_DIMS or min(mask.shape, default=0) < 1:
+        problems.add(argument, EXPECTED + ", none of them empty", f"sizes {dict(mask.sizes)}")
+    elif set(RESULT_DIMS) & set(mask.dims):
+        problems.add(f"{argument}.dims", f"leading dims other than {', '.join(RESULT_DIMS)}", mask.dims)
+    else:
+        return True
+    return False
+
+
+def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray) -> bool:
+    """Check that the observed cells lie on the same grid, and on the same leading dims, as the mask."""
+    dims = tuple(valid.dims) if isinstance(valid, xr.DataArray) else None
+    if dims is None or valid.dtype.kind != "b" or dims not in (CORE_DIMS, tuple(mask.dims)):
+        problems.add("valid", f"a boolean DataArray with dims (y, x) or {tuple(mask.dims)}", valid)
+        return False
+    expected_shape = mask.shape[-valid.ndim :]
+    if valid.shape != expected_shape:
+        problems.add("valid", f"the shape of the mask, {expected_shape}", f"shape {valid.shape}")
+        return False
+    matches = True
+    for dim in dims:
+        if dim in mask.coords and dim in valid.coords:
+            own, other = mask.coords[dim].values, valid.coords[dim].values
+            expected, got = (np.array2string(values, threshold=6) for values in (own, other))
+            expected = f"that of the mask, {expected}"
+            matches &= problems.require(_same_coordinates(own, other), f"valid.{dim}", expected, got)
+    return matches
+
+
+def _same_coordinates(first: Array, second: Array) -> bool:
+    """Return whether two coordinates agree; numbers may differ by a millionth of their spacing."""
+    if first.dtype.kind not in "iuf" or second.dtype.kind not in "iuf":
+        return bool(np.array_equal(first, second))
+    spacing = np.abs(np.diff(first)).min() if first.size > 1 else 0.0
+    return bool(np.all(np.abs(first - second) <= 1e-6 * spacing))
+
+
+def plane_shape(mask: Any) -> tuple[int, int] | None:
+    """Return (ny, nx) of a mask with dims (..., y, x), None of anything else."""
+    if not isinstance(mask, xr.DataArray) or tuple(mask.dims[-2:]) != CORE_DIMS or mask.size == 0:
+        return None
+    return int(mask.shape[-2]), int(mask.shape[-1])
+
+
+def mask_grid(mask: xr.DataArray) -> Grid:
+    """Return the grid of a mask that passed `check_mask`; without coordinates its unit is one cell."""
+    if any(dim in mask.coords for dim in CORE_DIMS):
+        return read_grid(mask)
+    shape = (int(mask.sizes["y"]), int(mask.sizes["x"]))
+    return Grid(shape, (1.0, 1.0), (False, False), known=False)
+
+
+def read_mask(
+    mask: xr.DataArray, *, valid: xr.DataArray | None = None, periodic: bool | None = None
+) -> Planes:
+    """Return the planes of a mask that passed `check_mask`."""
+    grid = mask_grid(mask)
+    grid = Grid(grid.shape, grid.spacing, periodic_axes(periodic, grid), grid.known)
+    cells = _flags(mask).view(np.uint8).reshape(-1, *grid.shape)
+    observed = None
+    if valid is not None:
+        observed = _flags(valid).view(np.uint8).reshape(-1, *grid.shape)
+        cells = cells * observed
+    return Planes(
+        cells,
+        observed,
+        grid,
+        tuple(str(dim) for dim in mask.dims[:-2]),
+        tuple(mask.shape[:-2]),
+        leading_coords(mask, mask.dims[:-2], RESULT_DIMS),
+        {dim: mask.coords[dim].variable for dim in CORE_DIMS} if grid.known else {},
+    )
+
+
+def _flags(mask: xr.DataArray) -> Array:
+    """Return where the mask is set, as a C-ordered array; a chunked mask is read chunk by chunk."""
+    if mask.chunks is None:
+        values = np.ascontiguousarray(mask.values)
+        return values if values.dtype.kind == "b" else np.asarray(values > 0)
+    flags = np.empty(mask.shape, bool)
+    stops = [np.cumsum(lengths) for lengths in mask.chunks]
+    for block in np.ndindex(*(len(lengths) for lengths in mask.chunks)):
+        region = tuple(
+            slice(int(stop[k]) - lengths[k], int(stop[k]))
+            for stop, lengths, k in zip(stops, mask.chunks, block, strict=True)
+        )
+        np.greater(mask[region].values, 0, out=flags[region])
+    return flags
+
+
+def build_dataset(
+    planes: Planes,
+    variables: dict[str, Any],
+    coords: dict[str, Any] | None = None,
+    *,
+    on_plane: bool = False,
+    notes: dict[str, dict[str, str]] | None = None,
+    rows: tuple[str, Array] | None = None,
+) -> xr.Dataset:
+    """Build a Dataset from variables (dims, values), with the coordinates of the leading dims.
+
+    `on_plane` adds the coordinates x and y. `notes` gives attributes by name, which replace those of the
+    schema. `rows` names the dim of a table and gives the plane that each of its rows belongs to.
+    """
+    used = {dim for dims, _ in variables.values() for dim in dims}
+    leading = {
+        name: values
+        for name, values in (planes.coords or {}).items()
+        if name not in variables and (name in QUANTITIES or name in used)
+    }
+    on_grid = (planes.plane_coords or {}) if on_plane else {}
+    of_rows = _row_coords(planes, *rows) if rows else {}
+    dataset = xr.Dataset(variables, coords={**leading, **on_grid, **of_rows, **(coords or {})})
+    for name, attributes in (notes or {}).items():
+        dataset[name].attrs.update(attributes)
+    return dataset
+
+
+def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
+    """Return where along every leading dim the plane of each row of a table lies.
+
+    The coordinates are named after the row and the dim, as in `island_step`. A dim that the schema does not
+    know gives its index.
+    """
+    coords: dict[str, Any] = {}
+    places = np.unravel_index(plane, planes.shape) if planes.dims else ()
+    for dim, length, index in zip(planes.dims, planes.shape, places, strict=True):
+        if f"{row}_{dim}" in QUANTITIES:
+            leading = planes.coords or {}
+            values = leading[dim].values if dim in leading else np.arange(length)
+            coords[f"{row}_{dim}"] = (row, values[index])
+        else:
+            attributes = {"units": "1", "long_name": f"index of the {row} along {dim}"}
+            coords[f"{row}_{dim}"] = (row, index, attributes)
+    return coords
+
+
+def parallel_map(function: Callable[[S], R], items: Iterable[S]) -> list[R]:
+    """Apply a function that releases the interpreter lock to all items, on several threads, in order."""
+    items = list(items)
+    threads = min(thread_count(), len(items))
+    if threads < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(function, items))
+
+
+def check_box_sizes(problems: Problems, argument: str, sizes: Any, longest: int) -> bool:
+    """Check edges of boxes in cells: None, or integers from 1 to `longest`."""
+    return problems.numbers(argument, sizes, at_least=1, at_most=longest, integral=True, optional=True)
+
+
+def read_box_sizes(sizes: Any, default: Array) -> Array:
+    """Return edges of boxes that passed `check_box_sizes`, ascending and without repetition, int64."""
+    return default if sizes is None else np.unique(float_array(sizes).astype(np.int64))

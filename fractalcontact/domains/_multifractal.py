@@ -1,0 +1,205 @@
+"""Multifractal analysis: generalised dimensions of a measure, or of a set, from its moments over boxes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.domains._mask_input import (
+    EXPECTED,
+    Array,
+    Planes,
+    build_dataset,
+    check_box_sizes,
+    check_mask,
+    plane_shape,
+    read_box_sizes,
+    read_mask,
+)
+from fractalcontact.domains._scaling_fit import ROUNDING, default_sizes, fit_line
+
+ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)
+LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
+EXPECTED_MEASURE = f"{EXPECTED}; or finite numbers, none negative"
+SOURCE = (
+    "Hentschel and Procaccia, Physica D 8:435 (1983); Halsey et al., Phys. Rev. A 33:1141 (1986); "
+    "Chhabra and Jensen, Phys. Rev. Lett. 62:1327 (1989)"
+)
+
+
+def _check(problems: Problems, *, mask: Any, q: Any, scales: Any, valid: Any) -> None:
+    problems.numbers("q", q, at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
+    if not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biuf":
+        problems.add("mask", EXPECTED_MEASURE, mask)
+        return
+    if mask.dtype.kind == "f":
+        values = mask.values
+        wrong = values.size - int(np.count_nonzero(np.isfinite(values) & (values >= 0)))
+        problems.require(
+            wrong == 0, "mask", EXPECTED_MEASURE, f"{wrong} of {values.size} NaN, infinite or negative"
+        )
+    check_mask(problems, _support(mask), valid=valid)
+    shape = plane_shape(mask)
+    if shape is not None:
+        check_box_sizes(problems, "scales", scales, max(shape))
+
+
+@public_result(title="Generalised dimensions", references=SOURCE, check=_check)
+def generalised_dimensions(
+    mask: xr.DataArray,
+    q: Any = ORDERS,
+    *,
+    scales: Any = None,
+    valid: xr.DataArray | None = None,
+) -> xr.Dataset:
+    """Generalised (Renyi) dimensions D_q of a set, or of a measure such as the contact pressure.
+
+    With mu the share of the measure in each box of size s, tau(q) is the slope of ln sum(mu^q) over ln s
+    and D_q = tau(q) / (q - 1); at q = 1 it is the slope of sum(mu ln mu), the entropy. D_0 is the box
+    dimension on one grid, D_1 the information dimension, D_2 the correlation dimension.
+
+    Parameters
+    ----------
+    mask : DataArray, dims (..., y, x)
+        A set: boolean, or integer flags (contact where value > 0), every cell with the same weight. Or a
+        measure: finite numbers, none negative.
+    q : number or sequence, optional
+        Orders of the moment. Negative ones emphasise the emptiest boxes and need a measure that fills its
+        boxes well.
+    scales : sequence of int, optional
+        Edges of the boxes in cells; by default the powers of two up to the geometric mean of the cell and
+        the extent (at least to 8). The grid starts at the first cell; boxes cut by the far edges count.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Observed cells. A box of which the share f was observed counts f times, with its measure over f.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims and `moment_order`: `generalised_dimension`, with `ci_low` and `ci_high`, two
+        standard deviations of the local slopes to either side; `mass_exponent` tau(q);
+        `singularity_strength` alpha(q) and `singularity_spectrum` f = q alpha - tau (Chhabra and Jensen).
+        Over the leading dims: `scale_min`, `scale_max` (cells). All are NaN for an empty plane.
+
+    Raises
+    ------
+    InvalidInput
+        The measure is negative, NaN or infinite, or another argument is not as described.
+
+    Examples
+    --------
+    A multiplicative cascade of four weights:
+
+    >>> import numpy as np, xarray as xr, fractalcontact as fc
+    >>> weights, measure = np.array([[0.1, 0.2], [0.3, 0.4]]), np.ones((1, 1))
+    >>> for _ in range(6):
+    ...     measure = np.kron(measure, weights)
+    >>> result = fc.domains.generalised_dimensions(xr.DataArray(measure, dims=("y", "x")), [0, 2])
+    >>> result.generalised_dimension.values.round(4).tolist(), round(-np.log2((weights**2).sum()), 4)
+    ([2.0, 1.737], 1.737)
+    """
+    orders = float_array(q)
+    planes = read_mask(_support(mask), valid=valid)
+    default = 2 ** np.arange(
+        default_sizes(planes.grid.shape).max(initial=1).item().bit_length(), dtype=np.int64
+    )
+    sizes = read_box_sizes(scales, default)
+    fits = [
+        _fit_moments(measure, planes.valid_of(k), orders, sizes)
+        for k, measure in enumerate(_measure(mask, planes))
+    ]
+    has_value = np.array([np.isfinite(fit[0]).any() for fit in fits])
+    dimension, half_width, exponent, strength, spectrum = np.moveaxis(np.array(fits), 1, 0)
+    variables = {
+        "generalised_dimension": planes.variable(dimension, "moment_order"),
+        "ci_low": planes.variable(dimension - half_width, "moment_order"),
+        "ci_high": planes.variable(dimension + half_width, "moment_order"),
+        "mass_exponent": planes.variable(exponent, "moment_order"),
+        "singularity_strength": planes.variable(strength, "moment_order"),
+        "singularity_spectrum": planes.variable(spectrum, "moment_order"),
+        "scale_min": planes.variable(np.where(has_value, sizes.min(), np.nan)),
+        "scale_max": planes.variable(np.where(has_value, sizes.max(), np.nan)),
+    }
+    coords = {"moment_order": ("moment_order", orders)}
+    return build_dataset(planes, variables, coords, notes=_notes(has_value, sizes))
+
+
+def _support(mask: xr.DataArray) -> xr.DataArray:
+    """Return the mask of the cells where a measure is positive."""
+    return mask > 0 if mask.dtype.kind == "f" else mask
+
+
+def _measure(mask: xr.DataArray, planes: Planes) -> Array:
+    """Return the measure, (planes, ny, nx) float64, zero where nothing was observed."""
+    if mask.dtype.kind != "f":
+        return planes.cells.astype(np.float64)
+    return np.asarray(mask.values.reshape(planes.cells.shape) * planes.cells, np.float64)
+
+
+def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Array) -> Array:
+    """Return dimension, half-width, tau, alpha and f of one plane, (5, orders)."""
+    total = float(np.max(measure))
+    if total == 0.0 or sizes.size < 2:
+        return np.full((5, orders.size), np.nan)
+    levels = {1: measure / total}
+    observed = {1: np.ones(1) if valid is None else valid.astype(float)}
+    partition, strength = np.empty((orders.size, sizes.size)), np.empty((orders.size, sizes.size))
+    for place, size in enumerate(sizes.tolist()):
+        coarsest = max(other for other in levels if size % other == 0)
+        levels[size] = _sum_boxes(levels[coarsest], size // coarsest)
+        occupied = levels[size] > 0
+        share, weight = levels[size][occupied], np.ones(1)
+        if valid is not None:
+            observed[size] = _sum_boxes(observed[coarsest], size // coarsest)
+            weight = (observed[size] / _sum_boxes(np.ones(measure.shape), size))[occupied]
+        log_mu = np.log(share / share.sum() / weight)
+        partition[:, place], strength[:, place] = _moments(log_mu, weight, orders)
+    x = np.log(sizes)
+    exponent, spread, _ = fit_line(x, partition)
+    alpha, alpha_spread, _ = fit_line(x, strength)
+    is_one = orders == 1.0
+    below = np.where(is_one, 1.0, orders - 1.0)
+    dimension = np.where(is_one, alpha, exponent / below)
+    half_width = ROUNDING + 2.0 * np.where(is_one, alpha_spread, spread / np.abs(below))
+    return np.stack([dimension, half_width, exponent, alpha, orders * alpha - exponent])
+
+
+def _sum_boxes(plane: Array, factor: int) -> Array:
+    """Sum over boxes of `factor` cells, on the grid from the first cell."""
+    if factor == 1:
+        return plane
+    ny, nx = plane.shape
+    rows = np.add.reduceat(plane, np.arange(0, ny, factor), axis=0)
+    return np.asarray(np.add.reduceat(rows, np.arange(0, nx, factor), axis=1))
+
+
+def _moments(log_mu: Array, weight: Array, orders: Array) -> tuple[Array, Array]:
+    """Return ln sum(weight mu^q), and the mean of ln mu with the same weights, for every order.
+
+    The largest exponent is taken out of the sum, so that large orders do not underflow.
+    """
+    partition, strength = np.empty(orders.size), np.empty(orders.size)
+    for place, order in enumerate(orders):
+        scaled = order * log_mu
+        top = scaled.max()
+        terms = weight * np.exp(scaled - top)
+        partition[place] = top + np.log(terms.sum())
+        strength[place] = (terms * log_mu).sum() / terms.sum()
+    return partition, strength
+
+
+def _notes(has_value: Array, sizes: Array) -> dict[str, dict[str, str]]:
+    interval = "generalised dimension (two standard deviations of the local slopes)"
+    notes = {
+        "ci_low": {"long_name": f"lower end of the interval of the {interval}"},
+        "ci_high": {"long_name": f"upper end of the interval of the {interval}"},
+        "scale_min": {"units": "1", "long_name": "smallest box of the fit, in cells"},
+        "scale_max": {"units": "1", "long_name": "largest box of the fit, in cells"},
+    }
+    if not has_value.all():
+        reason = "one size of box gives no slope" if sizes.size < 2 else "where the plane is empty"
+        notes["generalised_dimension"] = {"comment": f"NaN: {reason} ({int((~has_value).sum())} planes)"}
+    return notes
