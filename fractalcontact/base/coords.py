@@ -23,19 +23,20 @@ def leading_coords(
 ) -> dict[str, xr.Variable]:
     """Return the coordinates of the dims `outer`, and the known ones that live on these alone.
 
-    Names in `taken` are left out, because the result has values of its own under them; so is an index of
-    several levels, which no file holds.
+    Names in `taken` are left out, because the result has values of its own under them, and so is `run_time`;
+    an index of several levels is left out because no file holds it.
     """
     import xarray as xr
 
     levels = _levels(array)
     return {
         str(name): xr.Variable(coordinate.dims, coordinate.values, coordinate.attrs)
-        for name, coordinate in array.coords.items()
+        for name, coordinate in array.coords.variables.items()
         if set(coordinate.dims) <= set(outer)
         and (name in outer or name in QUANTITIES)
         and not (name in outer and name in levels)
         and name not in taken
+        and name != "run_time"
     }
 
 

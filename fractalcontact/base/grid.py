@@ -76,7 +76,7 @@ def _axis(array: xr.DataArray, dim: str, problems: Problems, argument: str) -> t
             name, "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)", "none"
         )
         return 1.0, False
-    coordinate = array.coords[dim]
+    coordinate = array.coords.variables[dim]
     units = coordinate.attrs.get("units", "m")
     problems.require(units in METRES, f"{name}.units", "'m'", units)
     centres = np.asarray(coordinate.values, dtype=np.float64)
@@ -113,7 +113,7 @@ def read_grid(array: xr.DataArray, dims: Sequence[str] = ("y", "x")) -> Grid:
     """Return the grid of an array whose `dims` passed `Problems.surface` or `Problems.grid`."""
     spacing, periodic = [], []
     for dim in dims:
-        coordinate = array.coords[dim]
+        coordinate = array.coords.variables[dim]
         centres = np.asarray(coordinate.values, dtype=np.float64)
         n, period = centres.size, coordinate.attrs.get("period")
         if n < 2:  # one point along the axis: its extent is the period

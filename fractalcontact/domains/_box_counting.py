@@ -59,9 +59,9 @@ def _check_boxes(
         check_box_sizes(problems, argument, sizes, _longest_box(shape, cover))
 
 
-def _longest_box(shape: Sequence[int], cover: str) -> int:
+def _longest_box(shape: Sequence[int], cover: Any) -> int:
     """Return the longest box of a cover: the mean needs boxes of at most half the shorter side."""
-    return max(1, min(shape) // 2) if cover == "mean" else 2 * max(shape)
+    return max(1, min(shape) // 2) if isinstance(cover, str) and cover == "mean" else 2 * max(shape)
 
 
 @public_result(title="Box dimension", references=SOURCE, check=_check_box_dimension)

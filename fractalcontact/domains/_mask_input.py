@@ -94,8 +94,8 @@ def check_mask(
     has_grid = any(dim in mask.coords for dim in CORE_DIMS)
     if has_grid and not problems.grid(argument, mask):
         return False
-    is_periodic_valid = problems.periodic("periodic", periodic, mask_grid(mask))
-    return (valid is None or _check_valid(problems, valid, mask)) and is_periodic_valid
+    is_valid = periodic is None or problems.periodic("periodic", periodic, mask_grid(mask))
+    return (valid is None or _check_valid(problems, valid, mask)) and is_valid
 
 
 def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
@@ -175,7 +175,7 @@ def read_mask(
         tuple(str(dim) for dim in mask.dims[:-2]),
         tuple(mask.shape[:-2]),
         leading_coords(mask, mask.dims[:-2], RESULT_DIMS),
-        {dim: mask.coords[dim].variable for dim in CORE_DIMS} if grid.known else {},
+        {dim: mask.coords.variables[dim] for dim in CORE_DIMS} if grid.known else {},
     )
 
 
