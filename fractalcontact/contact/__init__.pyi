@@ -1,8 +1,8 @@
+from ._flat_block import flat_stiffness as flat_stiffness
 from ._modulus import effective_modulus as effective_modulus
 from ._options import ContactOptions as ContactOptions
 from ._options import LoadPath as LoadPath
 from ._press import press as press
-from .flat_block import flat_stiffness as flat_stiffness
 
 __all__ = [
     "ContactOptions",

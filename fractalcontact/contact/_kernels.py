@@ -1,8 +1,12 @@
-"""Loops of the contact solver: influence tables and the fused passes of the iteration.
+"""Compiled loops of the contact solver: influence coefficients and the fused passes of the iteration.
 
-Every pass runs over bands of blocks; a block is as many rows as a bin of the preconditioner. Sums go to one
-row of `out` for each block and are added up by the caller, so that they do not depend on the bands. The inner
-loops are written without branches, so that they run in vector lanes.
+Every pass of the iteration runs over bands of blocks (`base.threads.in_bands`); a block is as many rows as a
+bin of the preconditioner. The sums of a block go to its row of `out` and are added up by the caller, block
+after block, so that they do not depend on the number of threads. The inner loops have no branches, so that
+they are vectorised.
+
+Symbols as in `_constrained_cg`: p pressure, u displacement, h gap of the undeformed surface, t search
+direction, r = K t, z preconditioned gap, tau step length; the gap is g = u + h - closure.
 """
 
 from __future__ import annotations
@@ -63,7 +67,7 @@ def scale_modes(start, stop, parts, qy2, qx2, factor, invert, mean):  # type: ig
 
 
 @kernel
-def multiply(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
+def multiply_modes(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
     """Multiply modes, as real and imaginary parts (my, mx, 2), by a real symbol."""
     for i in range(start, stop):
         for j in range(parts.shape[1]):
@@ -72,164 +76,167 @@ def multiply(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
 
 
 @sum_kernel
-def weigh(start, stop, rows, gap, u, p, cap, out):  # type: ignore[no-untyped-def]
-    """Sum p, p u, p gap over all nodes, and p, p (u + gap) over those below the cap."""
+def objective_sums(start, stop, rows, h, u, p, p_max, out):  # type: ignore[no-untyped-def]
+    """Sum p, p u, p h over all nodes, and p, p (u + h) over the nodes below p_max."""
     ny, nx = p.shape
     for k in range(start, stop):
-        force, work, height, below, level = 0.0, 0.0, 0.0, 0.0, 0.0
+        force, p_u, p_h, force_below, level = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 value = np.float64(p[i, j])
-                pu, ph = value * u[i, j], value * gap[i, j]
+                pu, ph = value * u[i, j], value * h[i, j]
                 force += value
-                work += pu
-                height += ph
-                if value < cap:
-                    below += value
+                p_u += pu
+                p_h += ph
+                if value < p_max:
+                    force_below += value
                     level += pu + ph
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = force, work, height, below, level
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = force, p_u, p_h, force_below, level
 
 
 @sum_kernel
-def inspect(start, stop, rows, gap, u, p, cap, closure, out):  # type: ignore[no-untyped-def]
-    """Measure the error: sum p g+, greatest overlap; and how it divides between the set and outside.
+def residual_sums(start, stop, rows, h, u, p, p_max, closure, out):  # type: ignore[no-untyped-def]
+    """Sum p max(g, 0), find the largest overlap, and sum the error inside and outside of the free set.
 
-    Inside (0 < p < cap) and outside (p = 0 overlapping, p = cap open): count, sum g, sum g^2.
+    Inside (0 < p < p_max) and outside (p = 0 and g < 0, or p = p_max and g > 0): count, sum g, sum g^2.
     """
     ny, nx = p.shape
-    nothing = 0 * closure
-    low = np.empty(nx, p.dtype)
+    zero = 0 * closure
+    lowest = np.empty(nx, p.dtype)
     for k in range(start, stop):
         opened, n_in, s_in, q_in, n_out, s_out, q_out = 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0
         for j in range(nx):
-            low[j] = 0
+            lowest[j] = 0
         for i in range(k * rows, min(k * rows + rows, ny)):
-            for j in range(nx):  # on its own: a greatest value among the sums would stop the lanes
-                g = u[i, j] + gap[i, j] - closure
-                g = g if p[i, j] < cap else nothing
-                low[j] = g if g < low[j] else low[j]
+            for j in range(nx):  # a loop of its own: a minimum among the sums would prevent vectorisation
+                g = u[i, j] + h[i, j] - closure
+                g = g if p[i, j] < p_max else zero
+                lowest[j] = g if g < lowest[j] else lowest[j]
             for j in range(nx):
-                g = np.float64(u[i, j] + gap[i, j] - closure)
+                g = np.float64(u[i, j] + h[i, j] - closure)
                 value = p[i, j]
-                inside = (value > 0) & (value < cap)
-                outside = ((value <= 0) & (g < 0)) | ((value >= cap) & (g > 0))
-                within, without = g if inside else 0.0, g if outside else 0.0
+                inside = (value > 0) & (value < p_max)
+                outside = ((value <= 0) & (g < 0)) | ((value >= p_max) & (g > 0))
+                g_in, g_out = g if inside else 0.0, g if outside else 0.0
                 opened += value * (g if g > 0 else 0.0)
                 n_in += inside
-                s_in += within
-                q_in += within * within
+                s_in += g_in
+                q_in += g_in * g_in
                 n_out += outside
-                s_out += without
-                q_out += without * without
-        least = nothing
+                s_out += g_out
+                q_out += g_out * g_out
+        least = zero
         for j in range(nx):
-            least = low[j] if low[j] < least else least
+            least = lowest[j] if lowest[j] < least else least
         out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = opened, -least, n_in, s_in, q_in
         out[k, 5], out[k, 6], out[k, 7] = n_out, s_out, q_out
 
 
 @sum_kernel
-def select(start, stop, rows, columns, gap, u, p, cap, closure, admit, shift, mask, x, bins, counts, out):  # type: ignore[no-untyped-def]
+def select_free_set(  # type: ignore[no-untyped-def]
+    start, stop, rows, columns, h, u, p, p_max, closure, admit, shift, mask, x, bins, counts, out
+):
     """Choose the free set, put its gap less `shift` into x, and sum both over the bins.
 
-    Free are 0 < p < cap and, where `admit`, the nodes outside that want in. Counts the changes of `mask`.
+    Free are the nodes with 0 < p < p_max and, where `admit`, the nodes outside that violate the conditions
+    of contact. Counts the changes of `mask`.
     """
     ny, nx = p.shape
-    nothing = 0 * shift
-    wide, many = np.empty(nx, x.dtype), np.empty(nx, x.dtype)
+    zero = 0 * shift
+    row_sum, row_count = np.empty(nx, x.dtype), np.empty(nx, x.dtype)
     for k in range(start, stop):
         changes = 0
         for j in range(nx):
-            wide[j], many[j] = 0, 0
+            row_sum[j], row_count[j] = 0, 0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                g = u[i, j] + gap[i, j] - closure
+                g = u[i, j] + h[i, j] - closure
                 value = p[i, j]
-                wanting = ((value <= 0) & (g < 0)) | ((value >= cap) & (g > 0))
-                free = ((value > 0) & (value < cap)) | (wanting & admit)
-                x[i, j] = g - shift if free else nothing
-                many[j] += 1 if free else 0
+                violating = ((value <= 0) & (g < 0)) | ((value >= p_max) & (g > 0))
+                free = ((value > 0) & (value < p_max)) | (violating & admit)
+                x[i, j] = g - shift if free else zero
+                row_count[j] += 1 if free else 0
                 changes += free != mask[i, j]
                 mask[i, j] = free
             for j in range(nx):
-                wide[j] += x[i, j]
+                row_sum[j] += x[i, j]
         for j in range(bins.shape[1]):
             bins[k, j], counts[k, j] = 0, 0
         for j in range(nx):
-            bins[k, j // columns] += wide[j]
-            counts[k, j // columns] += many[j]
+            bins[k, j // columns] += row_sum[j]
+            counts[k, j // columns] += row_count[j]
         out[k, 0] = changes
 
 
 @sum_kernel
-def extend(start, stop, rows, columns, mask, bins, x):  # type: ignore[no-untyped-def]
-    """Fill x, zero outside the free set, with the value of the bin there."""
+def fill_outside(start, stop, rows, columns, mask, bins, x):  # type: ignore[no-untyped-def]
+    """Fill x outside of the free set, where it is zero, with the value of the bin."""
     my, mx = mask.shape
-    wide = np.empty(mx, x.dtype)
+    row = np.empty(mx, x.dtype)
     for k in range(start, stop):
         for j in range(mx):
-            wide[j] = bins[k, j // columns]
+            row[j] = bins[k, j // columns]
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
-                x[i, j] += 0 * wide[j] if mask[i, j] else wide[j]
+                x[i, j] += 0 * row[j] if mask[i, j] else row[j]
 
 
 @sum_kernel
-def collect(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-untyped-def]
-    """Sum x outside the free set over the bins."""
+def sum_outside(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-untyped-def]
+    """Sum x outside of the free set over the bins."""
     my, mx = mask.shape
-    wide = np.empty(mx, x.dtype)
+    row = np.empty(mx, x.dtype)
     for k in range(start, stop):
         for j in range(mx):
-            wide[j] = 0
+            row[j] = 0
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
-                wide[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
+                row[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
         for j in range(bins.shape[1]):
             bins[k, j] = 0
         for j in range(mx):
-            bins[k, j // columns] += wide[j]
+            bins[k, j // columns] += row[j]
 
 
 @sum_kernel
-def correct(start, stop, rows, columns, mask, bins, gap, u, t, closure, x, out):  # type: ignore[no-untyped-def]
-    """Add the bin to x; on the free set sum x, x g and t."""
-    ny, nx = gap.shape
-    wide = np.empty(nx, x.dtype)
+def add_bins(start, stop, rows, columns, mask, bins, h, u, t, closure, x, out):  # type: ignore[no-untyped-def]
+    """Add the bins to x, which makes it z; on the free set sum z, z g and t."""
+    ny, nx = h.shape
+    row = np.empty(nx, x.dtype)
     for k in range(start, stop):
-        total, along, last = 0.0, 0.0, 0.0
+        z_sum, z_g, t_sum = 0.0, 0.0, 0.0
         for j in range(nx):
-            wide[j] = bins[k, j // columns]
+            row[j] = bins[k, j // columns]
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                z = x[i, j] + wide[j]
+                z = x[i, j] + row[j]
                 x[i, j] = z
                 free = np.float64(z) if mask[i, j] else 0.0
-                total += free
-                along += free * (u[i, j] + gap[i, j] - closure)
-                last += np.float64(t[i, j]) if mask[i, j] else 0.0
-        out[k, 0], out[k, 1], out[k, 2] = total, along, last
+                z_sum += free
+                z_g += free * (u[i, j] + h[i, j] - closure)
+                t_sum += np.float64(t[i, j]) if mask[i, j] else 0.0
+        out[k, 0], out[k, 1], out[k, 2] = z_sum, z_g, t_sum
 
 
 @sum_kernel
-def turn(start, stop, rows, mask, x, mean, beta, gap, u, closure, t, out):  # type: ignore[no-untyped-def]
-    """Direction t = x - mean + beta t on the free set, zero outside; sum t and t g."""
+def search_direction(start, stop, rows, mask, z, mean, beta, h, u, closure, t, out):  # type: ignore[no-untyped-def]
+    """Set t = z - mean + beta t on the free set and 0 outside; sum t and t g."""
     ny, nx = t.shape
-    nothing = 0 * mean
+    zero = 0 * mean
     for k in range(start, stop):
-        total, along = 0.0, 0.0
+        t_sum, t_g = 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                value = x[i, j] - mean + beta * t[i, j] if mask[i, j] else nothing
+                value = z[i, j] - mean + beta * t[i, j] if mask[i, j] else zero
                 t[i, j] = value
-                total += value
-                along += np.float64(value) * (u[i, j] + gap[i, j] - closure)
-        out[k, 0], out[k, 1] = total, along
+                t_sum += value
+                t_g += np.float64(value) * (u[i, j] + h[i, j] - closure)
+        out[k, 0], out[k, 1] = t_sum, t_g
 
 
 @sum_kernel
-def bend(start, stop, rows, t, r, out):  # type: ignore[no-untyped-def]
-    """Sum t r."""
+def curvature(start, stop, rows, t, r, out):  # type: ignore[no-untyped-def]
+    """Sum t r, with r = K t."""
     for k in range(start, stop):
         total = 0.0
         for i in range(k * rows, min(k * rows + rows, t.shape[0])):
@@ -239,28 +246,29 @@ def bend(start, stop, rows, t, r, out):  # type: ignore[no-untyped-def]
 
 
 @sum_kernel
-def survey(start, stop, rows, p, t, step, cap, out):  # type: ignore[no-untyped-def]
-    """Count what a step along -t would push over the bounds; sum what it leaves, cut to them."""
+def projected_step_sums(start, stop, rows, p, t, tau, p_max, out):  # type: ignore[no-untyped-def]
+    """Count the nodes that p - tau t takes out of bounds; sum its projection onto them."""
     ny, nx = t.shape
-    nothing = 0 * step
+    zero = 0 * tau
     for k in range(start, stop):
         clipped, force = 0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                value = p[i, j] - step * t[i, j]
-                clipped += (value < 0) | (value > cap)
-                value = value if value > 0 else nothing
-                force += value if value < cap else cap
+                value = p[i, j] - tau * t[i, j]
+                clipped += (value < 0) | (value > p_max)
+                value = value if value > 0 else zero
+                force += value if value < p_max else p_max
         out[k, 0], out[k, 1] = clipped, force
 
 
 @kernel
-def pair_sum(start, stop, table, iy, ix, wanted, sources, value, out):  # type: ignore[no-untyped-def]
-    """Sum of table[distance to source] * value over the sources, for every wanted node."""
+def pair_sum(start, stop, table, iy, ix, targets, sources, value, out):  # type: ignore[no-untyped-def]
+    """Sum table[offset to the source] * value over the sources, for every target node."""
     for k in range(start, stop):
-        y, x = iy[wanted[k]], ix[wanted[k]]
+        y, x = iy[targets[k]], ix[targets[k]]
         total = 0.0
         for m in range(sources.size):
             dy, dx = abs(y - iy[sources[m]]), abs(x - ix[sources[m]])
-            total += table[np.uint32(dy), np.uint32(dx)] * value[m]  # unsigned: no test for negatives
-        out[wanted[k]] = total
+            # unsigned indices: no test for negative ones
+            total += table[np.uint32(dy), np.uint32(dx)] * value[m]
+        out[targets[k]] = total

@@ -1,4 +1,4 @@
-"""The elastic operator: settlement of every node under a plane of pressure, by Fourier transform."""
+"""The elastic operator: displacement of every node under a pressure on all nodes, u = K p."""
 
 from __future__ import annotations
 
@@ -13,17 +13,79 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 class Operator(Protocol):
-    """Settlement from pressure; counts its pairs of transforms."""
+    """Displacement from pressure; counts its pairs of transforms."""
 
     transforms: int
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the settlement under `pressure`, both (ny, nx); it may be written into `out`."""
+        """Return the displacement under `pressure`, both (ny, nx); it may be written into `out`."""
         ...
 
 
+class PeriodicOperator:
+    """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean."""
+
+    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
+        self.wavenumbers = Wavenumbers(shape, spacing)
+        self.transforms = 0
+
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the displacement under `pressure`, without its mean."""
+        self.transforms += 1
+        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
+
+
+class FreeOperator:
+    """Half-space loaded inside a window: convolution on a plane padded so that nothing wraps around."""
+
+    def __init__(self, table: Array, dtype: Any = np.float64) -> None:
+        shape = table.shape
+        self.padded = (padded_length(shape[0]), padded_length(shape[1]))
+        self.symbol = convolution_symbol(table, self.padded).astype(dtype)
+        self.modes: Array | None = None
+        self.transforms = 0
+
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
+        """Return the displacement under `pressure`."""
+        from fractalcontact.contact._kernels import multiply_modes
+
+        self.transforms += 1
+        modes = fft.rfft2_padded(pressure, self.padded, self.modes)
+        self.modes = modes if fft.writes_in_place() else None
+        in_bands(multiply_modes, modes.shape[0], modes.size, real_parts(modes), self.symbol)
+        return fft.irfft2_cropped(modes, self.padded, (pressure.shape[0], pressure.shape[1]))
+
+
+class PairSum:
+    """Sums a table of coefficients over the pairs of a few nodes (iy, ix), without any transform.
+
+    A lightly pressed rough body touches at a few dozen nodes scattered over its whole extent. For some ten
+    nodes the sum over pairs is cheaper than transforms of planes by two orders of magnitude.
+    """
+
+    def __init__(self, table: Array, iy: Array, ix: Array) -> None:
+        self.table, self.iy, self.ix = table, iy, ix
+        self.all_nodes = np.arange(iy.size)
+        self.transforms = 0
+
+    def apply(self, value: Array, out: Array | None = None) -> Array:  # noqa: ARG002
+        """Return the sum over all nodes of table[offset] times value, for every node."""
+        return self.sum_at(value, self.all_nodes)
+
+    def sum_at(self, value: Array, targets: Array) -> Array:
+        """Return the sum for the nodes `targets` (indices); zero for the others."""
+        from fractalcontact.contact._kernels import pair_sum
+
+        flat = value.reshape(-1)
+        sources = np.flatnonzero(flat)
+        out = np.zeros_like(flat)
+        nodes = (self.iy, self.ix, targets, sources, flat[sources])
+        in_bands(pair_sum, targets.size, targets.size * sources.size, self.table, *nodes, out)
+        return out.reshape(value.shape)
+
+
 class Wavenumbers:
-    """Multiplies the modes of a plane by a power of |q|, without keeping a table of it."""
+    """Multiplies the modes of a plane by |q| or 1/|q|, without a table of |q| (another array)."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.shape = shape
@@ -34,55 +96,21 @@ class Wavenumbers:
     def apply(
         self, plane: Array, factor: float, *, invert: bool, mean: float, out: Array | None = None
     ) -> Array:
-        """Return the plane with its modes times factor |q| (or factor / |q|), its mean times `mean`.
+        """Return the plane with its modes times factor |q| (or factor / |q|) and its mean times `mean`.
 
-        Where the library can, it writes into `out`, which may be the plane itself.
+        Where the FFT library can, it writes into `out`, which may be the plane itself.
         """
         from fractalcontact.contact._kernels import scale_modes
 
-        kind = plane.dtype.type
+        dtype = plane.dtype.type
         modes = fft.rfft2(plane, self.modes)
-        qy2, qx2 = self.qy2.astype(kind), self.qx2.astype(kind)
-        weights = (qy2, qx2, kind(factor), invert, kind(mean))
+        qy2, qx2 = self.qy2.astype(dtype), self.qx2.astype(dtype)
+        weights = (qy2, qx2, dtype(factor), invert, dtype(mean))
         in_bands(scale_modes, modes.shape[0], modes.size, real_parts(modes), *weights)
         if not fft.writes_in_place():
             return fft.irfft2(modes, self.shape, overwrite=True)
         self.modes = modes
         return fft.irfft2(modes, self.shape, out, overwrite=True)
-
-
-class PeriodicOperator:
-    """A body that repeats itself: 2/|q| times the modes of the pressure; the mean is a rigid motion."""
-
-    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        self.wavenumbers = Wavenumbers(shape, spacing)
-        self.transforms = 0
-
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the settlement under `pressure`, without its mean."""
-        self.transforms += 1
-        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
-
-
-class FreeOperator:
-    """A half-space loaded inside a window alone: convolution on a plane padded so that nothing wraps."""
-
-    def __init__(self, table: Array, kind: Any = np.float64) -> None:
-        shape = table.shape
-        self.padded = (padded_length(shape[0]), padded_length(shape[1]))
-        self.symbol = convolution_symbol(table, self.padded).astype(kind)
-        self.modes: Array | None = None
-        self.transforms = 0
-
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
-        """Return the settlement under `pressure`."""
-        from fractalcontact.contact._kernels import multiply
-
-        self.transforms += 1
-        modes = fft.rfft2_padded(pressure, self.padded, self.modes)
-        self.modes = modes if fft.writes_in_place() else None
-        in_bands(multiply, modes.shape[0], modes.size, real_parts(modes), self.symbol)
-        return fft.irfft2_cropped(modes, self.padded, (pressure.shape[0], pressure.shape[1]))
 
 
 def real_parts(modes: Array) -> Array:
@@ -91,12 +119,12 @@ def real_parts(modes: Array) -> Array:
 
 
 def padded_length(n: int) -> int:
-    """Length of a fast transform that holds a linear convolution of n points."""
+    """Return the length of a fast transform that holds a linear convolution of n points."""
     return fft.fast_length(2 * n - 1)
 
 
 def convolution_symbol(table: Array, padded: tuple[int, int]) -> Array:
-    """Transform of the even extension of `table`, which is real; shape (my, mx//2 + 1)."""
+    """Return the transform of the even extension of `table`, which is real; shape (my, mx//2 + 1)."""
     ny, nx = table.shape
     plane = np.zeros(padded, dtype=table.dtype)
     plane[:ny, :nx] = table

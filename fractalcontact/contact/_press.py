@@ -15,8 +15,8 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
-from fractalcontact.contact._path import Path, Step, solve_path
 from fractalcontact.contact._scaling import make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -205,7 +205,7 @@ def press(
 
 def _scaled_path(
     heights: Array, grid: Grid, contact_modulus: float, options: ContactOptions, load: LoadPath
-) -> Path:
+) -> ScaledPath:
     """Return the scaled problem with its load path."""
     control, values = load.solver_values(grid.nominal_area)
     spacing = (grid.spacing[0], grid.spacing[1])
@@ -216,7 +216,7 @@ def _scaled_path(
     periodic, influence = options.is_periodic(grid), options.influence_on(grid)
     body = scaled_body(shape, spacing, periodic, influence, options.disc_radius)
     hardness = np.inf if options.hardness is None else options.hardness
-    return Path(
+    return ScaledPath(
         body, units, gap, control, tuple(values.tolist()), hardness, options.tolerance, options.method
     )
 
@@ -262,7 +262,11 @@ def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
 
 
 def _dataset(
-    surface: xr.DataArray, grid: Grid, path: Path, scalars: list[dict[str, Any]], maps: dict[str, list[Array]]
+    surface: xr.DataArray,
+    grid: Grid,
+    path: ScaledPath,
+    scalars: list[dict[str, Any]],
+    maps: dict[str, list[Array]],
 ) -> xr.Dataset:
     """Return the Dataset over all steps."""
     columns = {name: ("step", np.array([step[name] for step in scalars])) for name in scalars[0]}

@@ -1,8 +1,8 @@
 """The contact problem in scaled form: lengths, heights and pressures near 1, scales powers of two.
 
-Lengths in the plane are measured in `length_unit`, heights and settlements in `height_unit`, both powers of
-two, and pressures in contact modulus times height over length unit. A change of unit by a power of two
-therefore leaves every number of the computation as it is.
+Lengths in the plane are measured in `Units.length`, heights, gaps and displacements in `Units.height`, both
+powers of two, and pressures in contact modulus times height unit over length unit. A change of the units by
+powers of two therefore changes no bit of the computation.
 """
 
 from __future__ import annotations
@@ -19,37 +19,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)
-class Body:
-    """A pair of half-spaces on a grid: shape (ny, nx), scaled spacing, boundary and influence."""
-
-    shape: tuple[int, int]
-    spacing: tuple[float, float]
-    periodic: bool
-    influence: str
-    radius: float
-
-    @property
-    def cell_area(self) -> float:
-        """Scaled area of a cell."""
-        return self.spacing[0] * self.spacing[1]
-
-    def table(self, shape: tuple[int, int] | None = None) -> Array:
-        """Settlement at offset (i, j) under unit pressure on one cell of a free body."""
-        shape = shape or self.shape
-        if self.influence == "disc":
-            return _influence.disc_coefficients(shape, self.spacing, self.radius) * self.cell_area
-        return _influence.square_coefficients(shape, self.spacing) * self.cell_area
-
-    def operator(self, kind: Any = np.float64) -> Operator:
-        """Return the settlement under a plane of pressure."""
-        if self.periodic:
-            return PeriodicOperator(self.shape, self.spacing)
-        return FreeOperator(self.table(), kind)
-
-
-@dataclass(frozen=True)
 class Units:
-    """Scales of a problem: two powers of two, and the modulus."""
+    """Scales of a problem: length and height (m, powers of two), contact modulus (Pa), scaled cell area."""
 
     length: float
     height: float
@@ -68,70 +39,78 @@ class Units:
 
     @property
     def energy(self) -> float:
-        """Energy (J) of a scaled sum of pressure times settlement of 1."""
+        """Energy (J) of a scaled sum of pressure times displacement of 1."""
         return self.force * self.height
 
 
 @dataclass(frozen=True)
+class Body:
+    """A pair of half-spaces on a grid: shape (ny, nx), scaled spacing, boundary, influence coefficients."""
+
+    shape: tuple[int, int]
+    spacing: tuple[float, float]
+    periodic: bool
+    influence: str
+    radius: float
+
+    @property
+    def cell_area(self) -> float:
+        """Scaled area of a cell."""
+        return self.spacing[0] * self.spacing[1]
+
+    def influence_table(self) -> Array:
+        """Return the displacement at offset (i, j) from a cell under unit pressure; free bodies only."""
+        if self.influence == "disc":
+            return _influence.disc_coefficients(self.shape, self.spacing, self.radius) * self.cell_area
+        return _influence.square_coefficients(self.shape, self.spacing) * self.cell_area
+
+    def operator(self, dtype: Any = np.float64) -> Operator:
+        """Return the elastic operator, displacement from pressure."""
+        if self.periodic:
+            return PeriodicOperator(self.shape, self.spacing)
+        return FreeOperator(self.influence_table(), dtype)
+
+
+@dataclass(frozen=True)
 class Problem:
-    """A body and the gap above its surface at first touch, scaled."""
+    """A body, the gap h above its undeformed surface at first touch, and the largest pressure; all scaled."""
 
     body: Body
     gap: Array
-    cap: float = np.inf
+    p_max: float = np.inf
 
     @property
-    def local(self) -> float:
-        """Nominal pressure times grid spacing for unit sum of pressure: a length the error is measured in."""
+    def local_compliance(self) -> float:
+        """Nominal pressure times grid spacing for a unit sum of pressure: the least scale of the error."""
         return float(np.sqrt(self.body.spacing[0] * self.body.spacing[1])) / self.gap.size
 
 
 @dataclass(frozen=True)
 class Control:
-    """What is imposed: the sum of the pressure (force), or the closure."""
+    """What is imposed on a step: the force, which is the sum of the scaled pressure, or the closure."""
 
-    total: float | None = None
+    force: float | None = None
     closure: float | None = None
 
     @property
     def value(self) -> float:
         """The imposed number."""
-        return float(self.total if self.total is not None else self.closure or 0.0)
+        return float(self.force if self.force is not None else self.closure or 0.0)
 
 
 @dataclass
 class Solution:
-    """State of one step, scaled."""
+    """Scaled solution of one step, and how it was found."""
 
     pressure: Array
-    settlement: Array
+    displacement: Array
     closure: float
-    total: float
+    force: float
     iterations: int = 0
     transforms: int = 0
     residual: float = 0.0
     reason: str = "converged"
-    work: float = 0.0  # sum of pressure times settlement
-
-
-def serial_sum(plane: Array) -> float:
-    """Sum by rows, then over the rows, in double: the same bits for any number of threads."""
-    return float(np.sum(np.sum(plane, axis=-1, dtype=np.float64)))
-
-
-def serial_mean(plane: Array) -> float:
-    """Mean by rows, then over the rows."""
-    return serial_sum(plane) / plane.size
-
-
-def power_of_two(value: float) -> float:
-    """Return the power of two next above `value`; 1 for zero."""
-    return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0
-
-
-def length_unit(spacing: tuple[float, float]) -> float:
-    """Power of two in which lengths of the plane are measured."""
-    return power_of_two(max(spacing))
+    work: float = 0.0  # sum of pressure times displacement: twice the elastic energy
 
 
 def make_units(
@@ -160,3 +139,23 @@ def scaled_body(
         return Body(shape, scaled, periodic, influence, 0.0)
     choice = disc_radius if isinstance(disc_radius, str) else disc_radius / unit
     return Body(shape, scaled, periodic, influence, _influence.disc_radius(choice, scaled))
+
+
+def length_unit(spacing: tuple[float, float]) -> float:
+    """Return the power of two in which lengths of the plane are measured."""
+    return power_of_two(max(spacing))
+
+
+def power_of_two(value: float) -> float:
+    """Return the power of two next above `value`; 1 for zero."""
+    return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0
+
+
+def sum_by_rows(plane: Array) -> float:
+    """Sum each row, then the row sums, in double precision: the same bits for any number of threads."""
+    return float(np.sum(np.sum(plane, axis=-1, dtype=np.float64)))
+
+
+def mean_by_rows(plane: Array) -> float:
+    """Return the mean, summed as in `sum_by_rows`."""
+    return sum_by_rows(plane) / plane.size

@@ -8,8 +8,8 @@ import pytest
 import fractalcontact as fc
 from fractalcontact.base import fft, threads
 from fractalcontact.base.threads import limit
-from fractalcontact.contact import _fast, _plane
-from fractalcontact.contact._descent import Descent
+from fractalcontact.contact import _window_solver
+from fractalcontact.contact._constrained_cg import ConstrainedCG
 
 MODULUS = 2.0**30
 
@@ -47,7 +47,7 @@ def library(request, monkeypatch):
 def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
     library, monkeypatch, single, boundary, control, force
 ):
-    monkeypatch.setattr(_plane, "SINGLE_FROM", 0 if single else 10**9)
+    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0 if single else 10**9)
     monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
     monkeypatch.setattr(fft, "SMALL", 1000)
     surface, keep = rough(112), ("state", "pressure", "gap", "displacement")
@@ -129,19 +129,19 @@ def test_a_periodic_solve_keeps_eight_arrays_beyond_the_heights():
 @pytest.fixture
 def grids(monkeypatch):
     """Return the shapes of the grids that are solved on, in turn."""
-    seen, honest = [], Descent.solve
+    seen, honest = [], ConstrainedCG.solve
 
     def solve(self, *arguments, **options):
-        seen.append(self.gap.shape)
+        seen.append(self.h.shape)
         return honest(self, *arguments, **options)
 
-    monkeypatch.setattr(Descent, "solve", solve)
+    monkeypatch.setattr(ConstrainedCG, "solve", solve)
     return seen
 
 
 @pytest.mark.parametrize("corner", [(40, 50), (150, 170), (199, 0)])
 def test_a_free_contact_is_solved_where_it_touches(monkeypatch, grids, corner):
-    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     y, x = np.ogrid[:200, :200]
     ball = -((y - corner[0]) ** 2 + (x - corner[1]) ** 2) * 1e-10 / 2
     surface = fc.surfaces.from_array(ball + 1e-9 * rough(200).values, 1e-5)
@@ -164,8 +164,8 @@ def test_a_periodic_body_looks_for_no_window_and_a_full_contact_takes_the_plane(
     def never(*arguments):
         raise AssertionError("a periodic body has no window")
 
-    monkeypatch.setattr(_fast.Fast, "window", never)
-    monkeypatch.setattr(_fast.Fast, "ordered", property(never))
+    monkeypatch.setattr(_window_solver.WindowSolver, "bounding_window", never)
+    monkeypatch.setattr(_window_solver.WindowSolver, "sorted_gap", never)
     press(rough(64), nominal_pressure=[MODULUS * 1e-4, MODULUS])
 
 

@@ -192,11 +192,11 @@ def test_more_than_the_cap_can_carry_is_refused():
 
 
 def test_a_step_that_leaves_the_bounds_is_seen_and_one_that_reaches_them_is_not():
-    from fractalcontact.contact._kernels import survey
+    from fractalcontact.contact._kernels import projected_step_sums
 
     pressure = np.array([[1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0]])
     direction = np.array([[-0.1, 0.0, -0.5, -0.6, 0.5, 0.6, 0.0]])  # beyond the cap: 0, 3; below zero: 5
     out = np.zeros((1, 8))
-    survey(0, 1, 1, pressure, direction, 1.0, 1.0, out)
+    projected_step_sums(0, 1, 1, pressure, direction, 1.0, 1.0, out)
     assert out[0, 0] == 3
     assert out[0, 1] == pytest.approx(4.0)

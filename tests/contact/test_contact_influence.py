@@ -99,7 +99,7 @@ def test_least_symbol_against_the_spectrum_of_a_large_matrix(radius, ratio):
 @pytest.mark.parametrize("kind", ["disc", "square"])
 def test_free_operator_against_the_sum_over_all_pairs(shape, kind):
     body = Body(shape, (0.7, 1.0), False, kind, 0.3)
-    table = body.table()
+    table = body.influence_table()
     pressure = np.random.default_rng(1).random(shape)
     iy, ix = np.indices(shape)
     direct = np.array(

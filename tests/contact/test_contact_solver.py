@@ -5,8 +5,8 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.contact import _descent, _fast, _plane
-from fractalcontact.contact._precondition import Preconditioner
+from fractalcontact.contact import _constrained_cg, _window_solver
+from fractalcontact.contact._preconditioner import ExtensionPreconditioner
 from fractalcontact.contact._scaling import Body
 
 MODULUS = 1e9
@@ -25,7 +25,7 @@ def press(surface, **options):
 
 def preconditioned(body, free):
     """Matrix of the preconditioner on a set."""
-    precondition = Preconditioner(body, np.float64)
+    precondition = ExtensionPreconditioner(body, np.float64)
     rows, columns = precondition.rows, precondition.columns
     nodes = np.argwhere(free)
     matrix = np.empty((len(nodes), len(nodes)))
@@ -70,7 +70,7 @@ def test_the_preconditioner_is_symmetric_and_no_smaller_than_the_inverse(periodi
 def test_few_nodes_give_what_the_plane_gives(monkeypatch, pressure):
     surface = rough(80, periodic=False)
     nodes = press(surface, nominal_pressure=pressure, tolerance=1e-12)
-    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     plane = press(surface, nominal_pressure=pressure, tolerance=1e-12)
     np.testing.assert_array_equal(nodes["state"], plane["state"])
     np.testing.assert_allclose(
@@ -87,9 +87,9 @@ def ball(n):
 
 @pytest.mark.parametrize("control", [{"closure": [1e-9, 4e-8]}, {"normal_force": [1e-6, 0.01]}])
 def test_a_window_gives_what_the_whole_plane_gives(monkeypatch, control):
-    monkeypatch.setattr(_fast, "FEW_NODES", 0)
+    monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     window = press(ball(192), tolerance=1e-12, **control)
-    monkeypatch.setattr(_fast, "WHOLE", 0.0)
+    monkeypatch.setattr(_window_solver, "MAX_WINDOW_SHARE", 0.0)
     whole = press(ball(192), tolerance=1e-12, **control)
     np.testing.assert_array_equal(window["state"], whole["state"])
     np.testing.assert_allclose(window["normal_force"], whole["normal_force"], rtol=1e-11)
@@ -100,7 +100,7 @@ def test_a_window_gives_what_the_whole_plane_gives(monkeypatch, control):
 def test_single_precision_first_changes_nothing_that_counts(monkeypatch):
     surface = rough(128)
     double = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
-    monkeypatch.setattr(_plane, "SINGLE_FROM", 0)
+    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0)
     mixed = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
     np.testing.assert_array_equal(mixed["state"], double["state"])
     np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
@@ -138,14 +138,14 @@ def test_a_preconditioner_that_fails_is_done_without(monkeypatch, fault, boundar
     surface = rough(48)
     options = {"nominal_pressure": 1e6, "boundary": boundary, "tolerance": 1e-9}
     sound = press(surface, **options)
-    honest, rng = Preconditioner.apply, np.random.default_rng(0)
+    honest, rng = ExtensionPreconditioner.apply, np.random.default_rng(0)
 
     def faulty(self, x):
         plane, extra = honest(self, x)
         return (-plane, -extra) if fault == "sign" else (rng.normal(size=plane.shape), extra)
 
-    monkeypatch.setattr(_fast, "FEW_NODES", 0)
-    monkeypatch.setattr(Preconditioner, "apply", faulty)
+    monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
+    monkeypatch.setattr(ExtensionPreconditioner, "apply", faulty)
     found = press(surface, **options)
     assert bool(found["converged"].all())
     assert int(found["iterations"][0]) > int(sound["iterations"][0])
@@ -170,7 +170,7 @@ def stopped(found):
 
 
 def test_a_step_that_runs_out_of_iterations_is_told_apart(monkeypatch):
-    monkeypatch.setattr(_descent, "GREATEST_ITERATIONS", 2)
+    monkeypatch.setattr(_constrained_cg, "MAX_ITERATIONS", 2)
     with pytest.warns(ConvergenceWarning, match="step 1: iteration_limit"):
         found = press(rough(64), nominal_pressure=[0.0, 1e6], tolerance=1e-10)
     assert stopped(found) == ["converged", "iteration_limit"]

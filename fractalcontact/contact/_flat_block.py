@@ -1,8 +1,14 @@
-"""Stiffness of the block with perfectly mating faces."""
+"""The flat block: two perfectly mating surfaces pressed together, and their stiffness.
+
+The pressure under a unit force is solved once for each geometry and kept, because the bulk part of the
+closure of every surface of that extent needs it.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,7 +16,19 @@ import numpy as np
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.contact._options import BOUNDARIES, ContactOptions
-from fractalcontact.contact._scaling import length_unit, scaled_body
+from fractalcontact.contact._preconditioner import ExtensionPreconditioner
+from fractalcontact.contact._scaling import (
+    Body,
+    length_unit,
+    mean_by_rows,
+    scaled_body,
+    sum_by_rows,
+)
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MAX_ITERATIONS = 500
+TARGET = 1e-14  # spread of the displacement over its mean at which the solve stops
 
 
 def flat_stiffness(
@@ -57,8 +75,6 @@ def flat_stiffness(
     A square of edge L has 1.15230 E* L (rigid; the capacitance of the unit square, Read 1997) or
     E* L/0.9464020 (uniform) in the limit of small spacing.
     """
-    from fractalcontact.contact import _flat
-
     with Problems("fractalcontact.contact.flat_stiffness") as problems:
         problems.number("contact_modulus", contact_modulus, above=0)
         known_boundary = problems.choice("boundary", boundary, BOUNDARIES)
@@ -75,12 +91,10 @@ def flat_stiffness(
     options, grid = ContactOptions(boundary, influence, disc_radius), _grid(shape, spacing, boundary)
     cells, pair = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
     body = scaled_body(cells, pair, boundary == "periodic", options.influence_on(grid), options.disc_radius)
-    compliance = _flat.flat_block(body).compliance if loading == "rigid" else _flat.uniform_compliance(body)
-    return (
-        math.inf
-        if compliance == 0
-        else float(contact_modulus) * length_unit(pair) * body.cell_area / compliance
-    )
+    compliance = flat_block(body).compliance if loading == "rigid" else uniform_compliance(body)
+    if compliance == 0:
+        return math.inf
+    return float(contact_modulus) * length_unit(pair) * body.cell_area / compliance
 
 
 def _has_two_entries(shape: Any) -> bool:
@@ -94,3 +108,62 @@ def _grid(shape: Any, spacing: Any, boundary: str) -> Grid:
     steps, periodic = float_array(spacing), boundary == "periodic"
     pair = (float(steps[0]), float(steps[-1]))
     return Grid((int(shape[0]), int(shape[1])), pair, (periodic, periodic))
+
+
+@dataclass(frozen=True)
+class FlatBlock:
+    """Scaled pressure under a unit force, displacement and closure (the compliance), and how well solved."""
+
+    pressure: Array
+    displacement: Array
+    compliance: float
+    iterations: int
+    transforms: int
+    residual: float
+
+
+@lru_cache(maxsize=4)
+def flat_block(body: Body) -> FlatBlock:
+    """Solve K p = const, sum p = 1, by preconditioned conjugate gradients on the whole plane.
+
+    The symbols are those of `_constrained_cg`; here every node is free.
+    """
+    size = body.shape[0] * body.shape[1]
+    p = np.full(body.shape, 1.0 / size)
+    if body.periodic:
+        return FlatBlock(p, np.zeros(body.shape), 0.0, 0, 0, 0.0)
+    operator, preconditioner = body.operator(), ExtensionPreconditioner(body, np.float64)
+    u = operator.apply(p)
+    t, G, best = np.zeros_like(p), 0.0, (np.inf, p, u)
+    iteration = 0
+    while iteration < MAX_ITERATIONS:
+        closure = sum_by_rows(p * u) / sum_by_rows(p)
+        g = u - closure
+        error = float(np.abs(g).max()) / closure
+        if error < best[0]:
+            best = (error, p, u)
+        if error <= TARGET or error > 1e3 * best[0]:
+            break
+        g -= mean_by_rows(g)
+        z = preconditioner.apply_to_all(g)
+        z -= mean_by_rows(z)
+        G_old, G = G, sum_by_rows(g * z)
+        t = z + (G / G_old) * t if G_old > 0 else z
+        r = operator.apply(t)
+        tau = sum_by_rows(g * t) / sum_by_rows(t * r)
+        p, u = p - tau * t, u - tau * r
+        iteration += 1
+    error, p, _ = best
+    p = p / sum_by_rows(p)
+    u = operator.apply(p)
+    compliance = sum_by_rows(p * u)
+    error = float(np.abs(u - compliance).max()) / compliance
+    return FlatBlock(p, u, compliance, iteration, operator.transforms, error)
+
+
+@lru_cache(maxsize=16)
+def uniform_compliance(body: Body) -> float:
+    """Return the mean displacement under a uniform pressure that adds up to 1."""
+    if body.periodic:
+        return 0.0
+    return mean_by_rows(body.operator().apply(np.full(body.shape, 1.0 / (body.shape[0] * body.shape[1]))))

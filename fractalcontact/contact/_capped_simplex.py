@@ -1,0 +1,51 @@
+"""Pressures of a given force between zero and the hardness: projection onto the capped simplex.
+
+The set {0 <= p <= p_max, sum p = force} is a capped simplex. The nearest point of it to a pressure q is
+clip(q - shift, 0, p_max) with the one shift that gives the force (Wang and Lu 2015, arXiv:1503.01002); the
+shift is found by Newton's method kept inside a bracket (Cominetti, Mascarenhas and Silva 2014, Math. Prog.
+Comp. 6:151).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MAX_NEWTON_STEPS = 200
+
+
+def project_onto_capped_simplex(q: Array, force: float, p_max: float) -> Array:
+    """Shift values by one amount so that, clipped to 0 .. p_max, they add up to `force`.
+
+    The sum is piecewise linear in the shift, so that Newton's method ends after a few steps.
+    """
+    low, high, shift = float(q.min()) - p_max, float(q.max()), 0.0
+    p = np.clip(q, 0.0, p_max)
+    for _ in range(MAX_NEWTON_STEPS):
+        excess = float(np.sum(p)) - force
+        low, high = (shift, high) if excess > 0 else (low, shift)
+        free = int(np.count_nonzero((p > 0) & (p < p_max)))
+        newton = shift + excess / free if free else np.inf
+        newton = newton if low < newton < high else 0.5 * (low + high)
+        if newton == shift or abs(excess) <= 1e-15 * force:
+            break
+        shift = newton
+        p = np.clip(q - shift, 0.0, p_max)
+    # the free nodes share in proportion what rounding of the values has left
+    inside = (p > 0) & (p < p_max)
+    free_force = float(np.sum(p, where=inside))
+    if free_force > 0:
+        factor = (force - float(np.sum(p, where=~inside))) / free_force
+        p[inside] = np.clip(p[inside] * factor, 0.0, p_max)
+    return np.asarray(p)
+
+
+def uniform_on_lowest(level: Array, force: float, p_max: float) -> Array:
+    """Return an even pressure of the given force on the nodes of lowest `level`, a tenth more than needed."""
+    count = min(level.size, max(1, int(np.ceil(1.1 * force / p_max))))
+    pressure = np.zeros(level.shape)
+    pressure.ravel()[np.argpartition(level.ravel(), count - 1)[:count]] = force / count
+    return pressure

@@ -1,0 +1,243 @@
+"""A load path: one step after the other, each from the solution of the step before.
+
+An elastic surface has no history. One with a hardness has: where a node yields, the overlap of the bodies
+becomes indentation, which stays. The next step starts from the lowered surface, with the same pressure in
+balance. Unloading is elastic, and the surface that remains is that of the last step of yielding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.contact._flat_block import flat_block
+from fractalcontact.contact._scaling import (
+    Body,
+    Control,
+    Problem,
+    Solution,
+    Units,
+    mean_by_rows,
+    sum_by_rows,
+)
+
+if TYPE_CHECKING:
+    from fractalcontact.contact._elimination import Elimination
+    from fractalcontact.contact._window_solver import WindowSolver
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+ROWS = 64  # of a plane, at a time
+FORCE_TOLERANCE = 1e-9  # greatest share of an imposed force that the pressures may miss
+
+
+@dataclass(frozen=True)
+class ScaledPath:
+    """Everything a solver needs: body, units, scaled gap, and the imposed values in SI units."""
+
+    body: Body
+    units: Units
+    gap: Array
+    control: str
+    values: tuple[float, ...]
+    hardness: float
+    tolerance: float
+    method: str
+
+
+@dataclass(frozen=True)
+class PlasticHistory:
+    """What yielding has left, scaled: indentation (ny, nx), closure at which the bodies touch now, work."""
+
+    indentation: Array | float = 0.0
+    first_touch: float = 0.0
+    work: float = 0.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step in SI units; the maps are computed when they are asked for."""
+
+    solution: Solution
+    problem: Problem
+    path: ScaledPath
+    closure: float
+    force: float
+    run_time: float
+    history: PlasticHistory
+
+    @property
+    def contact(self) -> Array:
+        """Nodes under pressure, which includes one that is not determined (NaN)."""
+        return np.asarray(~(self.solution.pressure <= 0))
+
+    @property
+    def yielded(self) -> Array:
+        """Nodes at the hardness."""
+        return np.asarray(self.solution.pressure >= self.problem.p_max)
+
+    @property
+    def pressure(self) -> Array:
+        """Pressure in Pa."""
+        pressure = self.solution.pressure * self.path.units.pressure
+        if self.problem.p_max == np.inf:
+            return pressure
+        below = np.nextafter(self.path.hardness, 0.0)
+        return np.where(self.yielded, self.path.hardness, np.minimum(pressure, below))
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement in m, down."""
+        return self.solution.displacement * self.path.units.height
+
+    @property
+    def gap(self) -> Array:
+        """Gap in m: zero in contact, never negative."""
+        scaled = self.problem.gap + self.solution.displacement - self.solution.closure
+        return np.where(self.contact, 0.0, np.maximum(scaled, 0.0)) * self.path.units.height
+
+    @cached_property
+    def new_indentation(self) -> Array | None:
+        """Scaled overlap of the bodies at yielded nodes, which becomes indentation; None without."""
+        if self.problem.p_max == np.inf:
+            return None
+        yielded = self.yielded
+        if not yielded.any():
+            return None
+        overlap = self.solution.closure - self.problem.gap - self.solution.displacement
+        return np.where(yielded, np.maximum(overlap, 0.0), 0.0)
+
+    @property
+    def history_after(self) -> PlasticHistory:
+        """The plastic history with this step."""
+        if self.new_indentation is None:
+            return self.history
+        indentation = self.history.indentation + self.new_indentation
+        work = self.history.work + self.problem.p_max * sum_by_rows(self.new_indentation)
+        return PlasticHistory(indentation, float((self.path.gap + indentation).min()), work)
+
+    @property
+    def indentation(self) -> Array:
+        """Depth in m by which the surface has been lowered for good, since the start of the path."""
+        depth = self.history_after.indentation * self.path.units.height
+        return np.broadcast_to(depth, self.problem.gap.shape)
+
+    @property
+    def plastic_work(self) -> float:
+        """Plastic work in J since the start of the path."""
+        return self.history_after.work * self.path.units.energy
+
+    @property
+    def mean_gap(self) -> float:
+        """Mean gap in m."""
+        solution, gap, row_sums = self.solution, self.problem.gap, []
+        for first in range(0, gap.shape[0], ROWS):  # the gap of the whole plane would be one more array
+            rows = slice(first, first + ROWS)
+            scaled = gap[rows] + solution.displacement[rows] - solution.closure
+            is_open = solution.pressure[rows] <= 0
+            row_sums.append(np.sum(np.maximum(scaled, 0.0), axis=1, where=is_open))
+        return float(np.sum(np.concatenate(row_sums))) / gap.size * self.path.units.height
+
+    @property
+    def elastic_energy(self) -> float:
+        """Elastic energy in J."""
+        return 0.5 * self.solution.work * self.path.units.energy
+
+
+def solve_path(path: ScaledPath) -> Iterator[Step]:
+    """Yield the steps of a path as they are solved."""
+    problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
+    solver: WindowSolver | Elimination | None = None
+    history = PlasticHistory()
+    for value in path.values:
+        start = perf_counter()
+        control = scaled_control(path, value, history.first_touch)
+        solution = closed_form(problem, control)
+        if solution is None:
+            solver = solver or make_solver(problem, path)
+            solution = solver.solve(control)
+        force = solution.force * path.units.force
+        if path.control == "closure":
+            closure, imposed = value, force
+        else:
+            closure, imposed = (solution.closure + history.first_touch) * path.units.height, value
+        if abs(force - imposed) > FORCE_TOLERANCE * imposed:
+            solution = replace(solution, reason="force_missed")
+        step = Step(solution, problem, path, closure, imposed, perf_counter() - start, history)
+        yield step
+        if step.new_indentation is not None:
+            history = step.history_after
+            problem = replace(problem, gap=path.gap + history.indentation - history.first_touch)
+            if solver is not None:
+                solver.lower_surface(problem.gap)
+
+
+def scaled_control(path: ScaledPath, value: float, first_touch: float) -> Control:
+    """Return what is imposed, scaled; the closure counts from the touch of the surface as it is now."""
+    if path.control == "closure":
+        return Control(closure=value / path.units.height - first_touch)
+    largest = path.hardness / path.units.pressure * path.gap.size  # rounding must not ask for more than that
+    return Control(force=min(value / path.units.force, largest))
+
+
+def make_solver(problem: Problem, path: ScaledPath) -> WindowSolver | Elimination:
+    """Return the solver of the method asked for; only that one is imported."""
+    if path.method == "elimination":
+        from fractalcontact.contact._elimination import Elimination
+
+        return Elimination(problem, path.tolerance)
+    from fractalcontact.contact._window_solver import WindowSolver
+
+    return WindowSolver(problem, path.tolerance)
+
+
+def closed_form(problem: Problem, control: Control) -> Solution | None:
+    """Return the solution where there is a closed form: no load, a flat surface, beyond full contact."""
+    if control.value <= 0:
+        zero = np.zeros(problem.body.shape)
+        return Solution(zero, zero, control.closure or 0.0, 0.0)
+    elastic = problem.body.periodic and problem.p_max == np.inf
+    if elastic and control.closure is not None and control.value >= mean_by_rows(problem.gap):
+        return beyond_full_contact(problem, control.value)
+    if not problem.gap.any():
+        return flat_contact(problem, control)
+    return None
+
+
+def beyond_full_contact(problem: Problem, closure: float) -> Solution:
+    """Return the state of a periodic body closed to its mean plane or beyond: full contact, unknown force."""
+    unknown = np.full(problem.body.shape, np.nan)
+    return Solution(
+        unknown, unknown, closure, np.nan, residual=np.nan, reason="beyond_full_contact", work=np.nan
+    )
+
+
+def flat_contact(problem: Problem, control: Control) -> Solution | None:
+    """Return the solution of a flat surface: closure = force / stiffness, as `flat_stiffness` has it.
+
+    None where some nodes yield and others do not.
+    """
+    block = flat_block(problem.body)
+    stiffness = 1.0 / block.compliance if block.compliance > 0 else np.inf
+    force = control.closure * stiffness if control.closure is not None else control.value
+    if problem.body.periodic:  # uniform pressure; any closure makes it yield, any force closes it by nothing
+        pressure = np.full(problem.body.shape, min(force / problem.gap.size, problem.p_max))
+        force = float(pressure[0, 0]) * problem.gap.size
+        return Solution(pressure, block.displacement, control.closure or 0.0, force)
+    if block.pressure.max() * force > problem.p_max:
+        return None
+    return Solution(
+        block.pressure * force,
+        block.displacement * force,
+        force / stiffness if control.closure is None else control.closure,
+        force,
+        block.iterations,
+        block.transforms,
+        block.residual,
+        work=block.compliance * force * force,
+    )

@@ -1,0 +1,69 @@
+"""Cold start by nested iteration: the same problem on coarser grids, coarse to fine.
+
+Most iterations of a cold start on the fine grid would be spent on finding out which part of the surface
+touches at all. On a grid of half the points along each axis that is four times cheaper, and so on down. The
+solution of each grid is the start on the next finer one (nested iteration of the multigrid literature; for
+contact the cascade of Bemporad and Paggi 2015, Int. J. Solids Struct. 69:184).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.grid import UNIFORM
+from fractalcontact.contact import _influence
+from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
+from fractalcontact.contact._scaling import Body, Control, Problem
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SMALLEST = 32  # points along an axis that is not halved any more
+COARSE_TOLERANCE = 2e-2  # residual on a coarse grid
+
+
+def cold_start(problem: Problem, control: Control, dtype: Any) -> tuple[Array, float]:
+    """Return a pressure to start from on the grid of `problem`, and roughly the closure to expect."""
+    factors = tuple(2 if n >= 2 * SMALLEST else 1 for n in problem.body.shape)
+    if factors == (1, 1):
+        if control.closure is None:
+            return np.ones(problem.body.shape, dtype=dtype), float(problem.gap.max())
+        return np.maximum(control.closure - problem.gap, 0.0).astype(dtype), control.closure
+    coarse = coarsened(problem, factors)
+    share = coarse.gap.size / problem.gap.size
+    coarse_control = Control(None if control.force is None else control.force * share, control.closure)
+    start = cold_start(coarse, coarse_control, dtype)[0]
+    system = ContactSystem.on_plane(coarse, dtype)
+    solution = ConstrainedCG(system, coarse_control, start).solve(COARSE_TOLERANCE, certify=False)
+    pressure = solution.pressure.astype(dtype)
+    ny, nx = problem.body.shape
+    finer = np.repeat(np.repeat(pressure, factors[0], axis=0), factors[1], axis=1)[:ny, :nx]
+    return finer, solution.closure
+
+
+def coarsened(problem: Problem, factors: tuple[int, ...]) -> Problem:
+    """Return the problem of the mean gap over cells of `factors` nodes; the extent stays what it is."""
+    body = problem.body
+    shape = (-(-body.shape[0] // factors[0]), -(-body.shape[1] // factors[1]))
+    spacing = (
+        body.spacing[0] * body.shape[0] / shape[0],
+        body.spacing[1] * body.shape[1] / shape[1],
+    )
+    gap = problem.gap
+    for axis, factor in enumerate(factors):
+        if factor > 1:
+            starts = np.arange(0, gap.shape[axis], factor)
+            cell_nodes = np.diff(np.append(starts, gap.shape[axis]))
+            gap = np.add.reduceat(gap, starts, axis=axis) / np.expand_dims(cell_nodes, 1 - axis)
+    coarse = Body(shape, spacing, body.periodic, body.influence, coarse_radius(body, spacing))
+    return Problem(coarse, gap, problem.p_max)
+
+
+def coarse_radius(body: Body, spacing: tuple[float, float]) -> float:
+    """Return the plate radius on a coarse grid: of second order where there is one, else inscribed."""
+    if body.influence != "disc":
+        return 0.0
+    ratio = max(spacing) / min(spacing)
+    second_order = ratio <= _influence.GREATEST_RATIO * (1 + UNIFORM)
+    return _influence.disc_radius("second_order" if second_order else "inscribed", spacing)
