@@ -4,7 +4,7 @@ The paper, figure 5: dilatancy
 
 Rigid faces climb to a plateau within the first millimetre; towards East and South they then go on
 climbing with the mean slope of the face. Elastic faces climb less, the less the harder they are
-pressed. Below, the domains of contact under 30 kN: at 8 mm the faces have forgotten each other.
+pressed. Below, the domains of contact under 30 kN: at 8 mm the faces have decorrelated.
 """
 
 from shared_study import study

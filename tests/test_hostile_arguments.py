@@ -51,7 +51,7 @@ CALLS = {
     "joints.dilatancy": {"crack": CRACK, "shear": [0.0, 1e-4]},
     "joints.friction": {"dilatancy": SLID},
     "joints.cyclic_shear": {"dilatancy": SLID, "path": [0.0, 1e-4, 0.0], "nominal_pressure": 1e6},
-    "joints.roughness_coefficient": {"face": FACE, "lag": 1e-4},
+    "joints.roughness_coefficient": {"surface": FACE, "lag": 1e-4},
     "joints.transmissivity": {"gap": FACE - FACE.min()},
     "joints.bandis_closure": {"nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4},
     "joints.bandis_constants": {"roughness": 10, "wall_strength": 1e8, "aperture": 1e-4},

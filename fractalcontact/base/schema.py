@@ -55,6 +55,8 @@ _STOP = {
     "flag_meanings": " ".join(STOP_REASONS),
 }
 
+CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  # that `press` can return
+
 _EVENT = {
     "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
     "flag_meanings": "continuation birth death merge split merge_and_split",
@@ -212,7 +214,7 @@ QUANTITIES: dict[str, Quantity] = {
     "variogram_dimension": Quantity("1", "dimension by the variogram"),
     "spectrum_dimension": Quantity("1", "dimension by the power spectral density"),
     "delta_height": Quantity("m", "root mean square height of the delta-surface"),
-    "decorrelation_length": Quantity("m", "shear at which the faces have forgotten each other"),
+    "decorrelation_length": Quantity("m", "shear at which the facing heights have decorrelated"),
     "decorrelation_length_low": Quantity("m", "lower end of the 95 % interval of the decorrelation length"),
     "decorrelation_length_high": Quantity("m", "upper end of the 95 % interval of the decorrelation length"),
     "missing_reason": Quantity(None, "why a value or its interval is missing"),

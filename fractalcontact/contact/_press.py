@@ -13,7 +13,7 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, contact_edges, read_grid
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED
+from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
@@ -24,7 +24,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.contact.press"
 UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
 BEYOND = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
-MAPS = ("state", "pressure", "gap", "displacement", "residual_height")
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -44,7 +43,7 @@ def _check(
     surface_is_valid = problems.surface("surface", surface)
     problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
-        problems.choices("keep", keep, MAPS)
+        problems.choices("keep", keep, CONTACT_MAPS)
     problems.boolean("progress", progress)
     options = problems.construct(ContactOptions, **keywords)
     load = problems.construct(

@@ -9,7 +9,7 @@ closure_laws          the named laws of closure fitted to it, and its stiffness
 dilatancy             how far they open when they slide: rigid, under a normal force, or against a spring
 friction              the friction angle and the shear strength that follow from the dilatancy
 cyclic_shear          the shear stress along a path that goes to and fro
-decorrelation_length  the shear at which the faces have forgotten each other
+decorrelation_length  the shear at which the facing heights have decorrelated
 transmissivity        how much fluid the open part of the joint lets through
 register              brings two measured faces into mated position first
 

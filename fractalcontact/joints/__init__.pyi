@@ -1,5 +1,14 @@
+from ._closure import closure as closure
 from ._closure_laws import closure_laws as closure_laws
+from ._crack import Crack as Crack
+from ._cyclic_shear import cyclic_shear as cyclic_shear
+from ._decorrelation import decorrelation_length as decorrelation_length
+from ._delta_dimension import delta_dimension as delta_dimension
+from ._delta_surface import delta_surface as delta_surface
+from ._dilatancy import dilatancy as dilatancy
+from ._friction import friction as friction
 from ._registration import register as register
+from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
 from ._strength_criteria import PARK_PAULAY as PARK_PAULAY
 from ._strength_criteria import bandis_closure as bandis_closure
 from ._strength_criteria import bandis_constants as bandis_constants
@@ -7,16 +16,7 @@ from ._strength_criteria import barton_bandis_scaled as barton_bandis_scaled
 from ._strength_criteria import barton_choubey_strength as barton_choubey_strength
 from ._strength_criteria import self_weight_strength as self_weight_strength
 from ._strength_criteria import size_effect as size_effect
-from .closing import closure as closure
-from .crack import Crack as Crack
-from .cycling import cyclic_shear as cyclic_shear
-from .forgetting import decorrelation_length as decorrelation_length
-from .leakage import transmissivity as transmissivity
-from .opening import dilatancy as dilatancy
-from .profiling import roughness_coefficient as roughness_coefficient
-from .roughening import delta_dimension as delta_dimension
-from .sliding import delta_surface as delta_surface
-from .strength import friction as friction
+from ._transmissivity import transmissivity as transmissivity
 
 __all__ = [
     "Crack",

@@ -1,19 +1,22 @@
-"""Directions of sliding: compass words and azimuths (E is +x, N is +y, anticlockwise from E)."""
+"""Directions of sliding: compass words, or azimuths in degrees (E is +x, N is +y, anticlockwise from E)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from fractalcontact.base.checks import Problems
+from fractalcontact.base.validation import Problems
 
 AZIMUTHS = {"E": 0.0, "NE": 45.0, "N": 90.0, "NW": 135.0, "W": 180.0, "SW": 225.0, "S": 270.0, "SE": 315.0}
-_AXES = {0.0: (0.0, 1.0), 90.0: (1.0, 0.0), 180.0: (0.0, -1.0), 270.0: (-1.0, 0.0)}
+COMPASS = ("E", "N", "W", "S")
 EXPECTED = f"one of {', '.join(AZIMUTHS)}, or an azimuth in degrees"
+LARGEST_AZIMUTH = 1e9  # degree; beyond it a double has no digits left below 360
+# along an axis the other component is exactly zero, so that shifts by whole cells stay whole
+_AXES = {0.0: (0.0, 1.0), 90.0: (1.0, 0.0), 180.0: (0.0, -1.0), 270.0: (-1.0, 0.0)}
 
 
 @dataclass(frozen=True)
@@ -25,45 +28,53 @@ class Direction:
     unit: tuple[float, float]
 
 
-def one_direction(value: Any, problems: Problems, argument: str = "direction") -> Direction:
-    """Read a compass word or an azimuth in degrees."""
+def check_direction(problems: Problems, value: Any) -> bool:
+    """Check for one compass word or azimuth in degrees."""
     if isinstance(value, str):
-        if value in AZIMUTHS:
-            return _direction(AZIMUTHS[value])
-    elif isinstance(value, (int, float, np.integer, np.floating)) and _is_azimuth(value):
-        return _direction(float(value) % 360.0)
-    problems.add(argument, EXPECTED, value)
-    return _direction(0.0)
+        valid = value in AZIMUTHS
+    else:
+        number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+        valid = number and bool(abs(value) < LARGEST_AZIMUTH)  # False for NaN
+    return problems.require(valid, "direction", EXPECTED, value)
 
 
-def _is_azimuth(value: Any) -> bool:
-    """Say whether a number is an angle, and not a truth, NaN or one without any digits below 360."""
-    return not isinstance(value, bool) and bool(abs(value) < 1e9)
+def check_directions(problems: Problems, value: Any) -> bool:
+    """Check for one direction or a sequence of them, in which each occurs once."""
+    values = [value] if is_single(value) else list(value)
+    if not values:
+        problems.add("direction", EXPECTED, "an empty sequence")
+        return False
+    valid = [check_direction(problems, item) for item in values]
+    if not all(valid):
+        return False
+    names = [direction.name for direction in read_directions(value)]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    got = f"{', '.join(repeated)} several times"
+    return problems.require(not repeated, "direction", "every direction once", got)
 
 
-def several_directions(value: Any, problems: Problems, argument: str = "direction") -> tuple[Direction, ...]:
-    """Read one direction or a sequence of them, in which each comes once."""
-    given = [value] if is_one(value) else list(value)
-    if not given:
-        problems.add(argument, EXPECTED, "an empty sequence")
-        return (_direction(0.0),)
-    before = len(problems.found)
-    found = tuple(one_direction(item, problems, argument) for item in given)
-    names = [direction.name for direction in found]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice and len(problems.found) == before:
-        problems.add(argument, "every direction once", f"{', '.join(twice)} several times")
-    return found
+def read_directions(value: Any) -> tuple[Direction, ...]:
+    """Return one or several directions that passed `check_directions`."""
+    return tuple(read_direction(item) for item in ([value] if is_single(value) else value))
 
 
-def is_one(value: Any) -> bool:
-    """Say whether one direction is meant, and not a sequence of them."""
-    return isinstance(value, str) or np.ndim(value) == 0
-
-
-def _direction(azimuth: float) -> Direction:
+def read_direction(value: str | float) -> Direction:
+    """Return a direction that passed `check_direction`."""
+    azimuth = AZIMUTHS[value] if isinstance(value, str) else float(value) % 360.0
     names = {angle: name for name, angle in AZIMUTHS.items()}
     angle = math.radians(azimuth)
-    # along an axis the other component is exactly zero, so that whole shifts stay whole
     unit = _AXES.get(azimuth, (math.sin(angle), math.cos(angle)))
     return Direction(names.get(azimuth, f"{azimuth:g}"), azimuth, unit)
+
+
+def is_single(value: Any) -> bool:
+    """Return whether one direction is meant, not a sequence of them."""
+    return isinstance(value, (str, bytes, dict)) or not np.iterable(value)
+
+
+def direction_coords(directions: Sequence[Direction]) -> dict[str, Any]:
+    """Return the coordinates `direction` and `azimuth` over the dim `direction`."""
+    return {
+        "direction": ("direction", np.array([direction.name for direction in directions])),
+        "azimuth": ("direction", np.array([direction.azimuth for direction in directions])),
+    }

@@ -17,6 +17,8 @@ from fractalcontact.scenes import grammar
 from fractalcontact.scenes.planning import check_loads
 from fractalcontact.scenes.scene import Scene, Table
 
+COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
+
 
 def load(path: str | os.PathLike[str]) -> Scene:
     """Read a scene and check all that can be told without its surface.
@@ -220,9 +222,16 @@ def _check_numbers(table: Table, name: str, problems: Problems) -> None:
         check = problems.number if key in grammar.SINGLE else problems.numbers
         check(f"{name}.{key}", table[key], above=above, at_least=at_least, below=below)
     if "direction" in table:
-        from fractalcontact.joints._directions import several_directions
-
-        several_directions(table["direction"], problems, f"{name}.direction")
+        given = table["direction"]
+        for direction in given if isinstance(given, list) else [given]:
+            azimuth = isinstance(direction, (int, float)) and not isinstance(direction, bool)
+            valid = direction in COMPASS or (azimuth and abs(direction) < 1e9)
+            problems.require(
+                valid,
+                f"{name}.direction",
+                f"one of {', '.join(COMPASS)}, or an azimuth in degrees",
+                direction,
+            )
 
 
 def _known_keys(

@@ -218,7 +218,7 @@ def test_results_survive_a_file(crack, tmp_path):
 def test_options_of_the_solver_are_told_by_the_function_that_was_called(crack):
     options = {"tolerance": -1, "hardness": 0.0, "influence": "disk", "method": "slow"}
     for function in (fc.joints.closure, fc.joints.dilatancy):
-        with pytest.raises(ValueError, match="(?s)tolerance.*method.*hardness.*influence") as caught:
+        with pytest.raises(ValueError, match="(?s)influence.*hardness.*tolerance.*method") as caught:
             function(crack, shear=0.0, normal_force=1.0, **options)
         assert caught.value.where == f"fractalcontact.joints.{function.__name__}"
         assert len(caught.value.problems) == 4
@@ -227,7 +227,7 @@ def test_options_of_the_solver_are_told_by_the_function_that_was_called(crack):
 def test_forces_above_the_hardness_are_refused_and_just_below_it_yield_everywhere(crack):
     most = 1e9 * crack.nominal_area
     for options in ({"normal_force": 1.01 * most}, {"nominal_pressure": 1.01e9}):
-        with pytest.raises(ValueError, match="at most the hardness, 1e[+]09 Pa"):
+        with pytest.raises(ValueError, match="at most (the hardness, 1e[+]09 Pa|hardness times area)"):
             fc.joints.closure(crack, shear=8e-5, hardness=1e9, **options)
     full = fc.joints.closure(crack, shear=8e-5, hardness=1e9, nominal_pressure=0.99e9, keep=("state",))
     assert (full.state == 2).mean() > 0.8

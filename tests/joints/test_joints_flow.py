@@ -269,11 +269,11 @@ def test_leading_dims_and_labels(make_face):
 
 
 def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
-    from fractalcontact.joints import _flow
+    from fractalcontact.joints import _transmissivity
 
     gap = rough((96, 96), 0) + 0.5
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_flow, "DIRECT", 10)
+    monkeypatch.setattr(_transmissivity, "LARGEST_DIRECT", 10)
     pytest.importorskip("pyamg")
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=2e-8)
@@ -287,12 +287,12 @@ def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
 
 @pytest.mark.parametrize("contrast", [10.0, 1e9])
 def test_multigrid_knows_the_error_of_the_flow_for_narrow_beside_wide(make_face, monkeypatch, contrast):
-    from fractalcontact.joints import _flow
+    from fractalcontact.joints import _transmissivity
 
     pytest.importorskip("pyamg")
     gap = np.cbrt(np.where(np.random.default_rng(5).random((120, 120)) < 0.45, 1.0, contrast))
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_flow, "DIRECT", 10)
+    monkeypatch.setattr(_transmissivity, "LARGEST_DIRECT", 10)
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-7)
 

@@ -71,7 +71,7 @@ def test_a_wave_forgets_at_a_known_shear(make_face):
     assert result.decorrelation_length.sel(direction="E") == pytest.approx(expected, abs=5e-3)
     # along its crests a wave forgets nothing
     assert np.isnan(result.decorrelation_length.sel(direction="N"))
-    assert "remember" in result.missing_reason.sel(direction="N").item()
+    assert "still correlated" in result.missing_reason.sel(direction="N").item()
 
 
 def test_a_known_length_with_its_interval(make_face):

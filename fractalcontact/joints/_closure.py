@@ -1,0 +1,307 @@
+"""Closure of a sheared crack: its delta-surface is pressed by a flat, and the bulk part is subtracted."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
+from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.progress import track
+from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
+from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.contact import ContactOptions, LoadPath, flat_stiffness, press
+from fractalcontact.joints._crack import Crack, block_coords, check_sliding
+from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
+from fractalcontact.joints._directions import Direction, direction_coords, is_single, read_directions
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Path = float | Sequence[float] | Array
+
+WHERE = "fractalcontact.joints.closure"
+# how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
+BULK = {
+    "flat_block": (
+        "rigid",
+        "closure of the flat block under the same force and the same influence coefficients",
+    ),
+    "uniform_pressure": (
+        "uniform",
+        "mean displacement of the flat block under the same force, uniformly spread",
+    ),
+}
+LOADS = ("closure", "normal_force", "nominal_pressure")
+SCALARS = (
+    *LOADS, "contact_area", "contact_fraction", "corrected_contact_fraction", "mean_gap", "elastic_energy",
+    "iterations", "residual", "converged", "stop_reason", "run_time",
+)  # fmt: skip
+UNDETERMINED = (
+    "NaN where periodic faces are closed to the mean plane of the delta-surface or beyond: "
+    "no force is then determined"
+)
+STEPS_SHOWN = 5  # in a warning
+
+
+def _check(
+    problems: Problems,
+    *,
+    crack: Any,
+    shear: Any,
+    direction: Any,
+    closure: Any,
+    normal_force: Any,
+    nominal_pressure: Any,
+    bulk: Any,
+    keep: Any,
+    progress: Any,
+    **solver: Any,
+) -> None:
+    check_sliding(problems, crack, shear, direction)
+    problems.boolean("progress", progress)
+    load = problems.construct(
+        LoadPath.from_keywords, closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+    )
+    check_pressing(problems, crack, load, bulk, keep, solver)
+
+
+@public_result(title="closure of a sheared crack", check=_check)
+def closure(
+    crack: Crack,
+    *,
+    shear: Path,
+    direction: str | float | Sequence[str | float] = "E",
+    closure: Path | None = None,
+    normal_force: Path | None = None,
+    nominal_pressure: Path | None = None,
+    bulk: str = "flat_block",
+    keep: Sequence[str] = (),
+    influence: str | None = None,
+    disc_radius: str | float = "second_order",
+    hardness: float | None = None,
+    tolerance: float = 1e-8,
+    method: str = "fast",
+    progress: bool = False,
+) -> xr.Dataset:
+    """Return the closure of a sheared crack under a path of load.
+
+    The delta-surface of every shear is pressed together along the same path. The closure w counts from first
+    touch at that shear. The bulk part w_b(F) is subtracted: w_int = w - w_b, which is 0 to rounding for mated
+    faces.
+
+    Parameters
+    ----------
+    crack : Crack
+    shear : float or sequence of float
+        Shear displacements v >= 0, m, each once.
+    direction : str, float, or a sequence of them
+        Direction of sliding: compass word or azimuth in degrees (E = 0, anticlockwise). A sequence gives the
+        result a first dim `direction`.
+    closure, normal_force, nominal_pressure : float or sequence of float
+        Exactly one of them: approach from first touch (m), force on the block (N), or force over its area
+        (Pa). A sequence is a path of load, which may go up and down.
+    bulk : {"flat_block", "uniform_pressure"}
+        Bulk part: closure of the flat block under the same influence coefficients, or its mean displacement
+        under uniform pressure (about 9 % more for a square). Zero for periodic bodies.
+    keep : sequence of str
+        Maps over (shear, step, y, x) to keep: "state", "pressure", "gap", "displacement", "residual_height".
+    influence, disc_radius, hardness, tolerance, method
+        As for `fractalcontact.contact.press`. With a `hardness` unloading is stiffer than loading.
+    progress : bool
+        Show a progress bar over the shears.
+
+    Returns
+    -------
+    Dataset over (shear, step), or (direction, shear, step)
+        closure, bulk_closure, interface_closure (m), normal_force (N), nominal_pressure (Pa), the other
+        scalars of `press`, the maps in `keep`; nominal_area (m2); interpolation_error (m, rms) over shear.
+
+    Raises
+    ------
+    InvalidInput
+        The block would leave its face, heights are missing in its path, or an argument is wrong.
+
+    Warns
+    -----
+    ConvergenceWarning
+        A step stopped before its tolerance was met.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 4 and figure 3.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=2e-6, rng=1)
+    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> result = fc.joints.closure(crack, shear=[0, 2e-4], normal_force=[10, 100])
+    >>> (result.interface_closure.values * 1e6).round(1).tolist()  # micrometres
+    [[0.0, 0.0], [2.2, 5.2]]
+    """
+    directions, shears = read_directions(direction), float_array(shear)
+    load = LoadPath.from_keywords(
+        closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+    )
+    options = ContactOptions(
+        influence=influence, disc_radius=disc_radius, hardness=hardness, tolerance=tolerance, method=method
+    )
+    pressing = Pressing(load, options, bulk, word_tuple(keep), WHERE)
+    pressed = [press_sheared(crack, shears, towards, pressing, progress) for towards in directions]
+    for towards, columns in zip(directions, pressed, strict=True):
+        warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
+    columns = {name: np.stack([each[name] for each in pressed]) for name in pressed[0]}
+    dims = ("direction", "shear", "step", "y", "x")
+    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
+    variables["interpolation_error"] = dims[:2], interpolation_errors(crack, shears, directions)
+    coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
+    coords |= {"shear": ("shear", shears), "step": np.arange(columns["closure"].shape[2])}
+    coords |= direction_coords(directions)
+    if pressing.keep:
+        coords |= block_coords(crack)
+    result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
+    if is_single(direction):
+        result = result.isel(direction=0)
+    result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
+    _explain_undetermined(result)
+    return result.assign_attrs(achieved_residual=float(columns["residual"].max()))
+
+
+def _explain_undetermined(result: xr.Dataset) -> None:
+    """Add the reason where an elastic body does not determine the force."""
+    if bool((result["stop_reason"] == STOP_REASONS["beyond_full_contact"]).any()):
+        for name, variable in result.variables.items():
+            is_measured = "step" in variable.dims and variable.dtype.kind == "f"
+            if is_measured and bool(np.isnan(variable.values).any()):
+                result[name].attrs["reason"] = UNDETERMINED
+
+
+def warn_unconverged(
+    columns: dict[str, Array], shears: Array, towards: Direction, where: str, *, stacklevel: int
+) -> None:
+    """Warn of the shears and steps at which the solver did not meet its tolerance."""
+    failed = np.argwhere(~columns["converged"])
+    if failed.size == 0:
+        return
+    reasons = list(STOP_REASONS)
+    shown = "; ".join(
+        f"shear {shears[i]:g} m towards {towards.name}, step {j}: {reasons[columns['stop_reason'][i, j]]} "
+        f"(residual {columns['residual'][i, j]:.2g})"
+        for i, j in failed[:STEPS_SHOWN]
+    )
+    more = f"; and {len(failed) - STEPS_SHOWN} more" if len(failed) > STEPS_SHOWN else ""
+    warnings.warn(f"{where}: not converged: {shown}{more}", ConvergenceWarning, stacklevel=stacklevel)
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """How a sheared crack is pressed: load, solver options, bulk part, maps to keep, and the caller."""
+
+    load: LoadPath
+    options: ContactOptions
+    bulk: str
+    keep: tuple[str, ...]
+    where: str
+
+    @property
+    def bulk_comment(self) -> str:
+        """What the bulk part of the closure is."""
+        return BULK[self.bulk][1]
+
+
+def check_pressing(
+    problems: Problems, crack: Any, load: LoadPath | None, bulk: Any, keep: Any, solver: dict[str, Any]
+) -> None:
+    """Check what `Pressing` needs; `load` is None where it has problems of its own."""
+    if keep is not None:
+        problems.choices("keep", keep, CONTACT_MAPS)
+    problems.choice("bulk", bulk, BULK)
+    options = problems.construct(ContactOptions, **solver)
+    if options is None or not isinstance(crack, Crack):
+        return
+    layout = crack.layout
+    replace(options, boundary=_boundary(crack)).check_grid(
+        Grid(layout.cells, layout.spacing, layout.periodic), problems
+    )
+    if load is not None:
+        options.check_load(load, crack.nominal_area, problems)
+
+
+def _boundary(crack: Crack) -> str:
+    return "periodic" if all(crack.layout.periodic) else "free"
+
+
+class ShearedContact:
+    """The delta-surface of one shear between its two bodies, to be pressed along paths of load."""
+
+    def __init__(self, crack: Crack, shear: float, towards: Direction, pressing: Pressing) -> None:
+        self.keep, self.where = pressing.keep, pressing.where
+        self.modulus = crack.contact_modulus
+        self.place = f"at a shear of {shear:g} m towards {towards.name}"
+        self.options = replace(pressing.options, boundary=_boundary(crack))
+        heights = delta_heights(crack, shear, towards, self.where)
+        self.surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack))
+        # the spacing as the solver reads it, so that a flat block is the same to the last bit
+        dy, dx = read_grid(self.surface).spacing
+        self.stiffness = flat_stiffness(
+            crack.layout.cells,
+            (dy, dx),
+            contact_modulus=self.modulus,
+            boundary=_boundary(crack),
+            influence=self.options.influence,
+            disc_radius=self.options.disc_radius,
+            loading=BULK[pressing.bulk][0],
+        )
+
+    def press(self, load: LoadPath, keep: Sequence[str] = ()) -> dict[str, Array]:
+        """Press along a path of load.
+
+        Returns
+        -------
+        dict of ndarray
+            The scalars of `contact.press`, and bulk_closure and interface_closure (m), shape (step,); maps
+            (step, y, x).
+        """
+        pressed = self._solve(load, keep)
+        scalars = SCALARS if self.options.hardness is None else (*SCALARS, "plastic_work")
+        columns = {name: pressed[name].values for name in (*scalars, *keep)}
+        # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
+        has_bulk = np.isfinite(self.stiffness)
+        bulk = columns["normal_force"] / self.stiffness if has_bulk else 0.0 * columns["closure"]
+        return columns | {"bulk_closure": bulk, "interface_closure": columns["closure"] - bulk}
+
+    def _solve(self, load: LoadPath, keep: Sequence[str]) -> xr.Dataset:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ConvergenceWarning)  # one warning follows for all shears
+                return press(
+                    self.surface,
+                    contact_modulus=self.modulus,
+                    keep=keep,
+                    **self.options.keywords(),
+                    **load.keywords(),
+                )
+        except InvalidInput as error:
+            raise InvalidInput(self.where, [f"{line} ({self.place})" for line in error.problems]) from error
+
+
+def press_sheared(
+    crack: Crack, shears: Array, towards: Direction, pressing: Pressing, progress: bool
+) -> dict[str, Array]:
+    """Press the crack together at every shear along the same path of load.
+
+    Returns
+    -------
+    dict of ndarray
+        As `ShearedContact.press`, with the shear as first axis.
+    """
+    results = [
+        ShearedContact(crack, float(shear), towards, pressing).press(pressing.load, pressing.keep)
+        for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear")
+    ]
+    return {name: np.stack([result[name] for result in results]) for name in results[0]}

@@ -1,0 +1,295 @@
+"""The crack: two facing rough faces, the block that slides, and the material of both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.grid import UNIFORM, Grid, read_grid
+from fractalcontact.base.provenance import plain
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._directions import (
+    check_direction,
+    check_directions,
+    read_direction,
+    read_directions,
+)
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Pair = tuple[float, float]
+
+WHERE = "fractalcontact.joints.Crack"
+SMALLEST = 3  # cells along an edge of the block
+WHOLE = 1e-6  # a shear this close to whole cells, in cells, is a shift by whole cells
+FILL = "see fractalcontact.surfaces.fill"
+
+
+@dataclass(frozen=True)
+class Block:
+    """The sliding block in cells of its face; all pairs are (y, x).
+
+    `face_cells` is the shape of the face, `cells` that of the block, `start` the first cell of the block,
+    `spacing` in metres; `wraps` marks the axes along which the face repeats.
+    """
+
+    face_cells: tuple[int, int]
+    cells: tuple[int, int]
+    start: tuple[int, int]
+    spacing: Pair
+    wraps: tuple[bool, bool]
+
+    @property
+    def edges(self) -> Pair:
+        """Edge lengths in metres."""
+        return self.cells[0] * self.spacing[0], self.cells[1] * self.spacing[1]
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Whether the block is a whole period of its face, along y and x."""
+        whole = [n == b for n, b in zip(self.face_cells, self.cells, strict=True)]
+        return self.wraps[0] and whole[0], self.wraps[1] and whole[1]
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """The cells of the block in its face, before any shear."""
+        return tuple(slice(a, a + b) for a, b in zip(self.start, self.cells, strict=True))  # type: ignore[return-value]
+
+    def travel(self, unit: Pair) -> float:
+        """Return the greatest shear (m) towards the unit vector (y, x) that keeps the block on its face."""
+        travel = math.inf
+        for axis, component in enumerate(unit):
+            if self.wraps[axis] or component == 0:
+                continue
+            before = self.start[axis]
+            margin = self.face_cells[axis] - self.cells[axis] - before if component > 0 else before
+            travel = min(travel, margin * self.spacing[axis] / abs(component))
+        return travel
+
+    def shift(self, shear: float, unit: Pair) -> Pair:
+        """Return the shift in cells (y, x), rounded where it is whole within `WHOLE`."""
+        return _rounded(shear * unit[0] / self.spacing[0]), _rounded(shear * unit[1] / self.spacing[1])
+
+
+def _rounded(cells: float) -> float:
+    nearest = float(math.floor(cells + 0.5))
+    return nearest if abs(cells - nearest) <= WHOLE else cells
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Crack:
+    """A crack between two elastic half-spaces of the same material.
+
+    The upper body carries a block that lies on the lower face, slides over it and is pressed against it.
+    A periodic axis wraps: the lower face repeats, and the block may slide any distance. On a free axis the
+    block must stay on the face.
+
+    Parameters
+    ----------
+    lower : DataArray, shape (y, x)
+        Heights (m) of the lower face, up positive; they may be missing (NaN) outside the path of the block.
+    upper : DataArray, shape (y, x), optional
+        Heights (m) of the lower face of the upper body in the same frame and on the same grid: the aperture
+        is upper - lower. None: the faces match perfectly.
+    young : float
+        Young's modulus of both bodies, Pa.
+    poisson : float
+        Poisson's ratio of both bodies, above -1 and below 0.5.
+    block : float or pair (y, x), optional
+        Edge length of the sliding block, m, rounded to the nearest whole number of cells; its first cell is
+        (n - b)//2 of `lower`. None: the whole face.
+    basic_friction_angle : float
+        Friction angle of smooth faces of the material, degree.
+
+    Attributes
+    ----------
+    block : pair of float
+        Edge lengths (y, x) in use, m.
+    layout : Block
+        The block in cells.
+    nominal_area : float
+        Area of the block, m2.
+    contact_modulus : float
+        E* of the pair, young / (2 (1 - poisson^2)), Pa.
+
+    Raises
+    ------
+    InvalidInput
+        Lists all problems of the faces, the material and the block.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> round(crack.travel("W") * 1e3, 3), round(crack.contact_modulus / 1e9, 3)
+    (1.6, 15.625)
+    """
+
+    lower: xr.DataArray
+    upper: xr.DataArray | None = None
+    _: KW_ONLY
+    young: float
+    poisson: float
+    block: Any = None
+    basic_friction_angle: float = 35.0
+    layout: Block = field(init=False)
+
+    def __post_init__(self) -> None:
+        with Problems(WHERE) as problems:
+            problems.number("young", self.young, above=0)
+            problems.number("poisson", self.poisson, above=-1, below=0.5)
+            problems.number("basic_friction_angle", self.basic_friction_angle, at_least=0, below=90)
+            layout = _check_faces(problems, self.lower, self.upper, self.block)
+        for name in ("young", "poisson", "basic_friction_angle"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+        assert layout is not None
+        object.__setattr__(self, "layout", layout)
+        object.__setattr__(self, "block", layout.edges)
+
+    def __repr__(self) -> str:
+        """One line: the faces, the block and the material."""
+        (ny, nx), (by, bx) = self.layout.face_cells, self.layout.cells
+        faces = "mated faces" if self.upper is None else "two faces"
+        block = f"block of {by} x {bx} cells, {self.block[0]:g} x {self.block[1]:g} m"
+        material = f"young={self.young:g}, poisson={self.poisson:g}"
+        friction = f"basic_friction_angle={self.basic_friction_angle:g}"
+        return f"Crack({faces} of {ny} x {nx}, {block}, {material}, {friction})"
+
+    @property
+    def nominal_area(self) -> float:
+        """Area of the block, m2."""
+        return float(self.block[0] * self.block[1])
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of two half-spaces of this material, Pa."""
+        from fractalcontact.contact import effective_modulus  # a study of rigid faces loads no contact solver
+
+        return float(effective_modulus(self.young, self.poisson))
+
+    def travel(self, direction: str | float = "E") -> float:
+        """Return the greatest shear towards `direction`, m; infinite where the face wraps."""
+        with Problems(f"{WHERE}.travel") as problems:
+            check_direction(problems, direction)
+        return self.layout.travel(read_direction(direction).unit)
+
+    def faces(self) -> tuple[Array, Array]:
+        """Return the heights of the whole lower face and of the face of the block, as float64 arrays."""
+        lower = np.asarray(self.lower.values, dtype=np.float64)
+        upper = lower if self.upper is None else np.asarray(self.upper.values, dtype=np.float64)
+        return lower, upper[self.layout.slices]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the description of the crack in the provenance of a result, in plain types."""
+        return {
+            "lower": plain(self.lower),
+            "upper": "mated" if self.upper is None else plain(self.upper),
+            "young": self.young,
+            "poisson": self.poisson,
+            "block": list(self.block),
+            "block_cells": list(self.layout.cells),
+            "basic_friction_angle": self.basic_friction_angle,
+        }
+
+
+def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Block | None:
+    """Check faces and block; return the block in cells unless it is not valid."""
+    block_is_valid = problems.numbers("block", block, above=0, at_most=1e100, optional=True)
+    if block_is_valid and block is not None:
+        expected = "one edge length or (y, x), in metres"
+        block_is_valid = problems.require(float_array(block).size <= 2, "block", expected, block)
+    layout = None
+    lower_is_valid = problems.surface("lower", lower, finite=False)
+    if lower_is_valid and block_is_valid:
+        layout = _layout(problems, block, read_grid(lower))
+    if layout is not None:
+        _check_heights(problems, "lower", lower, layout)
+    if upper is not None and problems.surface("upper", upper, finite=False) and lower_is_valid:
+        _check_upper(problems, upper, lower, layout)
+    return layout
+
+
+def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
+    """Return the block in cells, None where it does not fit its face."""
+    face, spacing = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
+    cells = face
+    if block is not None:
+        edges = np.broadcast_to(float_array(block), 2)
+        cells = (math.floor(edges[0] / spacing[0] + 0.5), math.floor(edges[1] / spacing[1] + 0.5))
+    fits = True
+    for name, b, n, step in zip(("y", "x"), cells, face, spacing, strict=True):
+        expected = f"{SMALLEST} to {n} cells along {name}, {SMALLEST * step:g} to {n * step:g} m"
+        fits &= problems.require(SMALLEST <= b <= n, "block", expected, f"{b} cells")
+    start = ((face[0] - cells[0]) // 2, (face[1] - cells[1]) // 2)
+    return Block(face, cells, start, spacing, (grid.periodic[0], grid.periodic[1])) if fits else None
+
+
+def _check_heights(problems: Problems, argument: str, face: xr.DataArray, layout: Block) -> None:
+    values = np.asarray(face.values, dtype=np.float64)
+    infinite = int(np.count_nonzero(np.isinf(values)))
+    problems.require(infinite == 0, argument, "no infinite heights", f"{infinite}")
+    problems.finite(f"{argument} inside the block", values[layout.slices], remedy=FILL)
+
+
+def _check_upper(problems: Problems, upper: xr.DataArray, lower: xr.DataArray, layout: Block | None) -> None:
+    grid = read_grid(lower)
+    if not problems.require(
+        upper.shape == grid.shape, "upper", f"the shape of lower, {grid.shape}", upper.shape
+    ):
+        return
+    aligned = True
+    for axis, name in enumerate(("y", "x")):
+        distance = np.abs(upper[name].values - lower[name].values).max()
+        allowed = UNIFORM * grid.spacing[axis] + 4.0 * np.spacing(np.abs(lower[name].values).max())
+        aligned &= problems.require(
+            bool(distance <= allowed),
+            f"upper.{name}",
+            f"the positions of lower.{name}",
+            f"up to {distance:g} m off",
+        )
+    if aligned and layout is not None:
+        _check_heights(problems, "upper", upper, layout)
+
+
+def check_crack(problems: Problems, crack: Any) -> bool:
+    """Check for a `Crack`."""
+    expected = "a fractalcontact.joints.Crack"
+    return problems.require(isinstance(crack, Crack), "crack", expected, type(crack).__name__)
+
+
+def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) -> bool:
+    """Check crack, shears (m, each once) and directions, and that the block stays on its face."""
+    valid = [
+        check_crack(problems, crack),
+        check_directions(problems, direction),
+        problems.numbers("shear", shear, at_least=0),
+    ]
+    if not all(valid):
+        return False
+    values, counts = np.unique(float_array(shear), return_counts=True)
+    repeated = ", ".join(f"{value:g} m" for value in values[counts > 1][:5])
+    once = problems.require(not repeated, "shear", "every shear once", f"{repeated} several times")
+    greatest, inside = float(values[-1]), True
+    for item in read_directions(direction):
+        travel = crack.layout.travel(item.unit)
+        expected = f"at most {travel:g} m towards {item.name}, where the block meets the edge of the face"
+        if travel == 0:
+            expected += " (give the Crack a smaller `block`, or periodic faces)"
+        slack = WHOLE * min(crack.layout.spacing)
+        inside &= problems.require(greatest <= travel + slack, "shear", expected, greatest)
+    return once and inside
+
+
+def block_coords(crack: Crack) -> dict[str, xr.DataArray]:
+    """Return x and y of the block; an axis along which the block is a whole period keeps its period."""
+    layout = crack.layout
+    coords = {}
+    for axis, dim in enumerate(("y", "x")):
+        values = np.asarray(crack.lower[dim].values, dtype=np.float64)[layout.slices[axis]]
+        attributes = {"period": float(layout.edges[axis])} if layout.periodic[axis] else {}
+        coords[dim] = xr.DataArray(values, dims=dim, attrs=attributes)
+    return coords

@@ -1,0 +1,238 @@
+"""Cyclic shear: the shear stress along a path of shear that reverses."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._directions import check_direction, read_direction
+from fractalcontact.joints._friction import (
+    ERROR,
+    REFERENCES,
+    check_dilatancy,
+    dilatancy_slopes,
+    mark_locked,
+    read_basic_angle,
+    read_dilatancy,
+)
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+STRESSES = ("shear_stress", "frictional_work")
+
+
+def _check(
+    problems: Problems,
+    *,
+    dilatancy: Any,
+    path: Any,
+    direction: Any,
+    nominal_pressure: Any,
+    basic_friction_angle: Any,
+    smoothing: Any,
+) -> None:
+    valid = [
+        check_dilatancy(problems, dilatancy, basic_friction_angle, smoothing, nominal_pressure),
+        problems.numbers("path", path),
+        direction is None or check_direction(problems, direction),
+    ]
+    if valid[1]:
+        turns = float_array(path)
+        moves = turns.size > 1 and bool((np.diff(turns) != 0).all())
+        expected = "at least two positions, each other than the one before"
+        valid.append(problems.require(moves, "path", expected, path))
+    if all(valid):
+        _check_reach(problems, dilatancy, direction, turns)
+
+
+def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turns: Array) -> None:
+    """Check that the dilatancy covers the path, on both sides where it has negative positions."""
+    if not problems.require("azimuth" in dilatancy.variables, "dilatancy", "an azimuth", "none"):
+        return
+    shears = read_dilatancy(dilatancy)[1]
+    for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items():
+        places = _places(dilatancy, azimuth)
+        expected = f"the azimuth {azimuth:g}"
+        if problems.require(places.size == 1, "dilatancy", expected, _azimuths(dilatancy).tolist()):
+            reach = float((sign * turns).max())
+            covered = reach <= shears[-1] * (1 + 1e-9) and (shears[0] == 0 or reach <= 0)
+            problems.require(covered, "path", f"positions from 0 to {shears[-1]:g} m on both sides", reach)
+    lowest = float(turns.min())
+    problems.require(lowest < 0 or lowest >= shears[0], "path", f"at least {shears[0]:g} m", lowest)
+
+
+@public_result(title="cyclic shear", references=REFERENCES, achieved_error=ERROR, check=_check)
+def cyclic_shear(
+    dilatancy: xr.Dataset,
+    path: Sequence[float] | Array,
+    *,
+    direction: str | float | None = None,
+    nominal_pressure: float | Sequence[float] | None = None,
+    basic_friction_angle: float | None = None,
+    smoothing: float | None = None,
+) -> xr.Dataset:
+    """Return the shear stress along a path of shear that reverses.
+
+    The block climbs on the way out and slides down on the way back: with the dilatancy angle i = atan(d
+    delta/dv) the friction angle is phi_basic + i out and phi_basic - i back, where the stress has the
+    opposite sign. There is no wear: every cycle is like the first one, unlike in a real joint.
+
+    Parameters
+    ----------
+    dilatancy : Dataset
+        From `fractalcontact.joints.dilatancy`, with at least two shears, ascending. For a path with negative
+        positions it must contain the opposite direction and the shear 0.
+    path : sequence of float
+        Positions of the block (m) at which it reverses, from the start on, for example [0, a, -a, 0];
+        positive towards `direction`, negative towards the opposite one.
+    direction : str or float, optional
+        Direction of positive positions; None: the first one of the dilatancy.
+    nominal_pressure : float or sequence of float, optional
+        Pressures (Pa) for rigid faces; dilatancy under force has its own.
+    basic_friction_angle, smoothing
+        As for `fractalcontact.joints.friction`.
+
+    Returns
+    -------
+    Dataset over (point[, step])
+        Every shear of the dilatancy on the way and the turning points, these twice, once with each sense:
+        shear (position, m), slip (m), sense (1 out, -1 back), dilatancy (m), friction_angle (degree); with
+        forces or pressures shear_stress (Pa) and frictional_work (J/m2, since the start). NaN with the
+        `reason` where the friction angle reaches 90 degrees, and for the work from there on.
+
+    Raises
+    ------
+    InvalidInput
+        `dilatancy` is not the Dataset of `dilatancy` or does not cover the path, or an argument is wrong.
+
+    References
+    ----------
+    Patton (1966), 1st ISRM Congress; Goodman (1989), Introduction to Rock Mechanics.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> x = np.arange(60)
+    >>> teeth = np.abs((x + 10) % 20 - 10) * np.tan(np.radians(10)) * np.ones((6, 1))
+    >>> surface = fc.surfaces.from_array(teeth, 1.0)
+    >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
+    >>> climb = fc.joints.dilatancy(crack, shear=[0, 2, 4], direction="E")
+    >>> cycle = fc.joints.cyclic_shear(climb, [0, 4, 0])
+    >>> cycle.friction_angle.values.round(6).tolist()
+    [40.0, 40.0, 40.0, 20.0, 20.0, 20.0]
+    """
+    name, _ = read_dilatancy(dilatancy)
+    turns = float_array(path)
+    sides = {
+        sign: dilatancy.isel(direction=int(_places(dilatancy, azimuth)[0]))
+        if "direction" in dilatancy.dims
+        else dilatancy
+        for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items()
+    }
+    position, opening = _joined_sides(sides, name)
+    slopes, _ = dilatancy_slopes(position, opening, smoothing)
+    pressure = None
+    if name == "dilatancy":
+        pressure = _joined_sides(sides, "nominal_pressure")[1]
+    elif nominal_pressure is not None:
+        values = float_array(nominal_pressure)
+        pressure = np.broadcast_to(values, (position.size, values.size))
+    shear, sense = _points_along(turns, position)
+    angle = np.degrees(np.arctan(_interpolated(shear, position, slopes)))
+    columns = {
+        "dilatancy": _interpolated(shear, position, opening),
+        "friction_angle": read_basic_angle(dilatancy, basic_friction_angle) + sense[:, None] * angle,
+    }
+    if pressure is not None:
+        pressure = _interpolated(shear, position, pressure)
+        columns |= _stresses(shear, sense, columns["friction_angle"], pressure)
+    result = _dataset(shear, sense, columns, pressure, by_step=name == "dilatancy")
+    result["basic_friction_angle"] = read_basic_angle(dilatancy, basic_friction_angle)
+    mark_locked(result, STRESSES)
+    return result.assign_attrs(slope_of=name)
+
+
+def _dataset(
+    shear: Array, sense: Array, columns: dict[str, Array], pressure: Array | None, *, by_step: bool
+) -> xr.Dataset:
+    """Return the columns (point, step) as a Dataset; without `step` where there is only one and no load."""
+    variables: dict[str, Any] = {}
+    for name, values in columns.items():
+        over_steps = by_step or values.shape[1] > 1 or name in STRESSES
+        variables[name] = (("point", "step"), values) if over_steps else ("point", values[:, 0])
+    slip = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(shear)))])
+    variables |= {"shear": ("point", shear), "slip": ("point", slip), "sense": ("point", sense)}
+    result = xr.Dataset(variables, {"point": np.arange(shear.size)})
+    if pressure is not None:
+        steps = np.arange(pressure.shape[1])
+        result = result.assign_coords(step=steps, nominal_pressure=(("point", "step"), pressure))
+    return result
+
+
+def _azimuths(dilatancy: xr.Dataset) -> Array:
+    return np.atleast_1d(np.asarray(dilatancy["azimuth"].values, dtype=float))
+
+
+def _side_azimuths(dilatancy: xr.Dataset, direction: Any, turns: Array) -> dict[int, float]:
+    """Return the azimuth of positive positions under 1 and, if needed, of negative ones under -1."""
+    azimuth = float(_azimuths(dilatancy)[0]) if direction is None else read_direction(direction).azimuth
+    sides = {1: azimuth}
+    if float(turns.min()) < 0:
+        sides[-1] = (azimuth + 180.0) % 360.0
+    return sides
+
+
+def _places(dilatancy: xr.Dataset, azimuth: float) -> Array:
+    """Return at which places along `direction` the dilatancy has the azimuth."""
+    return np.flatnonzero(np.isclose(_azimuths(dilatancy), azimuth, atol=1e-9))
+
+
+def _joined_sides(sides: dict[int, xr.Dataset], name: str) -> tuple[Array, Array]:
+    """Return the positions, ascending, and a variable over (position, step)."""
+    shears = np.asarray(sides[1]["shear"].values, dtype=float)
+    tables = {sign: _table(side[name], shears.size) for sign, side in sides.items()}
+    if -1 not in tables:
+        return shears, tables[1]
+    return np.concatenate([-shears[:0:-1], shears]), np.concatenate([tables[-1][:0:-1], tables[1]])
+
+
+def _table(variable: xr.DataArray, size: int) -> Array:
+    """Return a variable over (shear, step)."""
+    if "shear" not in variable.dims:
+        return np.broadcast_to(np.atleast_1d(variable.values), (size, variable.size))
+    return np.asarray(variable.transpose("shear", ...).values, dtype=float).reshape(size, -1)
+
+
+def _points_along(turns: Array, position: Array) -> tuple[Array, Array]:
+    """Return the positions along the path, those of the dilatancy included, and the sense of sliding."""
+    legs, senses = [], []
+    for first, last in itertools.pairwise(turns):
+        low, high = min(first, last), max(first, last)
+        inner = position[(position > low) & (position < high)]
+        leg = np.concatenate([[low], inner, [high]])
+        legs.append(leg if last > first else leg[::-1])
+        senses.append(np.full(leg.size, 1 if last > first else -1, dtype=np.int8))
+    return np.concatenate(legs), np.concatenate(senses)
+
+
+def _interpolated(shear: Array, position: Array, table: Array) -> Array:
+    """Return a table over (position, ...) at other positions, linear between."""
+    return np.stack([np.interp(shear, position, column) for column in table.T], axis=1)
+
+
+def _stresses(shear: Array, sense: Array, angle: Array, pressure: Array) -> dict[str, Array]:
+    """Return shear stress and the work done against it, over (point, step)."""
+    angle = np.broadcast_to(angle, pressure.shape)
+    stress = sense[:, None] * pressure * np.tan(np.radians(np.where(angle < 90.0, angle, np.nan)))
+    work_step = 0.5 * (stress[1:] + stress[:-1]) * np.diff(shear)[:, None]
+    # at a turning point the block does not move while the stress changes its sign
+    work_step = np.where(np.diff(shear)[:, None] == 0, 0.0, work_step)
+    work = np.concatenate([np.zeros((1, stress.shape[1])), np.cumsum(work_step, axis=0)])
+    return {"shear_stress": stress, "frictional_work": work}

@@ -1,0 +1,266 @@
+"""Decorrelation of two faces: the shear at which the facing heights are no longer correlated.
+
+Heights are measured from the mean plane of their whole face. Sums are kept for tiles of the block, so that an
+interval follows from leaving tiles out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
+from fractalcontact.joints._delta_surface import heights_under, missing_heights
+from fractalcontact.joints._directions import (
+    COMPASS,
+    Direction,
+    check_directions,
+    direction_coords,
+    read_directions,
+)
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.joints.decorrelation_length"
+THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines the decorrelation length
+MAX_SHEARS = 128  # of the default shears
+FINE, COARSE = 8, 4  # tiles along an edge of the block
+FEWEST_LENGTHS = 15.0  # lengths in an edge of the block, below which the interval does not cover
+QUANTILE = 2.776  # of Student's t for 4 degrees of freedom: checked to cover 95 % on faces of known length
+ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a smaller residual from the mean plane is rounding
+
+
+def _check(problems: Problems, *, crack: Any, direction: Any, shear: Any) -> None:
+    if shear is not None:
+        if check_sliding(problems, crack, shear, direction):
+            shears = float_array(shear)
+            ascending = shears[0] == 0 and shears.size > 1 and bool((np.diff(shears) > 0).all())
+            problems.require(ascending, "shear", "at least two shears, ascending from 0", shear)
+        return
+    valid = [check_crack(problems, crack), check_directions(problems, direction)]
+    if all(valid):
+        slides = _whole_cell_shears(crack, read_directions(direction)).size > 1
+        expected = "a block smaller than its face, or periodic faces"
+        problems.require(slides, "crack", expected, crack.layout.cells)
+
+
+@public_result(title="correlation of the faces of a sheared crack", check=_check)
+def decorrelation_length(
+    crack: Crack,
+    *,
+    direction: str | float | Sequence[str | float] = COMPASS,
+    shear: Sequence[float] | Array | None = None,
+) -> xr.Dataset:
+    """Return the shear at which the two faces of a crack have decorrelated.
+
+    It is the shear at which the correlation of the facing heights, each from the mean plane of its whole
+    face, has fallen to 1/e of that at no shear. A self-affine face has no such length of its own: the result
+    then grows with the size of the face, and holds for this face only.
+
+    Parameters
+    ----------
+    crack : Crack
+    direction : str, float, or a sequence of them
+        Directions in which the block slides: compass words, or azimuths in degrees (E = 0, anticlockwise).
+    shear : sequence of float, optional
+        Shears (m), ascending from 0. None: whole cells up to the greatest travel (half the face where it
+        wraps); all of them up to 128, otherwise 128 in geometric steps.
+
+    Returns
+    -------
+    Dataset
+        correlation and structure_function (m2, the variance of the delta-surface) over (direction, shear);
+        decorrelation_length (m) over direction, NaN where the faces are still correlated at the greatest
+        shear; decorrelation_length_low and _high, its 95 % interval, NaN where the block is less than 15
+        lengths wide and holds too few independent parts; missing_reason; run_time (s).
+
+    Raises
+    ------
+    InvalidInput
+        The block cannot slide, heights are missing in its path, or an argument is wrong.
+
+    Notes
+    -----
+    The interval is a jackknife over tiles of the block. Its coverage was checked on Gaussian faces with
+    exponential, Gaussian and power-law correlation.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 4 (the threshold scale); Künsch (1989),
+    Ann. Stat. 17:1217 (jackknife of dependent data).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> wave = np.cos(2 * np.pi * np.arange(80) / 80) * np.ones((80, 1))
+    >>> surface = fc.surfaces.from_array(wave, 1.0, periodic=True)
+    >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2)
+    >>> result = fc.joints.decorrelation_length(crack, direction="E")
+    >>> round(float(result.decorrelation_length[0]), 1)  # 80 / (2 pi) arccos(1/e)
+    15.2
+    """
+    directions = read_directions(direction)
+    shears = _whole_cell_shears(crack, directions) if shear is None else float_array(shear)
+    correlations, variances, lengths = [], [], []
+    for towards in directions:
+        sums, variance = _crack_sums(crack, shears, towards)
+        correlations.append(sums.correlation(np.ones(sums.product.shape[1])))
+        variances.append(variance)
+        lengths.append(estimate_length(sums, shears, min(crack.block)))
+    dims = ("direction", "shear")
+    return xr.Dataset(
+        {
+            "correlation": (dims, np.stack(correlations)),
+            "structure_function": (dims, np.stack(variances)),
+            "decorrelation_length": ("direction", [length.value for length in lengths]),
+            "decorrelation_length_low": ("direction", [length.low for length in lengths]),
+            "decorrelation_length_high": ("direction", [length.high for length in lengths]),
+            "missing_reason": ("direction", np.array([length.reason for length in lengths])),
+        },
+        coords={"shear": ("shear", shears), **direction_coords(directions)},
+        attrs={"correlation_threshold": THRESHOLD},
+    )
+
+
+def _whole_cell_shears(crack: Crack, directions: Sequence[Direction]) -> Array:
+    """Return 0 and at most `MAX_SHEARS` whole-cell shears up to the least travel of the directions."""
+    layout = crack.layout
+    step = min(layout.spacing)
+    travel = min(layout.travel(towards.unit) for towards in directions)
+    if math.isinf(travel):
+        travel = 0.5 * min(n * s for n, s in zip(layout.face_cells, layout.spacing, strict=True))
+    cells = math.floor(travel / step * (1.0 + 1e-9))
+    if cells <= MAX_SHEARS:
+        return np.arange(cells + 1) * step
+    return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, MAX_SHEARS)))]) * step
+
+
+def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSums, Array]:
+    layout = crack.layout
+    order = 0 if any(layout.wraps) else 1
+    faces = [crack.lower] if crack.upper is None else [crack.lower, crack.upper]
+    heights = [np.asarray(face.values, dtype=np.float64) for face in faces]
+    planes = [_without_rounding(detrended(face, order)[0], face) for face in heights]
+    sums, variance = tile_sums(planes[0], planes[-1][layout.slices], layout, shears, towards.unit)
+    if not np.isfinite(variance).all():
+        raise missing_heights(WHERE, crack, towards, float(shears[~np.isfinite(variance)][0]))
+    return sums, variance
+
+
+def _without_rounding(residual: Array, heights: Array) -> Array:
+    """Return the heights from the mean plane, zero where they are only the rounding of a plane."""
+    rounding = ROUNDING * float(np.nanmax(np.abs(heights)))
+    return residual if float(np.nanmax(np.abs(residual))) > rounding else residual * 0.0
+
+
+@dataclass(frozen=True)
+class TileSums:
+    """Sums over every tile, shape (shear, tile): products of facing heights, and their squares."""
+
+    product: Array
+    lower: Array
+    upper: Array
+
+    def correlation(self, weights: Array) -> Array:
+        """Return the correlation at every shear from the tiles of weight 1 (the others have weight 0)."""
+        product, lower, upper = (part @ weights for part in (self.product, self.lower, self.upper))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(product / np.sqrt(lower * upper))
+
+
+@dataclass(frozen=True)
+class Length:
+    """Decorrelation length with its 95 % interval, or the reason why one is missing."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+    reason: str = ""
+
+
+def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> tuple[TileSums, Array]:
+    """Return the sums over tiles, and the variance of the delta-surface, at every shear.
+
+    Parameters
+    ----------
+    lower : ndarray, shape (ny, nx)
+        Heights of the whole lower face from its mean plane.
+    upper : ndarray, shape block.cells
+        Heights of the face of the block from the mean plane of the upper face.
+    """
+    side = FINE if min(block.cells) >= FINE else 1
+    tiles = side * side
+    product, squares = np.empty((shears.size, tiles)), np.empty((shears.size, tiles))
+    variance = np.empty(shears.size)
+    for index, shear in enumerate(shears):
+        under = heights_under(lower, block, block.shift(float(shear), unit))
+        product[index], squares[index] = _tile_sum(under * upper, side), _tile_sum(under * under, side)
+        variance[index] = np.var(under - upper)
+    upper_squares = np.broadcast_to(_tile_sum(upper * upper, side), (shears.size, tiles))
+    return TileSums(product, squares, upper_squares), variance
+
+
+def _tile_sum(plane: Array, side: int) -> Array:
+    for axis in (0, 1):
+        starts = np.arange(side) * plane.shape[axis] // side
+        plane = np.add.reduceat(plane, starts, axis=axis)
+    return plane.ravel()
+
+
+def estimate_length(sums: TileSums, shears: Array, edge: float) -> Length:
+    """Return the shear at which the correlation has fallen to 1/e of that at no shear, with its interval.
+
+    The interval is the jackknife spread of the logarithm of the length. The variances from 8 and from 4 tiles
+    along an edge are extrapolated to fewer, wider tiles, which depend least on each other.
+    """
+    tiles = sums.product.shape[1]
+    correlation = sums.correlation(np.ones(tiles))
+    value = _crossing(correlation, shears)
+    if not np.isfinite(correlation[0]):
+        return Length(math.nan, reason="the faces are planes")
+    if math.isnan(value):
+        return Length(value, reason="the faces are still correlated at the greatest shear")
+    if value < shears[1]:
+        return Length(value, reason="no interval: the length is below the first shear")
+    if tiles < FINE * FINE:
+        return Length(value, reason="no interval: the block has too few cells")
+    if edge < FEWEST_LENGTHS * value:
+        return Length(value, reason=f"no interval: the block is less than {FEWEST_LENGTHS:g} lengths wide")
+    fine, coarse = (_jackknife_variance(sums, shears, side) for side in (FINE, COARSE))
+    half_width = QUANTILE * math.sqrt(max(2.0 * coarse - fine, coarse))
+    if not math.isfinite(half_width):
+        return Length(value, reason="no interval: without a part of the block the faces stay correlated")
+    return Length(value, value * math.exp(-half_width), value * math.exp(half_width))
+
+
+def _jackknife_variance(sums: TileSums, shears: Array, side: int) -> float:
+    """Return the jackknife variance of the logarithm of the length, with side * side tiles left out."""
+    row = np.arange(FINE) * side // FINE
+    group = (row[:, None] * side + row[None, :]).ravel()
+    lengths = [
+        _crossing(sums.correlation((group != tile).astype(float)), shears) for tile in range(side * side)
+    ]
+    with np.errstate(invalid="ignore"):
+        return float((side * side - 1) * np.var(np.log(lengths)))
+
+
+def _crossing(correlation: Array, shears: Array) -> float:
+    """Return where the correlation first falls to 1/e of its first value, linear between the shears."""
+    if not correlation[0] > 0:
+        return math.nan
+    excess = correlation / correlation[0] - THRESHOLD
+    below = np.flatnonzero(excess <= 0)
+    if below.size == 0:
+        return math.nan
+    k = int(below[0])
+    part = excess[k - 1] / (excess[k - 1] - excess[k])
+    return float(shears[k - 1] + part * (shears[k] - shears[k - 1]))

@@ -1,0 +1,237 @@
+"""The delta-surface: the difference of the facing heights once the block has slid.
+
+Shifts are counted in cells, (y, x). A whole shift is a copy and exact. A fractional shift along an axis that
+wraps is band-limited (Fourier) and exact for what the grid resolves. Along a free axis it is a quintic spline
+through the heights, whose error for a wave of wavenumber k falls as (k * spacing)^6.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base import fft
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
+from fractalcontact.joints._directions import Direction, direction_coords, is_single, read_directions
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.joints.delta_surface"
+DEGREE = 5  # of the spline
+SPLINE_REACH = 48  # cells beyond which a height no longer changes a quintic spline (0.43^48 = 3e-18)
+# the error of the spline is measured on so many lines of at least so many points, without so many at the ends
+ERROR_LINES, SHORTEST_LINE, ERROR_MARGIN = 256, 40, 2
+
+
+def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any) -> None:
+    check_sliding(problems, crack, shear, direction)
+
+
+@public_result(title="delta-surface of a sheared crack", check=_check)
+def delta_surface(
+    crack: Crack,
+    shear: float | Sequence[float] | Array,
+    direction: str | float | Sequence[str | float] = "E",
+) -> xr.DataArray:
+    """Return the difference of the facing heights after the block has slid.
+
+    In coordinates x of the block, delta(x) = lower(x + v) - upper(x), where the block moves by v towards
+    `direction`. Pressing the sheared crack together is the same as pressing this surface with a flat from
+    above. A plane of slope m towards E adds m v to the delta-surface towards E and -m v towards W.
+
+    Parameters
+    ----------
+    crack : Crack
+    shear : float or sequence of float
+        Shear displacement v >= 0, m, each once. Within 1e-6 of whole cells the shift is a copy, and exact.
+        Otherwise it is band-limited where the face wraps, and a quintic spline on a free axis.
+    direction : str, float, or a sequence of them
+        E, NE, N, NW, W, SW, S, SE (E is +x, N is +y), or the azimuth in degrees from E, anticlockwise.
+
+    Returns
+    -------
+    DataArray `height`, shape (y, x), after (direction,) and (shear,) where sequences are given
+        Metres, on the grid of the block. An axis is periodic where the block is a whole period of its face.
+        The coordinate interpolation_error (m) is the rms error of the heights under the block: 0 for whole
+        shifts; otherwise that of the spline half way between two points, measured on the face by leaving out
+        every second height. NaN where the face has fewer than 40 points in a row.
+
+    Raises
+    ------
+    InvalidInput
+        The block would leave its face (the greatest travel is named), or heights are missing in its path.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> plane = fc.surfaces.from_array(0.1 * np.arange(20.0) * np.ones((20, 1)), 1.0)
+    >>> crack = fc.joints.Crack(plane, young=30e9, poisson=0.2, block=10)
+    >>> delta = fc.joints.delta_surface(crack, shear=[0, 4], direction="W")
+    >>> delta.mean(("y", "x")).values.round(12).tolist()
+    [0.0, -0.4]
+    """
+    directions, shears = read_directions(direction), float_array(shear)
+    planes = np.empty((len(directions), shears.size, *crack.layout.cells))
+    for i, towards in enumerate(directions):
+        for j, v in enumerate(shears):
+            planes[i, j] = delta_heights(crack, float(v), towards, WHERE)
+    coords: dict[str, Any] = {
+        "shear": ("shear", shears),
+        **block_coords(crack),
+        **direction_coords(directions),
+    }
+    coords["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
+    result = xr.DataArray(planes, dims=("direction", "shear", "y", "x"), coords=coords, name="height")
+    if np.ndim(shear) == 0:
+        result = result.isel(shear=0)
+    if is_single(direction):
+        result = result.isel(direction=0)
+    return result
+
+
+def delta_heights(crack: Crack, shear: float, direction: Direction, where: str) -> Array:
+    """Return the heights of one delta-surface, shape (y, x) of the block."""
+    lower, upper = crack.faces()
+    under = heights_under(lower, crack.layout, crack.layout.shift(shear, direction.unit))
+    plane = np.asarray(under - upper)
+    if not np.isfinite(plane).all():
+        raise missing_heights(where, crack, direction, shear)
+    return plane
+
+
+def missing_heights(where: str, crack: Crack, direction: Direction, shear: float) -> InvalidInput:
+    """Return the error for heights that are missing in the path of the block."""
+    under = heights_under(crack.faces()[0], crack.layout, crack.layout.shift(shear, direction.unit))
+    count = int(np.count_nonzero(~np.isfinite(under)))
+    expected = f"crack.lower: expected finite heights under the block ({FILL})"
+    return InvalidInput(
+        where, [f"{expected}, got {count} missing at a shear of {shear:g} m towards {direction.name}"]
+    )
+
+
+def interpolation_errors(crack: Crack, shears: Array, directions: Sequence[Direction]) -> Array:
+    """Return the rms error (m) of the heights under the block, shape (direction, shear).
+
+    Zero for whole shifts, and along axes that wrap, where a shift is exact for what the grid resolves;
+    otherwise that of the spline half way between two points.
+    """
+    layout, face = crack.layout, crack.faces()[0]
+    axis_squares: dict[int, float] = {}
+    squares = np.zeros((len(directions), shears.size))
+    for i, direction in enumerate(directions):
+        for j, shear in enumerate(shears):
+            for axis, cells in enumerate(layout.shift(float(shear), direction.unit)):
+                if cells == np.floor(cells) or layout.wraps[axis]:
+                    continue
+                if axis not in axis_squares:
+                    axis_squares[axis] = spline_error(face, axis) ** 2
+                squares[i, j] += axis_squares[axis]
+    return np.sqrt(squares)
+
+
+def heights_under(face: Array, block: Block, shift: Pair) -> Array:
+    """Return the heights of the face under the block after a shift.
+
+    Parameters
+    ----------
+    face : ndarray, shape (ny, nx)
+        May contain NaN; the result is NaN where such a height was needed.
+    block : Block
+    shift : pair of float
+        Cells (y, x), inside the travel.
+
+    Returns
+    -------
+    ndarray, shape block.cells
+        A view of `face` where nothing had to be interpolated.
+    """
+    part = face
+    # whole shifts first: they crop, and leave less to interpolate
+    for axis in sorted((0, 1), key=lambda a: shift[a] != math.floor(shift[a])):
+        part = _shift_axis(part, axis, block, shift[axis])
+    return part
+
+
+def _shift_axis(part: Array, axis: int, block: Block, shift: float) -> Array:
+    whole, n, size = math.floor(shift), block.face_cells[axis], block.cells[axis]
+    first = block.start[axis] + whole
+    fraction = shift - whole
+    if fraction and block.wraps[axis]:
+        part, fraction = _fourier_shift(part, axis, fraction), 0.0
+    if fraction:
+        return _spline_shift(part, axis, first + fraction, size)
+    if 0 <= first <= n - size:
+        cells = slice(first, first + size)
+        return part[cells] if axis == 0 else part[:, cells]
+    return np.take(part, np.arange(first, first + size) % n, axis=axis)
+
+
+def _fourier_shift(part: Array, axis: int, fraction: float) -> Array:
+    """Shift periodic lines by a fraction of a cell; the ambiguous Nyquist wave keeps its real part."""
+    lines = np.ascontiguousarray(np.moveaxis(part, axis, -1))
+    n = lines.shape[-1]
+    phase = np.exp(1j * fft.wavenumbers(n, 1.0, real=True) * fraction)
+    if n % 2 == 0:
+        phase[-1] = phase[-1].real
+    return np.moveaxis(fft.irfft(fft.rfft(lines) * phase, n), -1, axis)
+
+
+def _spline_shift(part: Array, axis: int, first: float, size: int) -> Array:
+    from scipy.interpolate import make_interp_spline
+
+    low, high = math.floor(first), math.floor(first) + size  # nodes next to the ends of the block
+    low, high = _spline_window(part, axis, low, high)
+    nodes = np.arange(low, high + 1)
+    degree = min(DEGREE, nodes.size - 1 if nodes.size % 2 == 0 else nodes.size - 2)
+    values = np.take(part, nodes, axis=axis)
+    spline = make_interp_spline(nodes - low, values, k=degree, axis=axis, check_finite=False)
+    return np.asarray(spline(first - low + np.arange(size)))
+
+
+def _spline_window(part: Array, axis: int, low: int, high: int) -> tuple[int, int]:
+    """Widen the nodes low..high by the reach of the spline, but not across missing heights."""
+    n = part.shape[axis]
+    missing = np.flatnonzero(~np.isfinite(part).all(axis=1 - axis))
+    before, after = missing[missing < low], missing[missing > high]
+    lowest = before[-1] + 1 if before.size else 0
+    highest = after[0] - 1 if after.size else n - 1
+    return int(max(lowest, low - SPLINE_REACH)), int(min(highest, high + SPLINE_REACH))
+
+
+def spline_error(face: Array, axis: int) -> float:
+    """Return the rms error of the spline half way between the points of a face, along one axis.
+
+    Splines through every second and every fourth point are compared with the heights between them. The ratio
+    of the two errors extrapolates to a spline through all points: it is 2^H on a self-affine face of Hurst
+    exponent H, up to 2^6 on a smooth one. NaN where the face has no long enough line without gaps.
+    """
+    lines = np.moveaxis(face, axis, -1)
+    lines = lines[np.isfinite(lines).all(axis=1)]
+    lines = lines[:: max(1, len(lines) // ERROR_LINES)]
+    if lines.size == 0 or lines.shape[-1] < SHORTEST_LINE:
+        return math.nan
+    second, fourth = (_midpoint_error(lines, step) for step in (2, 4))
+    return second * min(max(second / fourth, 2.0**-6), 1.0) if fourth > 0 else second
+
+
+def _midpoint_error(lines: Array, step: int) -> float:
+    """Return the rms error of a spline through every `step`-th point at the points half way between."""
+    from scipy.interpolate import make_interp_spline
+
+    nodes, middles = lines[:, ::step], lines[:, step // 2 :: step]
+    spline = make_interp_spline(np.arange(nodes.shape[1]), nodes, k=DEGREE, axis=1, check_finite=False)
+    inside = slice(ERROR_MARGIN, min(nodes.shape[1] - 1, middles.shape[1]) - ERROR_MARGIN)
+    places = np.arange(nodes.shape[1])[inside] + 0.5
+    return float(np.sqrt(np.mean((np.asarray(spline(places)) - middles[:, inside]) ** 2)))
