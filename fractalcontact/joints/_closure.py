@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
-from fractalcontact.contact import ContactOptions, LoadPath, flat_stiffness, press
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
 from fractalcontact.joints._directions import Direction, direction_coords, is_single, read_directions
@@ -65,7 +65,10 @@ def _check(
     check_sliding(problems, crack, shear, direction)
     problems.boolean("progress", progress)
     load = problems.construct(
-        LoadPath.from_keywords, closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+        fc.contact.LoadPath.from_keywords,
+        closure=closure,
+        normal_force=normal_force,
+        nominal_pressure=nominal_pressure,
     )
     check_pressing(problems, crack, load, bulk, keep, solver)
 
@@ -145,10 +148,10 @@ def closure(
     [[0.0, 0.0], [2.2, 5.2]]
     """
     directions, shears = read_directions(direction), float_array(shear)
-    load = LoadPath.from_keywords(
+    load = fc.contact.LoadPath.from_keywords(
         closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
     )
-    options = ContactOptions(
+    options = fc.contact.ContactOptions(
         influence=influence, disc_radius=disc_radius, hardness=hardness, tolerance=tolerance, method=method
     )
     pressing = Pressing(load, options, bulk, word_tuple(keep), WHERE)
@@ -202,8 +205,8 @@ def warn_unconverged(
 class Pressing:
     """How a sheared crack is pressed: load, solver options, bulk part, maps to keep, and the caller."""
 
-    load: LoadPath
-    options: ContactOptions
+    load: fc.contact.LoadPath
+    options: fc.contact.ContactOptions
     bulk: str
     keep: tuple[str, ...]
     where: str
@@ -215,13 +218,18 @@ class Pressing:
 
 
 def check_pressing(
-    problems: Problems, crack: Any, load: LoadPath | None, bulk: Any, keep: Any, solver: dict[str, Any]
+    problems: Problems,
+    crack: Any,
+    load: fc.contact.LoadPath | None,
+    bulk: Any,
+    keep: Any,
+    solver: dict[str, Any],
 ) -> None:
     """Check what `Pressing` needs; `load` is None where it has problems of its own."""
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
     problems.choice("bulk", bulk, BULK)
-    options = problems.construct(ContactOptions, **solver)
+    options = problems.construct(fc.contact.ContactOptions, **solver)
     if options is None or not isinstance(crack, Crack):
         return
     layout = crack.layout
@@ -248,7 +256,7 @@ class ShearedContact:
         self.surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack))
         # the spacing as the solver reads it, so that a flat block is the same to the last bit
         dy, dx = read_grid(self.surface).spacing
-        self.stiffness = flat_stiffness(
+        self.stiffness = fc.contact.flat_stiffness(
             crack.layout.cells,
             (dy, dx),
             contact_modulus=self.modulus,
@@ -258,7 +266,7 @@ class ShearedContact:
             loading=BULK[pressing.bulk][0],
         )
 
-    def press(self, load: LoadPath, keep: Sequence[str] = ()) -> dict[str, Array]:
+    def press(self, load: fc.contact.LoadPath, keep: Sequence[str] = ()) -> dict[str, Array]:
         """Press along a path of load.
 
         Returns
@@ -275,11 +283,11 @@ class ShearedContact:
         bulk = columns["normal_force"] / self.stiffness if has_bulk else 0.0 * columns["closure"]
         return columns | {"bulk_closure": bulk, "interface_closure": columns["closure"] - bulk}
 
-    def _solve(self, load: LoadPath, keep: Sequence[str]) -> xr.Dataset:
+    def _solve(self, load: fc.contact.LoadPath, keep: Sequence[str]) -> xr.Dataset:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ConvergenceWarning)  # one warning follows for all shears
-                return press(
+                return fc.contact.press(
                     self.surface,
                     contact_modulus=self.modulus,
                     keep=keep,

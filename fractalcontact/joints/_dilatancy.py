@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.joints._closure import (
+    Pressing,
+    ShearedContact,
+    check_pressing,
+    press_sheared,
+    warn_unconverged,
+)
 from fractalcontact.joints._crack import Block, Crack, Pair, block_coords, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._directions import COMPASS, Direction, direction_coords, read_directions
-
-if TYPE_CHECKING:
-    from fractalcontact.joints._closure import Pressing, ShearedContact
-
-# `_closure` and the contact solver are imported in the functions that press: a study of rigid faces loads
-# no solver
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Columns = dict[str, Array]
@@ -50,11 +52,8 @@ def _check(
         unused = {"keep": keep, "normal_stiffness": normal_stiffness, "bulk": bulk, **solver}
         _check_defaults(problems, unused)
         return
-    from fractalcontact.contact import LoadPath
-    from fractalcontact.joints._closure import check_pressing
-
     problems.number("normal_stiffness", normal_stiffness, above=0, optional=True)
-    load = problems.construct(LoadPath, "normal_force", normal_force)
+    load = problems.construct(fc.contact.LoadPath, "normal_force", normal_force)
     check_pressing(problems, crack, load, bulk, keep, solver)
 
 
@@ -144,13 +143,11 @@ def dilatancy(
     rigid = _rigid_dataset(crack, shears, directions)
     if normal_force is None:
         return rigid
-    from fractalcontact.contact import ContactOptions, LoadPath
-    from fractalcontact.joints._closure import Pressing, press_sheared, warn_unconverged
-
-    options = ContactOptions(
+    options = fc.contact.ContactOptions(
         influence=influence, disc_radius=disc_radius, hardness=hardness, tolerance=tolerance, method=method
     )
-    pressing = Pressing(LoadPath("normal_force", normal_force), options, bulk, word_tuple(keep), WHERE)  # type: ignore[arg-type]
+    load = fc.contact.LoadPath.from_keywords(normal_force=normal_force)
+    pressing = Pressing(load, options, bulk, word_tuple(keep), WHERE)
     pressed = []
     for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):
         if normal_stiffness is None:
@@ -281,8 +278,6 @@ def press_against_spring(
     dict of ndarray
         As `press_sheared`; normal_force and all that depends on it differ from shear to shear.
     """
-    from fractalcontact.joints._closure import ShearedContact
-
     at_rest = ShearedContact(crack, 0.0, towards, pressing).press(pressing.load)
     initial_dilatancy = -at_rest["interface_closure"]
     results = []
@@ -302,10 +297,8 @@ def _press_balanced(contact: ShearedContact, initial: float, opening: float, sti
     """Press under the force that balances the spring; `opening` is that of the rigid faces, m."""
     from scipy.optimize import brentq
 
-    from fractalcontact.contact import LoadPath
-
     def press(force: float, keep: Sequence[str] = ()) -> Columns:
-        return contact.press(LoadPath("normal_force", (force,)), keep)
+        return contact.press(fc.contact.LoadPath("normal_force", (force,)), keep)
 
     def excess(force: float) -> float:
         interface_closure = press(force)["interface_closure"][0] if force > 0 else 0.0
