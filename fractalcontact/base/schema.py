@@ -102,8 +102,8 @@ QUANTITIES: dict[str, Quantity] = {
     "method": Quantity(None, "estimator"),
     "hurst": Quantity("1", "Hurst exponent"),
     "fractal_dimension": Quantity("1", "fractal dimension"),
-    "fitted_hurst": Quantity("1", "Hurst exponent as fitted, before it was limited to 0 ... 1"),
-    "misfit": Quantity("1", "departure from the model in standard deviations"),
+    "fitted_hurst": Quantity("1", "Hurst exponent as fitted, not limited to 0 ... 1"),
+    "misfit": Quantity("1", "goodness of fit: z of the change of the exponent with scale"),
     "standard_error": Quantity("1", "standard error of the Hurst exponent"),
     "ci_low": Quantity("1", "lower end of the 95 % confidence interval of the Hurst exponent", _NO_INTERVAL),
     "ci_high": Quantity("1", "upper end of the 95 % confidence interval of the Hurst exponent", _NO_INTERVAL),
@@ -114,7 +114,9 @@ QUANTITIES: dict[str, Quantity] = {
     "increment_lag": Quantity("m", "lag of the height increment"),
     "noise_height": Quantity("m", "root mean square height of white measurement noise"),
     "topothesy": Quantity("m", "topothesy: lag at which the rms increment equals the lag"),
-    "isotropy_p_value": Quantity("1", "chance of an isotropic surface to differ as much between directions"),
+    "isotropy_p_value": Quantity(
+        "1", "p value of isotropy: probability that an isotropic surface differs as much"
+    ),
     "anisotropy_ratio": Quantity("1", "ratio of the longest to the shortest correlation length"),
     "anisotropy_ratio_low": Quantity(
         "1", "lower end of the 95 % confidence interval of the anisotropy ratio", _NO_INTERVAL
@@ -124,7 +126,7 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "anisotropy_azimuth": Quantity("degree", "azimuth of the longer correlation (E = 0, anticlockwise)"),
     "anisotropy_p_value": Quantity(
-        "1", "chance of an elliptic anisotropy to differ as much beyond its ratio"
+        "1", "p value of the anisotropy ratio: probability that such a surface differs as much"
     ),
     "run_time": Quantity("s", "run time"),
     "wavenumber": Quantity("rad m-1", "wavenumber"),
@@ -141,7 +143,7 @@ QUANTITIES: dict[str, Quantity] = {
     "cube_count": Quantity("1", "number of cubes that meet the surface"),
     "window_size": Quantity("m", "edge of the window"),
     "roughness": Quantity("m", "mean root mean square height inside the windows"),
-    "variation": Quantity("m", "mean range of the heights over a stretch"),
+    "variation": Quantity("m", "mean range of the heights over a segment"),
     "covering_area": Quantity("m2", "area of the triangulated surface"),
     "covering_length": Quantity("m", "length of the polygon through the profile"),
     "vertical_scale": Quantity("1", "factor on the heights"),

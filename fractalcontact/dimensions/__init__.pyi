@@ -1,14 +1,14 @@
-from .curves import covering as covering
-from .curves import cube_counts as cube_counts
-from .curves import madogram as madogram
-from .curves import roughness_length as roughness_length
-from .curves import second_variogram as second_variogram
-from .curves import spectrum as spectrum
-from .curves import variation as variation
-from .curves import variogram as variogram
-from .estimating import estimate as estimate
-from .estimating import methods as methods
-from .orienting import directions as directions
+from ._covering import covering as covering
+from ._cube_counts import cube_counts as cube_counts
+from ._directions import directions as directions
+from ._estimate import estimate as estimate
+from ._methods import methods as methods
+from ._roughness_length import roughness_length as roughness_length
+from ._spectrum import spectrum as spectrum
+from ._variation import variation as variation
+from ._variogram import madogram as madogram
+from ._variogram import second_variogram as second_variogram
+from ._variogram import variogram as variogram
 
 __all__ = [
     "covering",

@@ -1,4 +1,4 @@
-"""Loops over heights, and nothing else."""
+"""Compiled loops over heights."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @gap_sum_kernel
-def increment_sums(start: int, stop: int, heights: Array, step: int, edges: Array, sums: Array) -> None:
-    """Sum squared increments that start in each of the rows from start up to stop; a NaN makes a NaN.
+def increment_sums(start: int, stop: int, heights: Array, stride: int, edges: Array, sums: Array) -> None:
+    """Sum squared increments that start in each of the rows from start up to stop; a NaN gives NaN.
 
-    `edges` (parts + 1) cut the columns in which they start into parts. The last axis of `sums` (rows, parts,
-    12): along x the first differences over 1, 2 and 4 `step`, then the second differences over 1, 2 and 4
-    `step`; the same six along y.
+    `edges` (blocks + 1) cut the columns in which they start into blocks. The last axis of `sums` (rows,
+    blocks, 12): along x the first differences over 1, 2 and 4 `stride`, then the second differences over
+    1, 2 and 4 `stride`; the same six along y.
     """
     ny, nx = heights.shape
     for j in range(start, stop):
         for k in range(6):
-            x, y = (0, step << k - 3) if k > 2 else (step << k, 0)
+            x, y = (0, stride << k - 3) if k > 2 else (stride << k, 0)
             once, twice = j + y, j + 2 * y
-            for part in range(edges.size - 1):
-                low, high = edges[part], edges[part + 1]
-                # unsigned: no test for negatives
+            for block in range(edges.size - 1):
+                low, high = edges[block], edges[block + 1]
+                # unsigned, so that numba adds no test for negative indices
                 here, there, beyond = np.uint32(low), np.uint32(low + x), np.uint32(low + 2 * x)
                 last = high if high < nx - 2 * x else nx - 2 * x
                 double = last - low if twice < ny and last > low else 0
@@ -43,7 +43,7 @@ def increment_sums(start: int, stop: int, heights: Array, step: int, edges: Arra
                     u = heights[once, i + there] - heights[j, i + here]
                     first += u * u
                 column = k if k < 3 else k + 3
-                sums[j, part, column], sums[j, part, column + 3] = first, second
+                sums[j, block, column], sums[j, block, column + 3] = first, second
 
 
 @parallel_kernel
@@ -78,19 +78,19 @@ def whiten(covariances: Array, columns: Array, log_determinants: Array) -> None:
 
 @parallel_kernel
 def pair_sums(
-    heights: Array, rows: int, columns: Array, offsets: Array, kind: int, sums: Array, counts: Array
+    heights: Array, rows: int, columns: Array, lags: Array, measure: int, sums: Array, counts: Array
 ) -> None:
     """Sum increments from the first `rows` rows and the columns from columns[0] up to columns[1].
 
-    `offsets` (k, 2) are steps in y (not negative) and x. `kind` 0 sums squares of first differences, 1
+    `lags` (k, 2) are steps in y (not negative) and x. `measure` 0 sums squares of first differences, 1
     their absolute values, 2 squares of second differences. `sums` and `counts` are (rows, k); an increment
     with a NaN in it is left out.
     """
     ny, nx = heights.shape
     for j in prange(rows):
-        for k in range(offsets.shape[0]):
-            dy, dx = offsets[k, 0], offsets[k, 1]
-            reach = 2 if kind == 2 else 1
+        for k in range(lags.shape[0]):
+            dy, dx = lags[k, 0], lags[k, 1]
+            reach = 2 if measure == 2 else 1
             total = 0.0
             number = 0
             if j + reach * dy < ny:
@@ -100,10 +100,10 @@ def pair_sums(
                 beyond = heights[j + reach * dy]
                 for i in range(first, last):
                     v = on[i + dx] - row[i]
-                    if kind == 2:
+                    if measure == 2:
                         v = (beyond[i + 2 * dx] - on[i + dx]) - v
                     if v == v:
-                        total += abs(v) if kind == 1 else v * v
+                        total += abs(v) if measure == 1 else v * v
                         number += 1
             sums[j, k] = total
             counts[j, k] = number

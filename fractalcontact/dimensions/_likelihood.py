@@ -1,4 +1,8 @@
-"""The default estimator: maximum likelihood for the family that the face belongs to."""
+"""Maximum likelihood estimate of H, for the family that the surface belongs to (method "likelihood").
+
+Surfaces with free edges: fractional Brownian heights, by their cosine modes. Periodic surfaces: a power-law
+spectrum between cut-offs. Profiles with free ends: the exact likelihood of their increments.
+"""
 
 from __future__ import annotations
 
@@ -7,198 +11,221 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _exact, _increments, _modes, _periodic, _plateaus, _whittle
-from fractalcontact.dimensions._estimates import CONSTANT, STRANGE, Estimate, plane, undefined
-from fractalcontact.dimensions._evenness import evenness
-from fractalcontact.dimensions._faces import Face
-from fractalcontact.dimensions._fitting import LEAST_MODES, FreeModes, PeriodicModes, fitted
-from fractalcontact.dimensions._rounding import quantum, told
+from fractalcontact.dimensions import _cosine_modes, _periodic_modes, _profile_likelihood
+from fractalcontact.dimensions._heterogeneity import heterogeneity
+from fractalcontact.dimensions._increment_moments import increment_moments
+from fractalcontact.dimensions._increments import closed_form
+from fractalcontact.dimensions._periodic_modes import PeriodicModes
+from fractalcontact.dimensions._quantisation import quantisation, quantisation_note
+from fractalcontact.dimensions._records import CONSTANT, SIGNIFICANT, Estimate, joined, plane, undefined
+from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._whittle import LEAST_MODES, WhittleFit, fit_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Scales = tuple[float, float] | None
 
-_ROUNDING = 1e-26  # share of the mean square that transforms lose
-_PERIODIC = "all modes of the band: cut-offs and plateau found from the spectrum"
-_FAMILY = "periodic family: power law between cut-offs"
-_TORN = (
-    "a periodic face with gaps, or with one periodic axis, is taken as free, and the interval is for another "
-    "family than its own: see fractalcontact.surfaces.fill"
+_ROUNDING = 1e-26  # relative rounding of the mean square in transforms
+_PERIODIC_WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
+_FREE_WINDOW = "all modes that vary along both axes"
+_ASKED = "asked for"
+_PERIODIC_FAMILY = "periodic family: power law between cut-offs"
+_PERIODIC_GAPS = (
+    "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
+    "another family than its own: see fractalcontact.surfaces.fill"
 )
-_DROWNED = (
-    "a cut-off that is under the noise looks like another exponent: give `scales` inside the power law of a "
+_CUT_OFF_BELOW_NOISE = (
+    "a cut-off that is below the noise looks like another exponent: give `scales` inside the power law of a "
     "surface; the modes of a profile are too few"
 )
-_FREE = "all modes that vary along both axes"
-_SMOOTHED = "the fitted noise is below zero and told as 0: there is none, or short waves were smoothed away"
-_ASKED = "asked for"
+_NEGATIVE_NOISE = (
+    "the fitted noise is negative and reported as 0: there is none, or short waves were smoothed away"
+)
 
 
-def likelihood(face: Face, scales: Scales, noise: bool) -> Estimate:
-    """Fit the periodic family where every axis is periodic, else fractional Brownian heights."""
-    if face.is_constant:
+def likelihood(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+    """Fit the periodic family where every axis is periodic, otherwise fractional Brownian heights."""
+    if surface.is_constant:
         return undefined(CONSTANT)
-    if face.is_plane:
+    if surface.is_plane:
         return plane()
-    if all(face.grid.periodic) and face.complete:
-        return _periodic_face(face, scales, noise)
-    found = _profile(face, scales, noise) if face.axes == 1 else _free_face(face, scales, noise)
-    if not any(face.grid.periodic) or found.not_given:
-        return found
-    return replace(found, standard_error=np.nan, low=np.nan, high=np.nan, not_given=_TORN)
+    if all(surface.grid.periodic) and surface.is_complete:
+        return _periodic_surface(surface, scales, noise)
+    estimate = (
+        _profile(surface, scales, noise) if surface.axes == 1 else _free_surface(surface, scales, noise)
+    )
+    if not any(surface.grid.periodic) or estimate.reason:
+        return estimate
+    return replace(estimate, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=_PERIODIC_GAPS)
 
 
-def _free_face(face: Face, scales: Scales, noise: bool) -> Estimate:
-    """Fit the cosine modes of a face with free edges."""
-    heights = _cropped(face.heights)
-    dx = face.spacing[1]
-    lattice = _modes.Lattice.of(heights.shape, (face.spacing[0] / dx, 1.0))
-    lengths = _modes.wavelengths(lattice) * dx
+def _free_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+    """Fit the cosine modes of a surface with free edges."""
+    heights = _cropped(surface.heights)
+    dx = surface.spacing[1]
+    lattice = _cosine_modes.Lattice.of(heights.shape, (surface.spacing[0] / dx, 1.0))
+    lengths = _cosine_modes.wavelengths(lattice) * dx
     chosen = _between(lengths, scales)
     if np.count_nonzero(chosen) < LEAST_MODES:
         return undefined(f"{np.count_nonzero(chosen)} modes in the window, at least {LEAST_MODES} are needed")
-    pilot = _pilot(heights, lattice.steps)
-    modes = FreeModes.of(heights, lattice, chosen, pilot)
+    pilot = _pilot(heights, lattice.spacing)
+    modes = _cosine_modes.FreeModes.of(heights, lattice, chosen, pilot)
     centred = heights - np.nanmean(heights)
     if float(modes.power.sum()) <= _ROUNDING * float(np.nansum(centred * centred)):
         return undefined(
             "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
             "exponent is: estimate profiles, or see `directions`"
         )
-    fit, estimate = fitted(modes, pilot, noise)
-    every = _stride(scales, max(face.spacing))
-    level = _without_offsets(heights)
-    parts = evenness(_increments.moments([(level, len(level))], level.shape, every), lattice.steps, fit.hurst)
-    low, high = parts.applied(fit.hurst, estimate.low, estimate.high)
-    rounded = "" if noise else _rounded(heights, estimate.standard_error)
-    if rounded:
-        loud = fitted(modes, pilot, True)[1]
-        low, high = float(np.fmin(low, loud.low)), float(np.fmax(high, loud.high))
-    as_free = "a periodic face with gaps is taken as free" if all(face.grid.periodic) else ""
-    smooth = _SMOOTHED if noise and fit.noise < 0 else ""
+    fit, estimate = fit_interval(modes, pilot, noise)
+    levelled = _without_offsets(heights)
+    stride = _stride(scales, max(surface.spacing))
+    moments = increment_moments([(levelled, len(levelled))], levelled.shape, stride)
+    blocks = heterogeneity(moments, lattice.spacing, fit.hurst)
+    low, high = blocks.widened(fit.hurst, estimate.ci_low, estimate.ci_high)
+    rounding_note = "" if noise else _quantisation_note(heights, estimate.standard_error)
+    if rounding_note:
+        with_noise = fit_interval(modes, pilot, True)[1]
+        low, high = float(np.fmin(low, with_noise.ci_low)), float(np.fmax(high, with_noise.ci_high))
+    periodic_note = "a periodic surface with gaps is treated as free" if all(surface.grid.periodic) else ""
+    noise_note = _NEGATIVE_NOISE if noise and fit.noise < 0 else ""
     return replace(
         estimate,
-        standard_error=estimate.standard_error * parts.widening,
-        low=low,
-        high=high,
+        standard_error=estimate.standard_error * blocks.widening,
+        ci_low=low,
+        ci_high=high,
         scale_min=float(lengths[chosen].min()),
         scale_max=float(lengths[chosen].max()),
-        increment=_increment(fit) * face.unit,
-        noise=float(np.sqrt(max(fit.noise, 0.0))) * face.unit if noise else np.nan,
-        window=_FREE if scales is None else _ASKED,
-        note="; ".join(part for part in (as_free, smooth, estimate.note, parts.note, rounded) if part),
+        rms_increment=_rms_increment(fit) * surface.unit,
+        noise_height=float(np.sqrt(max(fit.noise, 0.0))) * surface.unit if noise else np.nan,
+        window=_FREE_WINDOW if scales is None else _ASKED,
+        note=joined(periodic_note, noise_note, estimate.note, blocks.note, rounding_note),
     )
 
 
-def _periodic_face(face: Face, scales: Scales, noise: bool) -> Estimate:
-    """Fit a power law to the modes of a periodic face."""
-    heights = face.heights if face.axes == 2 else face.heights[0]
-    modes = _periodic.modes(heights, face.steps)
-    unit = max(face.grid.extent)
-    bent = face.axes == 1 and scales is None and not noise
-    if bent:
-        low, high = _periodic.cut_offs(modes)
+def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+    """Fit a power law to the modes of a periodic surface or profile."""
+    heights = surface.heights if surface.axes == 2 else surface.heights[0]
+    modes = PeriodicModes.of(heights, surface.relative_spacing)
+    unit = max(surface.grid.extent)
+    has_rolloff = surface.axes == 1 and scales is None and not noise
+    if has_rolloff:
+        low, high = _periodic_modes.cut_offs(modes)
+    elif scales is None:
+        low, high = _periodic_modes.band(modes)
     else:
-        low, high = _periodic.band(modes) if scales is None else (unit / scales[1], unit / scales[0])
-    modes = modes.inside(low * (1 - 1e-9), high * (1 + 1e-9))
+        low, high = unit / scales[1], unit / scales[0]
+    modes = modes.between(low, high)
     if modes.weights.sum() < LEAST_MODES:
         return undefined(f"{modes.weights.sum():.0f} modes in the band, at least {LEAST_MODES} are needed")
-    if bent:
-        modes, fit, estimate = _beyond_plateau(modes)
+    if has_rolloff:
+        modes, fit, estimate = _with_rolloff(modes)
     else:
-        fit, estimate = fitted(PeriodicModes(modes), 0.5, noise)
-    if noise and (face.axes == 1 or (scales is None and abs(fit.misfit) > STRANGE)):
-        estimate = replace(estimate, standard_error=np.nan, low=np.nan, high=np.nan, not_given=_DROWNED)
-    rounded = "" if noise else _rounded(face.heights, estimate.standard_error)
-    if rounded:
-        loud = fitted(PeriodicModes(modes), 0.5, True)[1]
-        estimate = replace(estimate, low=min(estimate.low, loud.low), high=max(estimate.high, loud.high))
-    step = np.diff(heights, append=heights[..., :1], axis=-1)
-    cell = float(np.prod(face.steps))
+        fit, estimate = fit_interval(modes, 0.5, noise)
+    if noise and (surface.axes == 1 or (scales is None and abs(fit.misfit) > SIGNIFICANT)):
+        estimate = replace(
+            estimate, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=_CUT_OFF_BELOW_NOISE
+        )
+    rounding_note = "" if noise else _quantisation_note(surface.heights, estimate.standard_error)
+    if rounding_note:
+        with_noise = fit_interval(modes, 0.5, True)[1]
+        estimate = replace(
+            estimate,
+            ci_low=min(estimate.ci_low, with_noise.ci_low),
+            ci_high=max(estimate.ci_high, with_noise.ci_high),
+        )
+    jumps = np.diff(heights, append=heights[..., :1], axis=-1)
+    cell = float(np.prod(surface.relative_spacing))
+    noise_note = _NEGATIVE_NOISE if noise and fit.noise < 0 else ""
     return replace(
         estimate,
         scale_min=unit / float(modes.wavenumber.max()),
         scale_max=unit / float(modes.wavenumber.min()),
-        increment=float(np.sqrt(np.mean(step * step))) * face.unit,
-        noise=float(np.sqrt(max(fit.noise / cell, 0.0))) * face.unit if noise else np.nan,
-        window=_PERIODIC if scales is None else _ASKED,
-        note="; ".join(
-            part
-            for part in (_FAMILY, _SMOOTHED if noise and fit.noise < 0 else "", estimate.note, rounded)
-            if part
-        ),
+        rms_increment=float(np.sqrt(np.mean(jumps * jumps))) * surface.unit,
+        noise_height=float(np.sqrt(max(fit.noise / cell, 0.0))) * surface.unit if noise else np.nan,
+        window=_PERIODIC_WINDOW if scales is None else _ASKED,
+        note=joined(_PERIODIC_FAMILY, noise_note, estimate.note, rounding_note),
     )
 
 
-def _beyond_plateau(modes: _periodic.Modes) -> tuple[_periodic.Modes, _whittle.WhittleFit, Estimate]:
-    """Fit a profile with a plateau of any length; return its modes beyond that as well."""
-    found = _plateaus.fit(modes)
-    modes = modes.inside(found.corner, np.inf)
-    fit, estimate = fitted(PeriodicModes(modes), float(np.clip(found.hurst, 0.01, 1.5)), False)
-    low, high = found.low, found.high
+def _with_rolloff(modes: PeriodicModes) -> tuple[PeriodicModes, WhittleFit, Estimate]:
+    """Fit a profile with a roll-off at any wavelength; return its modes beyond the corner as well."""
+    rolloff = _periodic_modes.fit_rolloff(modes)
+    modes = modes.between(rolloff.corner, np.inf)
+    fit, estimate = fit_interval(modes, float(np.clip(rolloff.hurst, 0.01, 1.5)), False)
+    low, high = rolloff.low, rolloff.high
     if estimate.note:  # the modes do not follow one power law
-        low, high = min(low, estimate.low), max(high, estimate.high)
-    estimate = replace(estimate, hurst=found.hurst, standard_error=found.standard_error, low=low, high=high)
+        low, high = min(low, estimate.ci_low), max(high, estimate.ci_high)
+    estimate = replace(
+        estimate,
+        hurst=rolloff.hurst,
+        standard_error=rolloff.standard_error,
+        ci_low=low,
+        ci_high=high,
+    )
     return modes, fit, estimate
 
 
-def _profile(face: Face, scales: Scales, noise: bool) -> Estimate:
+def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     """Fit a profile with its exact likelihood."""
-    heights, dx = face.heights[0], face.spacing[1]
-    every = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
-    heights = heights[::every]
-    longest = _exact.CHUNK if scales is None else int(scales[1] / (dx * every) * (1 + 1e-9)) + 1
-    chunk = min(longest, _exact.CHUNK, int(np.isfinite(heights).sum()))
-    if chunk < _exact.SMALLEST:
-        return undefined(f"{chunk} points, at least {_exact.SMALLEST} are needed")
-    fit = _exact.fit_profile(heights, noise=noise, chunk=chunk)
-    moments = _increments.moments([(heights[None], 1)], (heights.size,))
-    parts = evenness(moments, (1.0,), fit.hurst)
-    low, high = parts.applied(fit.hurst, fit.low, fit.high)
-    turned = ""
+    heights, dx = surface.heights[0], surface.spacing[1]
+    stride = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
+    heights = heights[::stride]
+    largest = _profile_likelihood.CHUNK
+    longest = largest if scales is None else int(scales[1] / (dx * stride) * (1 + 1e-9)) + 1
+    chunk = min(longest, largest, int(np.isfinite(heights).sum()))
+    smallest = _profile_likelihood.SMALLEST
+    if chunk < smallest:
+        return undefined(f"{chunk} points, at least {smallest} are needed")
+    fit = _profile_likelihood.fit_profile(heights, noise=noise, chunk=chunk)
+    moments = increment_moments([(heights[None], 1)], (heights.size,))
+    blocks = heterogeneity(moments, (1.0,), fit.hurst)
+    low, high = blocks.widened(fit.hurst, fit.low, fit.high)
+    noise_note = ""
     if not noise:
-        low, high, turned = _increments.closed_form(moments, (1.0,)).quieted(low, high)
-    rounded = "" if noise else _rounded(heights[None], fit.standard_error)
-    if rounded:
-        loud = _exact.fit_profile(heights, noise=True, chunk=chunk)
-        low, high = min(low, loud.low), max(high, loud.high)
+        low, high, noise_note = closed_form(moments, (1.0,)).widened_for_noise(low, high)
+    rounding_note = "" if noise else _quantisation_note(heights[None], fit.standard_error)
+    if rounding_note:
+        with_noise = _profile_likelihood.fit_profile(heights, noise=True, chunk=chunk)
+        low, high = min(low, with_noise.low), max(high, with_noise.high)
     return Estimate(
-        fit.hurst, fit.standard_error * parts.widening, low, high,
-        scale_min=every * dx,
-        scale_max=(chunk - 1) * every * dx,
-        increment=fit.increment * float(every) ** -fit.hurst * face.unit,
-        noise=float(np.sqrt(fit.noise)) * face.unit if noise else np.nan,
+        fit.hurst,
+        fit.standard_error * blocks.widening,
+        low,
+        high,
+        scale_min=stride * dx,
+        scale_max=(chunk - 1) * stride * dx,
+        rms_increment=fit.rms_increment * float(stride) ** -fit.hurst * surface.unit,
+        noise_height=float(np.sqrt(fit.noise)) * surface.unit if noise else np.nan,
         window="exact likelihood of all increments" if scales is None else _ASKED,
-        note="; ".join(part for part in (turned, parts.note, rounded) if part),
-    )  # fmt: skip
+        note=joined(noise_note, blocks.note, rounding_note),
+    )
 
 
-def _rounded(heights: Array, error: float) -> str:
-    """Return what to say of heights that were rounded to steps that matter; nothing otherwise."""
-    share = quantum(heights)[1]
-    return told(share, "that of a fit with white noise") if share > 0.5 * error else ""
+def _quantisation_note(heights: Array, error: float) -> str:
+    """Return a note where the heights were rounded so coarsely that it matters; empty otherwise."""
+    share = quantisation(heights)[1]
+    return quantisation_note(share, "that of a fit with white noise") if share > 0.5 * error else ""
 
 
 def _without_offsets(heights: Array) -> Array:
-    """Take off what the modes do not see, an offset of each row and each column."""
+    """Subtract an offset of each row and each column, which the modes are insensitive to."""
     if np.isnan(heights).any():
         return heights
     return np.asarray(heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True) + heights.mean())
 
 
 def _stride(scales: Scales, spacing: float) -> int:
-    """Return the step of points whose second differences see the shortest waves that are asked for."""
+    """Return the stride whose second differences resolve the shortest waves of the window."""
     return 1 if scales is None else max(1, round(0.5 * scales[0] / spacing))
 
 
-def _pilot(heights: Array, steps: tuple[float, float]) -> float:
-    """Return a quick estimate to start from."""
-    moments = _increments.moments([(heights, heights.shape[0])], heights.shape)
-    hurst = _increments.closed_form(moments, steps, error=False).hurst
+def _pilot(heights: Array, spacing: tuple[float, float]) -> float:
+    """Return a first estimate of H."""
+    moments = increment_moments([(heights, heights.shape[0])], heights.shape)
+    hurst = closed_form(moments, spacing, error=False).hurst
     return float(np.clip(hurst, 0.03, 0.98)) if np.isfinite(hurst) else 0.5
 
 
-def _increment(fit: _whittle.WhittleFit) -> float:
-    """Return the rms increment over one x spacing that goes with the amplitude."""
+def _rms_increment(fit: WhittleFit) -> float:
+    """Return the rms increment over one x spacing that corresponds to the amplitude."""
     return float(np.sqrt(2.0 * fit.amplitude / (1.0 - fit.hurst))) if fit.hurst < 1.0 else float("nan")
 
 
@@ -209,7 +236,7 @@ def _between(lengths: Array, scales: Scales) -> Array:
 
 
 def _cropped(heights: Array) -> Array:
-    """Cut off the rows and columns at the border where nothing was observed."""
-    seen = np.isfinite(heights)
-    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    """Remove the rows and columns at the border where nothing was observed."""
+    observed = np.isfinite(heights)
+    rows, columns = np.flatnonzero(observed.any(axis=1)), np.flatnonzero(observed.any(axis=0))
     return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -155,7 +155,7 @@ def _achieved_lines(group: Outline) -> Iterable[str]:
 
 def _reason_lines(group: Outline) -> Iterable[str]:
     for name, (_, attributes) in group.variables.items():
-        for key in ("note", "not_given"):
+        for key in ("comment", "reason"):
             for methods, reason in _reasons(attributes, key).items():
                 yield f"    {name}, {methods}: {reason}"
 
@@ -192,7 +192,7 @@ def _dimensions(tree: xr.DataTree) -> str:
                 f"{abs(misfit):.1f} standard deviations" if np.isfinite(misfit) else "",
             )
         )
-    notes = _reasons(found["hurst"].attrs, "note") | _reasons(found["ci_low"].attrs, "not_given")
+    notes = _reasons(found["hurst"].attrs, "comment") | _reasons(found["ci_low"].attrs, "reason")
     return "\n".join([table(rows), *(f"  {method}: {reason}" for method, reason in notes.items() if reason)])
 
 

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.base.results import provenance_of
 from fractalcontact.base.schema import QUANTITIES
 
 CURVES = (
@@ -348,15 +349,13 @@ def test_labels_and_files(rough, name, tmp_path):
     curve = getattr(fc.dimensions, name)(rough)
     for key, variable in curve.variables.items():
         assert variable.attrs["units"] == QUANTITIES[key].units
-    assert curve.attrs["periodic_axes"] == "none"
+    assert provenance_of(curve)["periodic_axes"] == "none"
     xr.testing.assert_identical(fc.open(fc.save(curve, tmp_path / "curve.nc")), curve)
 
 
 def test_a_surface_out_of_memory_gives_the_same_short_lags(rough, monkeypatch):
     pytest.importorskip("dask")
-    from fractalcontact.dimensions import _faces
-
-    monkeypatch.setattr(_faces, "SLAB", 400)
+    monkeypatch.setattr("fractalcontact.dimensions._surface_input.SLAB", 400)
     lazy = rough.chunk({"y": 7})
     for name in ("variogram", "madogram", "second_variogram"):
         curve = getattr(fc.dimensions, name)
@@ -391,7 +390,7 @@ def test_bad_input_is_told_all_at_once(rough):
 @pytest.mark.parametrize("hurst", [0.2, 0.8])
 def test_expected_roughness_of_a_window(hurst, steps):
     """The mean square about a plane, over exact surfaces of the size of a window."""
-    from fractalcontact.dimensions._covers import expected_roughness
+    from fractalcontact.dimensions._roughness_length import expected_roughness
 
     shape = (5, 8)
     faces = fc.surfaces.fbm(

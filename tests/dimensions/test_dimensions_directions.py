@@ -5,10 +5,9 @@ import pytest
 from scipy.stats import binom
 
 import fractalcontact as fc
-from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.dimensions import _rays, _scatter
-from fractalcontact.dimensions._faces import read_faces
+from fractalcontact.dimensions import _anisotropy, _second_differences
+from fractalcontact.dimensions._surface_input import read_surfaces
 
 SPACING = 1e-4
 
@@ -89,7 +88,7 @@ def test_striated_faces_are_told_from_isotropic_ones(size):
         found = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
         assert float(found["isotropy_p_value"]) < 1e-3
         if size > 100:
-            assert "no model" in found["ci_low"].attrs["not_given"]
+            assert "no model" in found["ci_low"].attrs["reason"]
             assert np.isnan(found["ci_low"]).all()
 
 
@@ -235,7 +234,7 @@ def test_limits_and_refusals():
 def test_scatter_of_second_differences_is_the_one_expected(hurst, missing):
     """Over a thousand small faces: a variance of so many is known to 4.5 %."""
     n = 40
-    rays = _rays.rays(None, (1.0, 1.0))[:4]
+    rays = _second_differences.lattice_directions(None, (1.0, 1.0))[:4]
     vectors = np.array([(m * ray.dy, m * ray.dx) for ray in rays for m in (1, 2)])
     gone = np.random.default_rng(19).random((n, n)) < missing
     logs = []
@@ -247,10 +246,10 @@ def test_scatter_of_second_differences_is_the_one_expected(hurst, missing):
             means.append(np.nanmean((heights[: n - 2 * dy, : n - 2 * dx] - 2 * middle + far) ** 2))
         logs.append(np.log(means))
     face = fc.surfaces.from_array(np.where(gone, np.nan, 0.0) + np.arange(n) ** 2, SPACING)
-    means, _ = _rays.Means.of(read_faces(face, Problems("test"))[0], rays, (0.0, 5e-4))
+    means, _ = _second_differences.SecondDifferences.of(read_surfaces(face)[0], rays, (0.0, 5e-4))
     own = means.part([np.flatnonzero((means.vectors == vector).all(axis=1))[0] for vector in vectors])
-    pairs = _scatter.Pairs.of(face.values, missing == 0, own.vectors, own.numbers)
-    expected = own.spread(pairs, hurst, np.eye(2))
+    pairs = _second_differences.MiddlePairs.of(face.values, missing == 0, own.vectors, own.numbers)
+    expected = _second_differences.covariance(own.vectors, pairs, hurst, np.eye(2))
     found = np.cov(np.transpose(logs))
     assert np.diag(found) == pytest.approx(np.diag(expected), rel=0.17)
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -260,26 +259,26 @@ def test_scatter_of_second_differences_is_the_one_expected(hurst, missing):
 def test_scatter_does_not_hang_on_where_the_sum_is_cut():
     """Shifts beyond those summed one by one, and the coarse lattice of long lags, against a longer sum."""
     vectors = np.array([(0, 2), (3, 4), (8, 0), (6, -6)])
-    shape, form = (300, 200), _rays.matrix(0.3, -0.2)
+    shape, form = (300, 200), _anisotropy.metric_of(0.3, -0.2)
     line = np.stack([np.ones(3), np.arange(3)], axis=1)  # a slope along one direction
     for hurst, error in ((0.1, 1e-3), (0.6, 5e-3), (0.95, 0.02)):
-        found = _scatter.covariance(vectors, _pairs(shape, vectors), hurst, form)
+        found = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, form)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_scatter, "_REACH", 120)
-            longer = _scatter.covariance(vectors, _pairs(shape, vectors), hurst, form)
+            patch.setattr(_second_differences, "_REACH", 120)
+            longer = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, form)
         assert found == pytest.approx(longer, rel=error, abs=error * longer.max())
         far = np.array([(0, 12), (0, 24), (0, 48)])
-        coarse = _scatter.covariance(far, _pairs(shape, far), hurst, form)
+        coarse = _second_differences.covariance(far, _pairs(shape, far), hurst, form)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_scatter, "_LONG", 48)
-            fine = _scatter.covariance(far, _pairs(shape, far), hurst, form)
+            patch.setattr(_second_differences, "_LONG", 48)
+            fine = _second_differences.covariance(far, _pairs(shape, far), hurst, form)
         errors = [np.linalg.inv(line.T @ np.linalg.solve(spread, line))[1, 1] for spread in (coarse, fine)]
         assert errors[0] == pytest.approx(errors[1], rel=0.06)
 
 
 def _pairs(shape, vectors):
     """Those of a complete face."""
-    return _scatter.Pairs(shape, np.prod(np.array(shape) - 2.0 * np.abs(vectors), axis=1))
+    return _second_differences.MiddlePairs(shape, np.prod(np.array(shape) - 2.0 * np.abs(vectors), axis=1))
 
 
 @pytest.mark.slow
@@ -336,7 +335,7 @@ def test_pairs_of_middle_points_of_a_face_with_gaps_are_counted():
         for dy, dx in vectors
     ]
     numbers = np.array([len(each) for each in middles])
-    pairs = _scatter.Pairs.of(heights, False, vectors, numbers)
+    pairs = _second_differences.MiddlePairs.of(heights, False, vectors, numbers)
     for i, j in ((0, 0), (1, 0), (2, 1)):
         for y, x in ((0, 0), (0, 1), (1, -2), (3, 2), (4, 0), (2, -7)):
             expected = sum((a + y, b + x) in middles[i] for a, b in middles[j])

@@ -9,6 +9,7 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base import threads
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.results import provenance_of
 
 VARIABLES = {
     "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",
@@ -47,7 +48,7 @@ def holes(face, share=0.1, seed=0):
 def test_the_default_alone(rough):
     found = estimate(rough)
     assert list(found.method.values) == ["default"]
-    assert found.attrs["default_method"] == "likelihood"
+    assert provenance_of(found)["default_method"] == "likelihood"
     assert set(found.data_vars) == VARIABLES
     assert all(found[name].dims == ("method",) for name in VARIABLES)
     assert float(found.increment_lag) == 1e-4
@@ -64,10 +65,10 @@ def test_every_method_by_name(rough, tmp_path):
     np.testing.assert_allclose(near, 0.7, atol=0.05)
     given = np.isfinite(found.ci_low)
     assert list(found.method.values[given.values]) == ["default", *HONEST]
-    reasons = json.loads(found.ci_low.attrs["not_given"])
+    reasons = json.loads(found.ci_low.attrs["reason"])
     assert set(reasons) == set(NAMES) - set(HONEST)
     assert all(reasons.values())
-    assert set(json.loads(found.scale_min.attrs["window"])) == {"default", *NAMES}
+    assert set(json.loads(found.scale_min.attrs["comment"])) == {"default", *NAMES}
     assert (found.scale_min < found.scale_max).all()
     xr.testing.assert_identical(fc.open(fc.save(found, tmp_path / "found.nc")), found)
 
@@ -106,9 +107,9 @@ def test_periodic_faces_belong_to_another_family(hurst, cut):
     found = estimate(face, ["default", "spectrum", "increments"])
     assert float(found.hurst[0]) == pytest.approx(hurst, abs=0.1 if cut else 0.03)
     assert float(found.ci_low[0]) < hurst < float(found.ci_high[0])
-    assert "periodic" in json.loads(found.hurst.attrs["note"])["default"]
+    assert "periodic" in json.loads(found.hurst.attrs["comment"])["default"]
     assert np.isnan(found.ci_low[2])
-    assert "periodic" in json.loads(found.ci_low.attrs["not_given"])["increments"]
+    assert "periodic" in json.loads(found.ci_low.attrs["reason"])["increments"]
     if cut:
         assert float(found.scale_min[0]) == pytest.approx(0.004, rel=0.1)
         assert 0.015 < float(found.scale_max[0]) < 0.04
@@ -118,7 +119,7 @@ def test_a_crop_of_a_band_limited_face_is_found_out():
     face = fc.surfaces.spectral((256, 256), 1e-3, hurst=0.8, rms_height=1e-5, rolloff=0.03, rng=24)
     found = one(face[:128, :128])
     assert abs(float(found.misfit)) > 3.3
-    note = json.loads(estimate(face[:128, :128]).hurst.attrs["note"])["default"]
+    note = json.loads(estimate(face[:128, :128]).hurst.attrs["comment"])["default"]
     assert "changes with scale" in note
     assert float(found.ci_high - found.ci_low) > 8 * float(found.standard_error)
 
@@ -147,7 +148,7 @@ def test_noise_is_told_apart():
     assert float(gapped.noise_height) == pytest.approx(2.3e-7, rel=0.15)
     others = estimate(noisy, ["increments", "variogram"], noise=True)
     assert np.isnan(others.ci_low).all()
-    assert "noise" in others.ci_low.attrs["not_given"]
+    assert "noise" in others.ci_low.attrs["reason"]
 
 
 def test_unequal_spacings_and_any_orientation():
@@ -214,11 +215,11 @@ def test_scales_limit_the_fit(rough):
     free = estimate(rough, ["likelihood"])
     assert float(found.standard_error[0]) > 1.5 * float(free.standard_error[0])
     assert float(found.ci_low[0]) < 0.7 < float(found.ci_high[0])
-    with pytest.raises(InvalidInput, match="scales: expected a window that meets the lengths of the face"):
+    with pytest.raises(InvalidInput, match="scales: expected a window that meets the lengths of the surface"):
         estimate(rough, NAMES, scales=(1.0, 2.0))
     empty = estimate(rough, NAMES, scales=(1.05e-4, 1.3e-4))
     assert np.isnan(empty.hurst).all()
-    assert set(json.loads(empty.hurst.attrs["note"])) == set(NAMES)
+    assert set(json.loads(empty.hurst.attrs["comment"])) == set(NAMES)
 
 
 @pytest.mark.parametrize("method", ["variogram", "madogram", "second_variogram"])
@@ -258,7 +259,7 @@ def test_a_periodic_face_with_gaps_has_no_interval_and_says_why():
         torn = one(face.where(face.x != face.x[7]))
         assert np.isfinite(float(torn.hurst))
         assert np.isnan([float(torn[name]) for name in ("standard_error", "ci_low", "ci_high")]).all()
-        assert "fill" in json.loads(torn.ci_low.attrs["not_given"])["default"]
+        assert "fill" in json.loads(torn.ci_low.attrs["reason"])["default"]
 
 
 def test_periodic_profile():
@@ -279,11 +280,11 @@ def test_planes_and_smooth_caps_are_the_limit_one():
     found = estimate(surface(np.add.outer(0.03 * y, 0.1 * y)), NAMES)
     np.testing.assert_allclose(found.hurst, 1.0, rtol=1e-12)
     assert np.isnan(found.ci_low).all()
-    assert "plane" in json.loads(found.hurst.attrs["note"])["likelihood"]
+    assert "plane" in json.loads(found.hurst.attrs["comment"])["likelihood"]
     cap = estimate(surface(np.sqrt(2000 - np.add.outer((y - 12) ** 2, (y - 12) ** 2))), HONEST)
     np.testing.assert_array_equal(cap.hurst, 1.0)
     assert (cap.fitted_hurst > 1.3).all()
-    assert "smoother than a fractal" in cap.hurst.attrs["note"]
+    assert "smoother than a fractal" in cap.hurst.attrs["comment"]
 
 
 @pytest.mark.parametrize("shape", [(40, 36), (60,)])
@@ -301,25 +302,25 @@ def test_constant_heights_have_no_exponent_but_a_covering_of_dimension_two():
     covers = found.method.isin(["cube_counts", "covering"]).values
     assert (found.fractal_dimension.values[covers] == 2.0).all()
     assert np.isnan(found.hurst.values[~covers]).all()
-    assert "constant" in json.loads(found.hurst.attrs["note"])["likelihood"]
+    assert "constant" in json.loads(found.hurst.attrs["comment"])["likelihood"]
 
 
 def test_corrugations_are_sent_to_profiles():
     found = estimate(surface(np.tile(np.sin(0.7 * np.arange(40)), (40, 1))))
     assert np.isnan(found.hurst).all()
-    assert "profile" in found.hurst.attrs["note"]
+    assert "profile" in found.hurst.attrs["comment"]
 
 
 @pytest.mark.parametrize("shape", [(5, 5), (7, 11), (4, 9), (4, 200), (31, 37)])
 def test_small_and_prime_faces_give_an_interval_or_a_reason(shape):
     face = surface(np.random.default_rng(34).standard_normal(shape).cumsum(0).cumsum(1))
     found = estimate(face, [name for name in NAMES if name != "roughness_length"])
-    notes = json.loads(found.hurst.attrs["note"])
+    notes = json.loads(found.hurst.attrs["comment"])
     for name, hurst in zip(found.method.values, found.hurst.values, strict=True):
         assert np.isfinite(hurst) or notes[name]
     low, high = float(found.ci_low[0]), float(found.ci_high[0])
     if np.isnan(low):  # twice summed noise may be smoother than any fractal
-        assert json.loads(found.ci_low.attrs["not_given"])["likelihood"]
+        assert json.loads(found.ci_low.attrs["reason"])["likelihood"]
         assert float(found.fitted_hurst[0]) > 1.0
     else:
         assert 0.0 <= low <= float(found.hurst[0]) <= high <= 1.0

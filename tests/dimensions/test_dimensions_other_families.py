@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.dimensions import _increments
-from fractalcontact.dimensions._evenness import evenness
-from fractalcontact.dimensions._rounding import quantum
+from fractalcontact.dimensions._heterogeneity import heterogeneity
+from fractalcontact.dimensions._increment_moments import increment_moments
+from fractalcontact.dimensions._quantisation import quantisation
 
 SIZE, SPACING, STEP = 96, 1e-4, 1e-5
 
@@ -41,7 +41,7 @@ def of(heights, method, **options):
         float(found.hurst),
         float(found.ci_low),
         float(found.ci_high),
-        json.loads(found.hurst.attrs["note"]).get(method, ""),
+        json.loads(found.hurst.attrs["comment"]).get(method, ""),
     )
 
 
@@ -91,7 +91,7 @@ def test_a_stretched_face_is_told_by_the_share_of_its_waves(periodic):
         (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=2.0, azimuth=30.0, rng=6
     )
     found = fc.dimensions.estimate(face if periodic else fc.surfaces.from_array(face.values, SPACING))
-    assert "more than their share" in found.hurst.attrs["note"]
+    assert "more than their share" in found.hurst.attrs["comment"]
     if periodic:
         assert float(found.ci_low[0]) < 0.7 < float(found.ci_high[0])
 
@@ -101,7 +101,7 @@ def test_a_band_limited_periodic_face_is_of_the_family():
         face = fc.surfaces.spectral(
             (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, rolloff=2e-3, short_cutoff=4e-4, rng=seed
         )
-        assert "share" not in fc.dimensions.estimate(face).hurst.attrs["note"]
+        assert "share" not in fc.dimensions.estimate(face).hurst.attrs["comment"]
 
 
 @pytest.mark.parametrize(
@@ -117,9 +117,9 @@ def test_faces_of_the_family_are_even(shape, steps, gaps):
         alarms = []
         for face in faces:
             heights = np.where(missing, np.nan, face.reshape(shape))
-            moments = _increments.moments([(heights, len(heights))], shape[-len(steps) :])
-            assert len(moments.parts[0]) > 1
-            alarms.append(bool(evenness(moments, steps, hurst).note))
+            moments = increment_moments([(heights, len(heights))], shape[-len(steps) :])
+            assert len(moments.blocks[0]) > 1
+            alarms.append(bool(heterogeneity(moments, steps, hurst).note))
         assert sum(alarms) <= 1
 
 
@@ -135,17 +135,17 @@ def test_profiles_that_were_rounded_or_are_uneven_say_so():
 @pytest.mark.parametrize(("factor", "offset"), [(1.0, 0.0), (1e-9, 0.0), (1e6, 3e6), (25.4e-3, -1.0)])
 def test_the_step_of_rounded_heights_is_found_in_any_unit(factor, offset):
     heights = np.round(6 * np.random.default_rng(10).standard_normal((64, 64)).cumsum(axis=1))
-    step, share = quantum(heights * factor + offset)
+    step, share = quantisation(heights * factor + offset)
     assert step == pytest.approx(factor, rel=1e-6)
     bend = np.mean(np.diff(heights[::4], 2, axis=1) ** 2)
     assert share == pytest.approx(0.5 / bend, rel=0.1)
 
 
 def test_heights_that_were_not_rounded_have_no_step():
-    assert quantum(brownian(0.6, 11)) == (0.0, 0.0)
-    assert quantum(np.zeros((20, 20))) == (0.0, 0.0)
-    assert quantum(np.full((20, 20), np.nan)) == (0.0, 0.0)
-    assert quantum(np.arange(9.0)[None]) == (0.0, 0.0)
+    assert quantisation(brownian(0.6, 11)) == (0.0, 0.0)
+    assert quantisation(np.zeros((20, 20))) == (0.0, 0.0)
+    assert quantisation(np.full((20, 20), np.nan)) == (0.0, 0.0)
+    assert quantisation(np.arange(9.0)[None]) == (0.0, 0.0)
 
 
 def test_noise_that_was_asked_for_explains_the_rounding():

@@ -1,0 +1,117 @@
+"""Number of cubes that meet a surface against the edge of the cubes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def _check(problems: Problems, *, surface: Any, vertical_scale: Any) -> None:
+    check_surface(
+        problems,
+        surface,
+        squares=True,
+        reserved=("cube_count", "cube_size", "pair_count", "vertical_scale", *ALWAYS),
+    )
+    if not (isinstance(vertical_scale, str) and vertical_scale == "range"):
+        problems.number("vertical_scale", vertical_scale, above=0, at_least=1e-50, at_most=1e50)
+
+
+@public_result(
+    title="Cube counts of a surface",
+    references="Borri-Brunetto, Carpinteri and Chiaia, Contact, closure and friction behaviour of rough "
+    "crack concrete surfaces, FRAMCOS-3 (1998); Clarke, Computers and Geosciences 12 (1986) 713-722",
+    achieved_error=EXACT_MEAN,
+    check=_check,
+)
+def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range") -> xr.Dataset:
+    """Count the cubes that meet a surface, averaged over all positions of the grid of cubes.
+
+    The count depends on the unit of height: where heights are small compared with the cubes, it is that of
+    a plane. `vertical_scale` states how the heights were scaled and is part of the result.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., y, x) or (..., x); columns of cubes that contain NaN are left out.
+    vertical_scale : "range" or float
+        "range" scales the heights so that their range equals the extent of the surface (geometric mean of
+        its edges); a number multiplies them, 1 being natural scale.
+
+    Returns
+    -------
+    Dataset over `cube_size` (m)
+        `cube_count` (not an integer: a mean over positions), `local_slope`, which is -D for a fractal
+        surface, and `vertical_scale`. Edges double from one spacing to half the surface.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or `vertical_scale` is not positive.
+
+    Notes
+    -----
+    Measured influence of the unit: an fBm surface of 512 x 512 points with H = 0.6 (D = 2.4) and an rms
+    increment of a tenth of the spacing gives D = 2.00, 2.02, 2.14, 2.30 and 2.34 as its heights are
+    multiplied by 0.1, 1, 10, 100 and 1000. Extremes of sampled heights miss what lies between the points,
+    so that D is too low for rough surfaces, by 0.2 to 0.3 where H is small.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998); Clarke (1986), Computers and Geosciences 12.
+
+    Examples
+    --------
+    A flat surface of 32 x 32 spacings is covered by (32 / edge)^2 cubes:
+
+    >>> import numpy as np, fractalcontact as fc
+    >>> flat = fc.surfaces.from_array(np.zeros((33, 33)), 1.0)
+    >>> fc.dimensions.cube_counts(flat).cube_count.values
+    array([1024.,  256.,   64.,   16.,    4.])
+    """
+    surfaces = read_surfaces(surface)
+    scale = vertical_scale if isinstance(vertical_scale, str) else float(vertical_scale)
+    curves = [cube_count_curve(single, scale) for single in surfaces]
+    slopes = [window_slope(curve) for curve in curves]
+    return curve_dataset(surface, surfaces, "cube_size", curves, slopes, value="cube_count")
+
+
+def cube_count_curve(surface: Surface, vertical_scale: float | str = "range") -> Curve:
+    """Return the mean number of cubes that meet one surface."""
+    edges = window_edges(surface.shape, surface.spacing)
+    lengths = edge_lengths(surface, edges)
+    grid = surface.grid
+    area = float(np.prod([(n - 1) * spacing for n, spacing in zip(grid.shape, grid.spacing, strict=True)]))
+    heights = surface.heights
+    if vertical_scale == "range":
+        height_range = float(np.nanmax(heights) - np.nanmin(heights))
+        factor = area ** (1.0 / surface.axes) / height_range if height_range > 0 else 1.0
+    else:
+        factor = float(vertical_scale) * surface.unit
+    counts = _mean_counts(heights * factor, edges, lengths, area, surface.axes)
+    return Curve(lengths, counts, np.ones(lengths.shape, dtype=np.int64), factor / surface.unit)
+
+
+def _mean_counts(heights: Array, edges: Array, lengths: Array, area: float, axes: int) -> Array:
+    """Count cubes of edge `lengths` (k,), of `edges` (k, 2) points, averaged over all positions.
+
+    A column of cubes over heights of range R meets R / length + 1 of them, averaged over the vertical
+    position of the grid. `area` is the length of a profile.
+    """
+    counts = np.empty(len(edges))
+    for k, ((ey, ex), length) in enumerate(zip(edges, lengths, strict=True)):
+        spread = running_range(heights, ey + 1, ex + 1)
+        spread = spread[np.isfinite(spread)]
+        mean = float(np.sum(spread / length)) / spread.size + 1.0 if spread.size else np.nan
+        counts[k] = mean * area / length**axes
+    return counts

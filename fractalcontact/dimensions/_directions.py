@@ -1,0 +1,334 @@
+"""Roughness of a surface along each direction, and tests of isotropy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.dimensions import _spectral_sectors as sectors
+from fractalcontact.dimensions._anisotropy import (
+    LEAST_LAGS,
+    RIDGES,
+    SMOOTH,
+    Anisotropy,
+    directional_fit,
+    fit_anisotropy,
+)
+from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
+from fractalcontact.dimensions._records import (
+    CONSTANT,
+    SIGNIFICANT,
+    Estimate,
+    normal_interval,
+    plane,
+    undefined,
+)
+from fractalcontact.dimensions._second_differences import (
+    DIRECTIONS,
+    LatticeDirection,
+    MiddlePairs,
+    SecondDifferences,
+    lattice_directions,
+)
+from fractalcontact.dimensions._surface_input import (
+    Scales,
+    Surface,
+    check_scales,
+    check_surface,
+    read_scales,
+    read_surfaces,
+)
+from fractalcontact.dimensions._whittle import LEAST_MODES, fit_interval
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SMALLEST = 16  # points along each axis
+_BY_DIRECTION = ("hurst", "fitted_hurst", "standard_error", "ci_low", "ci_high", "rms_increment")
+_OF_SURFACE = (
+    "isotropy_p_value",
+    "anisotropy_ratio",
+    "anisotropy_ratio_low",
+    "anisotropy_ratio_high",
+    "anisotropy_azimuth",
+    "anisotropy_p_value",
+)
+_NAMES = (*_BY_DIRECTION, *_OF_SURFACE, "topothesy", "run_time", "azimuth", "increment_lag")
+_IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
+_SHARE_COMPARED = 1 / 3  # of the surface, which a second difference may span in a test
+_ROUNDING = 1e-22  # of the largest mean square: the heights do not vary along that direction
+_NO_VARIATION = "the heights do not vary along this direction"
+_NO_MODEL = "the surface is not an anisotropic fractional Brownian one, and no model gives the scatter"
+_FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
+
+
+def _check(problems: Problems, *, surface: Any, azimuth: Any, scales: Any) -> None:
+    problems.numbers("azimuth", azimuth, optional=True)
+    is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_NAMES)
+    check_scales(problems, scales, surface if is_valid else None)
+
+
+@public_result(
+    title="Roughness by direction",
+    references="Davies and Hall, Fractal analysis of surface roughness by using spatial data, Journal "
+    "of the Royal Statistical Society B 61 (1999) 3-37",
+    check=_check,
+)
+def directions(
+    surface: xr.DataArray,
+    azimuth: float | Sequence[float] | None = None,
+    *,
+    scales: tuple[float, float] | None = None,
+) -> xr.Dataset:
+    """Estimate the Hurst exponent along each direction, and test whether the surface is isotropic.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., y, x), at least 16 points along each axis. NaN marks missing points.
+    azimuth : float or sequence of float, optional
+        Directions in degrees anticlockwise from E, modulo 180. Default: eight over the half-circle. On a
+        surface with free edges, the nearest directions of the lattice are used.
+    scales : (low, high), optional
+        Lengths in m: lags on free edges, wavelengths on periodic ones and for the tests. Default: the
+        shortest lags, or the band of the spectrum.
+
+    Returns
+    -------
+    Dataset over the leading dims and `azimuth` (degree, ascending, 0 ... 180)
+        Along each direction `hurst`, `standard_error`, `ci_low`, `ci_high`, `fitted_hurst`,
+        `rms_increment` and `topothesy`, as in `estimate`. Of the surface: `isotropy_p_value` (probability
+        that an isotropic surface differs as much between directions); `anisotropy_ratio` of the
+        correlation lengths along and across `anisotropy_azimuth`, with its 95 % interval
+        (`anisotropy_ratio_low`, `anisotropy_ratio_high`); `anisotropy_p_value` (the same probability for a
+        surface of that ratio). The attribute `reason` says why a value is NaN.
+
+    Raises
+    ------
+    InvalidInput
+        A profile, wrong axes or scales, a surface too small or entirely NaN.
+
+    Notes
+    -----
+    Free edges: second differences along lattice directions. Periodic: sectors of the spectrum. Models,
+    tests, and their measured size, power and coverage: see "Theory of the dimensions" in the documentation.
+
+    References
+    ----------
+    Davies and Hall (1999), J. R. Stat. Soc. B 61; Chan and Wood (2000), Annals of Statistics 28; Richard
+    (2018), Journal of Mathematical Imaging and Vision 60.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> ground = fc.surfaces.spectral(
+    ...     (128, 128), 1e-4, hurst=0.7, rms_height=1e-6, anisotropy_ratio=2.0, azimuth=30.0, rng=1
+    ... )
+    >>> result = fc.dimensions.directions(ground)
+    >>> print(
+    ...     f"ratio {float(result.anisotropy_ratio):.1f} along {float(result.anisotropy_azimuth):.0f} degrees"
+    ... )
+    ratio 2.0 along 30 degrees
+    """
+    surfaces, window = read_surfaces(surface), read_scales(scales)
+    chosen = None if azimuth is None else np.unique(np.mod(float_array(azimuth), 180.0))
+    is_periodic = all(surfaces[0].grid.periodic) and all(single.is_complete for single in surfaces)
+    if is_periodic:
+        azimuths = np.arange(DIRECTIONS) * 180.0 / DIRECTIONS if chosen is None else chosen
+        results = [_periodic_surface(single, azimuths, window) for single in surfaces]
+    else:
+        lattice = set(lattice_directions(chosen, surfaces[0].plane_spacing))
+        ordered = sorted(lattice, key=lambda direction: direction.azimuth)
+        azimuths = np.array([direction.azimuth for direction in ordered])
+        results = [_free_surface(single, ordered, window) for single in surfaces]
+    return _with_reasons(_dataset(surface, surfaces[0], azimuths, results), results)
+
+
+@dataclass(frozen=True)
+class _Directional:
+    """Estimates of one surface by direction, and its anisotropy, or the reason why there is none."""
+
+    estimates: list[Estimate]
+    anisotropy: Anisotropy | None
+    reason: str = ""
+
+    @classmethod
+    def of(cls, estimates: list[Estimate], anisotropy: Anisotropy) -> _Directional:
+        return cls(estimates, anisotropy.defined(), anisotropy.reason)
+
+
+def _dataset(
+    surface: xr.DataArray, first: Surface, azimuths: Array, results: Sequence[_Directional]
+) -> xr.Dataset:
+    leading = surface.dims[: surface.ndim - 2]
+    shape = [surface.sizes[dim] for dim in leading]
+    spacing = first.spacing[1]
+
+    def by_direction(values: list[list[float]]) -> tuple[Any, Array]:
+        return (*leading, "azimuth"), np.reshape(values, (*shape, -1))
+
+    data = {
+        name: by_direction([[getattr(record, name) for record in result.estimates] for result in results])
+        for name in _BY_DIRECTION
+    }
+    data["topothesy"] = by_direction(
+        [[record.topothesy(spacing) for record in result.estimates] for result in results]
+    )
+    for name in _OF_SURFACE:
+        values = [np.nan if r.anisotropy is None else getattr(r.anisotropy, name) for r in results]
+        data[name] = (leading, np.reshape(values, shape))
+    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=(*data, "run_time")))
+    return xr.Dataset(data, coords=coords | {"azimuth": azimuths, "increment_lag": spacing})
+
+
+def _with_reasons(result: xr.Dataset, results: Sequence[_Directional]) -> xr.Dataset:
+    """Add the reasons of missing values to the variables."""
+
+    def collected(texts: Sequence[str]) -> str:
+        return "; ".join(dict.fromkeys(text for text in texts if text))
+
+    records = [record for each in results for record in each.estimates]
+    for name in ("standard_error", "ci_low", "ci_high"):
+        result[name].attrs["reason"] = collected([record.reason for record in records])
+    result["hurst"].attrs["reason"] = collected([record.note for record in records])
+    for name in _OF_SURFACE:
+        result[name].attrs["reason"] = collected([each.reason for each in results])
+    return result
+
+
+def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> _Directional:
+    """Measure a surface with free edges by its second differences."""
+    if surface.is_constant or surface.is_plane:
+        record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
+        return _Directional([record] * len(directions), None, record.note)
+    differences, owner = SecondDifferences.of(surface, directions, scales)
+    every = lattice_directions(None, surface.plane_spacing)
+    compared = _compared(
+        surface,
+        differences if list(directions) == every else SecondDifferences.of(surface, every, scales)[0],
+    )
+    limit = _ROUNDING * max(differences.means.max(initial=0.0), compared.means.max(initial=0.0))
+    varied = compared.part(compared.means > limit)
+    has_constant_direction = bool((compared.means <= limit).any())
+    anisotropy, is_beyond_model = None, False
+    if np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > LEAST_LAGS:
+        anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
+        is_beyond_model = anisotropy.anisotropy_p_value < _IMPROBABLE or anisotropy.reason in (RIDGES, SMOOTH)
+        if surface.is_complete:
+            anisotropy = _tested_by_waves(surface, anisotropy, scales)
+        if has_constant_direction:
+            anisotropy = replace(anisotropy, isotropy_p_value=0.0, anisotropy_p_value=0.0, reason=RIDGES)
+        is_beyond_model = is_beyond_model or anisotropy.anisotropy_p_value < _IMPROBABLE
+    estimates = []
+    for index in range(len(directions)):
+        part = differences.part(owner == index)
+        if (part.means <= limit).any():
+            estimates.append(undefined(_NO_VARIATION))
+        elif len(part.means) < 2:
+            estimates.append(undefined(_FEW_LAGS))
+        else:
+            estimates.append(_along(surface, part, anisotropy, _NO_MODEL if is_beyond_model else ""))
+    if anisotropy is None:
+        return _Directional(estimates, None, "too few lags fit into the surface to compare directions")
+    return _Directional.of(estimates, anisotropy)
+
+
+def _compared(surface: Surface, differences: SecondDifferences) -> SecondDifferences:
+    """Return the lags whose second differences span at most a third of the surface, for the tests."""
+    inside = np.all(2 * np.abs(differences.vectors) < _SHARE_COMPARED * np.array(surface.shape), axis=1)
+    return differences.part(inside)
+
+
+def _middle_pairs(surface: Surface, differences: SecondDifferences) -> MiddlePairs:
+    return MiddlePairs.of(surface.heights, surface.is_complete, differences.vectors, differences.numbers)
+
+
+def _tested_by_waves(surface: Surface, anisotropy: Anisotropy, scales: Scales) -> Anisotropy:
+    """Take the p values from the waves of a complete surface that is large enough: they need no family.
+
+    Where the power law of the lags is straight, the smaller of both p values counts, doubled: second
+    differences are more sensitive to narrow ridges.
+    """
+    low, high = (0.0, np.inf) if scales is None else scales
+    window = low / surface.spacing[1], high / surface.spacing[1]
+    waves = sectors.TaperedModes.of(surface.heights, surface.plane_spacing, window)
+
+    def combined(metric: Array, fitted: int, by_lags: float) -> float:
+        by_waves = waves.test(metric, anisotropy.hurst, fitted=fitted)
+        if not np.isfinite(by_waves):
+            return by_lags
+        is_straight = abs(anisotropy.curvature_z) < SIGNIFICANT
+        return min(2.0 * min(by_waves, by_lags), 1.0) if is_straight else by_waves
+
+    return replace(
+        anisotropy,
+        isotropy_p_value=combined(np.eye(2), 0, anisotropy.isotropy_p_value),
+        anisotropy_p_value=combined(np.linalg.inv(anisotropy.metric), 2, anisotropy.anisotropy_p_value),
+    )
+
+
+def _along(
+    surface: Surface, differences: SecondDifferences, anisotropy: Anisotropy | None, reason: str
+) -> Estimate:
+    """Return the estimate of one direction.
+
+    Where the power law bends over the length more than chance allows, the interval also holds the exponents
+    between the shorter and between the longer lags.
+    """
+    hurst, metric = (None, np.eye(2)) if anisotropy is None else (anisotropy.hurst, anisotropy.metric)
+    pairs = _middle_pairs(surface, differences)
+    exponent, error, second = directional_fit(differences, pairs, hurst, metric)
+    low, high = normal_interval(exponent, error)
+    note = ""
+    if anisotropy is not None and abs(anisotropy.curvature_z) > SIGNIFICANT:
+        for start in range(len(differences.means) - 1):
+            part = differences.part(np.arange(start, start + 2))
+            fit = directional_fit(part, _middle_pairs(surface, part), hurst, metric)
+            part_low, part_high = normal_interval(*fit[:2])
+            low, high = min(low, part_low), max(high, part_high)
+        note = (
+            f"the exponent changes with the lag ({anisotropy.curvature_z:+.1f} standard deviations): the "
+            "interval holds those between the shorter and between the longer lags"
+        )
+    # a second difference over one lag has 4 - 4^H times the mean square of a first one
+    first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan
+    increment = float(np.sqrt(first)) * surface.unit
+    if reason:
+        error = low = high = np.nan
+        note = ""
+    return Estimate(exponent, error, low, high, rms_increment=increment, reason=reason, note=note).limited()
+
+
+def _periodic_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Directional:
+    """Measure a periodic surface by the waves that run along each direction."""
+    if surface.is_constant:
+        return _Directional([undefined(CONSTANT)] * azimuths.size, None, CONSTANT)
+    every = sectors.PlaneModes.of(surface.heights, surface.plane_spacing)
+    extent = max(surface.grid.extent)
+    low, high = band(every.modes) if scales is None else (extent / scales[1], extent / scales[0])
+    modes = every.between(low, high)
+    gaps = np.diff(azimuths, append=azimuths[:1] + 180.0)
+    half_width = min(sectors.WIDEST, 0.5 * float(gaps.min())) if azimuths.size > 1 else sectors.WIDEST
+    increments = sectors.directional_increments(surface.heights, surface.plane_spacing, azimuths)
+    estimates = []
+    for azimuth, increment in zip(azimuths, increments * surface.unit, strict=True):
+        sector = modes.sector(float(azimuth), half_width)
+        if np.sum(sector.weights) < 2 * LEAST_MODES or not _differ_in_length(sector):
+            estimates.append(undefined("too few waves of the band run along this direction"))
+            continue
+        _, record = fit_interval(sector, 0.5, noise=False)
+        estimates.append(replace(record, rms_increment=float(increment)).limited())
+    if modes.weights.sum() < sectors.LEAST or not _differ_in_length(modes.modes):
+        return _Directional(estimates, None, "too few waves in the band to compare directions")
+    start = modes.modes.fit(0.5, noise=False).hurst
+    return _Directional.of(estimates, sectors.fit_spectral_anisotropy(modes, start))
+
+
+def _differ_in_length(modes: PeriodicModes) -> bool:
+    return bool(modes.wavenumber.max() > 1.2 * modes.wavenumber.min())

@@ -1,0 +1,167 @@
+"""Exact likelihood of a profile: Gaussian increments with their full covariance.
+
+The increments between successive observed points are Gaussian with a covariance that follows from the
+variogram, whatever the gaps. A tilt of the profile is a mean proportional to the gaps and is eliminated
+(restricted likelihood: Patterson and Thompson 1971, Biometrika 58). Long profiles are cut into chunks of
+`CHUNK` points, which are taken as independent; each has its own tilt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+CHUNK = 256
+SMALLEST = 8  # observed points
+QUANTILE = 3.841458820694124  # 95 % quantile of chi square with one degree of freedom
+_LOWEST, _HIGHEST = 1e-3, 0.999
+_LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
+
+
+@dataclass(frozen=True)
+class ProfileFit:
+    """Estimate of H; the interval is that of the profile likelihood, inside (0, 1)."""
+
+    hurst: float
+    standard_error: float
+    low: float
+    high: float
+    rms_increment: float
+    noise: float
+
+
+def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> ProfileFit:
+    """Fit H, the amplitude and, with `noise`, white noise on the heights.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,)
+        At least `SMALLEST` finite values that do not lie on a straight line.
+    noise : bool
+        Fit white noise too, with a variance up to 100 times the mean square increment.
+    chunk : int
+        Largest number of points taken together.
+    """
+    increments = ProfileIncrements(heights, chunk)
+    cache: dict[float, tuple[float, float, float]] = {}
+
+    def best(hurst: float) -> tuple[float, float, float]:
+        """Return deviance, amplitude and noise for one exponent."""
+        hurst = float(hurst)
+        if hurst not in cache:
+            cache[hurst] = _best_noise(increments, hurst) if noise else (*increments.solve(hurst, 0.0), 0.0)
+        return cache[hurst]
+
+    hurst = minimum(lambda h: best(h)[0], _LOWEST, _HIGHEST)
+    least, amplitude, level = best(hurst)
+    low = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _LOWEST, 0.0)
+    high = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _HIGHEST, 1.0)
+    return ProfileFit(
+        hurst, _standard_error(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
+    )
+
+
+def _best_noise(increments: ProfileIncrements, hurst: float) -> tuple[float, float, float]:
+    """Return deviance, amplitude and noise at the best noise for one exponent."""
+    level = float(
+        np.exp(minimum(lambda t: increments.solve(hurst, np.exp(t))[0], _LEAST_NOISE, _MOST_NOISE, 1e-3))
+    )
+    with_noise, without = increments.solve(hurst, level), increments.solve(hurst, 0.0)
+    return (*with_noise, level) if with_noise[0] < without[0] else (*without, 0.0)
+
+
+def _standard_error(best: Callable[[float], tuple[float, float, float]], hurst: float) -> float:
+    """Return the standard error from the second difference of the deviance."""
+    step = min(0.02, 0.5 * (hurst - 0.5 * _LOWEST), 0.5 * (1.0 - hurst))
+    middle, left, right = (best(h)[0] for h in (hurst, hurst - step, hurst + step))
+    curvature = (left - 2.0 * middle + right) / step**2
+    return float(np.sqrt(2.0 / curvature)) if curvature > 0 else float("nan")
+
+
+class ProfileIncrements:
+    """Increments of one profile in chunks of equal length.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (n,)
+        NaN where nothing was observed.
+    chunk : int
+        Largest number of points of a chunk; chunks are equally long.
+    """
+
+    def __init__(self, heights: Array, chunk: int = CHUNK) -> None:
+        observed = np.flatnonzero(np.isfinite(heights))
+        size = observed.size // -(-observed.size // chunk)
+        starts = np.arange(0, observed.size - size + 1, size)
+        self.positions = observed[starts[:, None] + np.arange(size)]
+        self.jumps = np.diff(heights[self.positions], axis=1)
+        self.gaps = np.diff(self.positions, axis=1)
+        self.is_regular = bool((self.gaps == 1).all())
+        self.freedom = self.jumps.size - len(self.jumps)
+
+    def solve(self, hurst: float, noise: float) -> tuple[float, float]:
+        """Return the deviance and the mean square of the whitened increments.
+
+        The covariance is that of unit increments over one spacing, plus `noise` on the heights.
+        """
+        from fractalcontact.base.jit import use_threads
+        from fractalcontact.dimensions._kernels import whiten
+
+        columns = np.stack([self.jumps, self.gaps], axis=-1)
+        positions = self.positions
+        if self.is_regular:
+            # one factorisation for all chunks: the jumps of each are a column of its own
+            columns = np.concatenate([self.jumps.T, np.ones((self.jumps.shape[1], 1))], axis=1)[None]
+            positions = positions[:1]
+        covariances = _covariance(positions, hurst, noise)
+        log_determinants = np.empty(len(positions))
+        use_threads()
+        whiten(covariances, columns, log_determinants)
+        if self.is_regular:
+            jumps, gaps = columns[0, :, :-1].T, np.broadcast_to(columns[0, :, -1], self.jumps.shape)
+            log_determinants = np.repeat(log_determinants, len(self.jumps))
+        else:
+            jumps, gaps = columns[..., 0], columns[..., 1]
+        tilt = np.sum(gaps * gaps, axis=1)
+        squares = np.sum(jumps * jumps, axis=1) - np.sum(jumps * gaps, axis=1) ** 2 / tilt
+        amplitude = float(np.sum(squares)) / self.freedom
+        deviance = float(np.sum(log_determinants + np.log(tilt)) + self.freedom * np.log(amplitude))
+        return deviance, amplitude
+
+
+def _covariance(positions: Array, hurst: float, noise: float) -> Array:
+    """Return the covariance of the increments of each chunk: (chunks, size - 1, size - 1)."""
+    distance = np.abs(positions[:, :, None] - positions[:, None, :]).astype(float)
+    heights = -0.5 * distance ** (2.0 * hurst)
+    if noise:
+        heights += noise * np.eye(positions.shape[1])
+    return np.ascontiguousarray(
+        heights[:, 1:, 1:] - heights[:, 1:, :-1] - heights[:, :-1, 1:] + heights[:, :-1, :-1]
+    )
+
+
+def minimum(
+    function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5, points: int = 9
+) -> float:
+    """Return where a function of one variable, which may have several minima, is least."""
+    from scipy.optimize import minimize_scalar
+
+    # a coarse grid first: the bounded search alone may end in a local minimum
+    grid = np.linspace(low, high, points)
+    k = int(np.argmin([function(g) for g in grid]))
+    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, points - 1)])
+    return float(minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
+
+
+def crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
+    """Return where a function that is negative at `inside` vanishes; `beyond` if not up to the limit."""
+    from scipy.optimize import brentq
+
+    if function(limit) < 0:
+        return beyond
+    return float(brentq(function, inside, limit, xtol=1e-5))

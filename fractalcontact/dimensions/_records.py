@@ -1,0 +1,107 @@
+"""Record of one estimate of the Hurst exponent, with its limits to the range of fractals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
+CONSTANT = "a constant height has no Hurst exponent"
+NORMAL = 1.959963984540054  # 97.5 % quantile of the normal distribution
+_ROUNDING = 1e-9  # rounding of a slope
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Hurst exponent of one surface by one method.
+
+    Attributes
+    ----------
+    hurst : float
+        As fitted; `limited` brings it into 0 ... 1.
+    standard_error, ci_low, ci_high : float
+        NaN where no validated interval exists; `reason` then says why.
+    scale_min, scale_max : float
+        Window of the fit, m.
+    rms_increment : float
+        Rms height increment over one x spacing, m.
+    noise_height : float
+        Rms height of white noise, m.
+    misfit : float
+        Goodness of fit: z of the change of the exponent with scale.
+    window, reason, note : str
+        How the window was chosen, why there is no interval, other remarks.
+    fitted_hurst : float
+        The exponent before it was limited.
+    """
+
+    hurst: float
+    standard_error: float = np.nan
+    ci_low: float = np.nan
+    ci_high: float = np.nan
+    scale_min: float = np.nan
+    scale_max: float = np.nan
+    rms_increment: float = np.nan
+    noise_height: float = np.nan
+    misfit: float = np.nan
+    window: str = ""
+    reason: str = ""
+    note: str = ""
+    fitted_hurst: float = np.nan
+
+    def limited(self) -> Estimate:
+        """Limit exponent and interval to 0 ... 1, with a note; no interval if all of it lies outside."""
+        if not np.isfinite(self.hurst):
+            return replace(self, fitted_hurst=np.nan)
+        hurst = float(np.clip(self.hurst, 0.0, 1.0))
+        low, high = float(np.clip(self.ci_low, 0.0, 1.0)), float(np.clip(self.ci_high, 0.0, 1.0))
+        error, note, reason = self.standard_error, self.note, self.reason
+        if self.ci_low > 1.0 or self.ci_high < 0.0:
+            low = high = error = np.nan
+            reason = f"the fitted exponent, {self.hurst:.3f}, is that of no fractal: choose other scales"
+        if self.hurst > 1.0 + _ROUNDING:
+            note = joined(note, f"fitted {self.hurst:.3f}: smoother than a fractal surface, limited to 1")
+        elif self.hurst < -_ROUNDING:
+            note = joined(note, f"fitted {self.hurst:.3f}: rougher than a fractal surface, limited to 0")
+        return replace(
+            self,
+            hurst=hurst,
+            standard_error=error,
+            ci_low=low,
+            ci_high=high,
+            note=note,
+            reason=reason,
+            fitted_hurst=self.hurst,
+        )
+
+    def topothesy(self, spacing: float) -> float:
+        """Return the lag in m at which the rms increment equals the lag; NaN at H = 1."""
+        if not (self.rms_increment > 0 and self.hurst < 1.0):
+            return float("nan")
+        # near H = 1 the power over- or underflows: logarithms, with the power of two of the unit split off
+        mantissa, exponent = np.frexp(spacing)
+        logarithm = np.log(mantissa) + np.log(self.rms_increment / spacing) / (1.0 - self.hurst)
+        is_finite = abs(logarithm) < 690.0 and abs(logarithm + exponent * np.log(2.0)) < 690.0
+        return float(np.ldexp(np.exp(logarithm), exponent)) if is_finite else float("nan")
+
+
+def normal_interval(hurst: float, error: float) -> tuple[float, float]:
+    """Return the 95 % interval of a normal estimate."""
+    return hurst - NORMAL * error, hurst + NORMAL * error
+
+
+def undefined(reason: str) -> Estimate:
+    """Return the record of an estimate that does not exist."""
+    return Estimate(np.nan, reason=reason, note=reason)
+
+
+def plane() -> Estimate:
+    """Return the estimate for a plane, the limit H = 1."""
+    reason = "a plane: the limit H = 1, without scatter to make an interval from"
+    return Estimate(1.0, reason=reason, note=reason)
+
+
+def joined(*notes: str) -> str:
+    """Join the notes that are not empty."""
+    return "; ".join(note for note in notes if note)

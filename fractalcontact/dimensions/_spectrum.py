@@ -1,0 +1,167 @@
+"""Power spectral density of a surface, averaged over rings of wavenumbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base import spectra
+from fractalcontact.base.results import public_result
+from fractalcontact.base.scaling import logarithm
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset
+from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+
+Array = np.ndarray[Any, np.dtype[Any]]
+_NAMES = {2: "power_spectral_density", 1: "profile_power_spectral_density"}  # by number of axes
+
+
+def _check(problems: Problems, *, surface: Any, window: Any, tile: Any) -> None:
+    reserved = (*_NAMES.values(), "wavenumber", "wavelength", "mode_count", *ALWAYS)
+    is_valid = check_surface(problems, surface, smallest=4, gaps=False, squares=True, reserved=reserved)
+    if window is not None:
+        problems.choice("window", window, ("auto", "hann", "none"))
+    if problems.integer("tile", tile, at_least=8, optional=True) and is_valid and tile is not None:
+        shortest = min(surface.sizes[dim] for dim in ("y", "x") if dim in surface.dims)
+        problems.require(tile <= shortest, "tile", f"at most {shortest}", tile)
+
+
+@public_result(
+    title="Power spectral density of a surface",
+    references="Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
+    achieved_error="relative standard error of each value sqrt(2 / mode_count), where no window mixes the "
+    "modes",
+    check=_check,
+)
+def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
+    """Return the radially averaged power spectral density of a surface.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., y, x) or (..., x) for a profile, without gaps.
+    window : "auto", "hann" or None
+        Taper of the free axes. "auto" is "hann" on free axes and None on periodic ones. With None, the
+        edges of a free surface show as a tail q^-3. A plane is removed first, except where both axes are
+        periodic; there only the mean is.
+    tile : int, optional
+        Average the spectra of square tiles of this edge in points, overlapping by half (Welch 1967): for
+        surfaces that do not fit in memory, or for a smoother curve. Default: the whole surface.
+
+    Returns
+    -------
+    Dataset over `wavenumber` (rad m-1)
+        `power_spectral_density` (m4), or `profile_power_spectral_density` (m3) of a profile; `mode_count`;
+        `local_slope`, fitted over a factor of two in wavenumber; and `wavelength` (m). Rings are as wide as
+        the spacing of the wavenumbers and go up to the smaller Nyquist wavenumber.
+
+    Raises
+    ------
+    InvalidInput
+        Heights are missing, an axis is not uniform, or a tile does not fit.
+
+    Notes
+    -----
+    Convention: C(q) = dx dy |Z(q)|^2 / (nx ny), so that the integral of C over dqx dqy / (2 pi)^2 is the
+    mean square height. For a self-affine surface C falls as q^(-2 - 2 H), for a profile as q^(-1 - 2 H).
+
+    References
+    ----------
+    Jacobs, Junge and Pastewka (2017), Surface Topography: Metrology and Properties 5, 013001.
+
+    Examples
+    --------
+    The slope of the spectrum gives the Hurst exponent:
+
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.spectral((256, 256), 1e-3, hurst=0.7, rms_height=1e-5, rng=1)
+    >>> curve = fc.dimensions.spectrum(surface)
+    >>> slope = float(curve.local_slope.median())
+    >>> round(-(slope + 2) / 2, 1)
+    0.7
+    """
+    surfaces = read_surfaces(surface)
+    taper = "none" if window is None else window
+    curves = [spectrum_curve(single, taper, tile) for single in surfaces]
+    slopes = [_local_slope(curve.scale, curve.value, curve.count) for curve in curves]
+    name = _NAMES[surfaces[0].axes]
+    result = curve_dataset(surface, surfaces, "wavenumber", curves, slopes, value=name, count="mode_count")
+    return result.assign_coords(wavelength=2.0 * np.pi / result["wavenumber"])
+
+
+def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Curve:
+    """Return the ring averages of the power spectral density of one surface."""
+    axes, spacing = surface.axes, surface.grid.spacing
+    shape = surface.grid.shape if tile is None else (tile,) * axes
+    periodic = surface.grid.periodic if tile is None else (False,) * axes
+    tapers = tuple(
+        "hann" if window == "hann" or (window == "auto" and not is_periodic) else None
+        for is_periodic in periodic
+    )
+    total: Array = np.zeros(1)
+    number = 0
+    for part in _tiles(surface, tile):
+        heights = without_trend(part, plane=not all(periodic))
+        power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
+        total = total + power
+        number += 1
+    power = total / number
+    if axes == 2:
+        q, mean, count = spectra.radial_average(power, shape, spacing)
+    else:
+        q, mean = spectra.half_wavenumbers(shape, spacing)[0][1:], power[1:]
+        count = spectra.half_weights(shape[0])[1:].astype(np.int64)
+    return Curve(q, mean * (surface.unit**2 if tile is None else 1.0), count)
+
+
+def without_trend(heights: Array, *, plane: bool) -> Array:
+    """Return complete heights without their mean, or without the least-squares plane."""
+    heights = heights - heights.mean()
+    if not plane:
+        return heights
+    ny, nx = heights.shape
+    x, y = np.arange(nx) - 0.5 * (nx - 1), np.arange(ny) - 0.5 * (ny - 1)
+    # on a full rectangle the two slopes are independent
+    tilt = np.sum(heights.sum(axis=0) * x) / (ny * np.sum(x * x)) * x
+    rise = np.sum(heights.sum(axis=1) * y) / (nx * np.sum(y * y)) * y if ny > 1 else np.zeros(1)
+    return np.asarray(heights - tilt - rise[:, None])
+
+
+def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:
+    """Yield the whole surface in scaled heights, or its tiles in metres."""
+    if tile is None:
+        yield surface.heights
+        return
+    ny, nx = surface.shape
+    edge_y = min(tile, ny)
+    for j in range(0, ny - edge_y + 1, max(edge_y // 2, 1)):
+        if surface.is_lazy and surface.axes == 2:
+            strip = np.asarray(surface.source.isel(y=slice(j, j + edge_y)).values, dtype=np.float64)
+        else:
+            strip = surface.raw[j : j + edge_y]
+        for i in range(0, nx - tile + 1, tile // 2):
+            yield strip[:, i : i + tile]
+
+
+def _local_slope(scale: Array, value: Array, count: Array) -> Array:
+    """Return the slope of a line through the points within a factor of sqrt 2, weighted by counts."""
+    (x, _), (y, _) = logarithm(scale), logarithm(value)
+    good = np.isfinite(y)
+    weights = np.where(good, count, 0.0)
+    y = np.where(good, y, 0.0)
+    sums = np.stack([weights, weights * x, weights * y, weights * x * x, weights * x * y])
+    sums = np.concatenate([np.zeros((5, 1)), np.cumsum(sums, axis=1)], axis=1)
+    low = np.searchsorted(scale, scale / np.sqrt(2.0) * (1 - 1e-9))
+    high = np.searchsorted(scale, scale * np.sqrt(2.0) * (1 + 1e-9))
+    # the lowest wavenumbers have no neighbour within sqrt 2
+    low, high = (
+        np.minimum(low, np.arange(x.size) - 1).clip(0),
+        np.maximum(high, np.arange(x.size) + 2).clip(max=x.size),
+    )
+    w, wx, wy, wxx, wxy = sums[:, high] - sums[:, low]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = (w * wxy - wx * wy) / (w * wxx - wx * wx)
+    return np.where(good & np.isfinite(slope), slope, np.nan)

@@ -1,0 +1,294 @@
+"""Check an input surface and split it into single surfaces with scaled heights."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.coords import check_leading
+from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.validation import Problems
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Scales = tuple[float, float] | None
+
+ROUNDING = 1e-12  # of the range of heights
+DECADES = 250  # powers of ten of a metre: heights are scaled before they are used
+SMALLEST_UNIT, LARGEST_UNIT = 2.0**-450, 2.0**450  # m: ranges whose second and fourth powers are finite
+SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
+
+
+@dataclass
+class Surface:
+    """One surface or profile with its heights above the lowest, in units of a power of two metres.
+
+    Attributes
+    ----------
+    source : DataArray
+        Dims (y, x), or (x,) for a profile.
+    grid : Grid
+    """
+
+    source: xr.DataArray
+    grid: Grid
+    _unit: float = 1.0
+    _heights: Array | None = None
+    _is_plane: bool | None = None
+
+    @property
+    def heights(self) -> Array:
+        """Scaled heights, shape (ny, nx); ny = 1 for a profile. NaN where nothing was observed."""
+        if self._heights is None:
+            raw = self.raw
+            low, high = _height_range(raw)
+            self._unit = _height_unit(low, high)
+            self._heights = raw - low
+            self._heights *= 1.0 / self._unit
+        return self._heights
+
+    @property
+    def unit(self) -> float:
+        """Unit of `heights` in m, a power of two."""
+        _ = self.heights
+        return self._unit
+
+    @property
+    def raw(self) -> Array:
+        """Heights in m, shape (ny, nx)."""
+        return np.asarray(self.source.values, dtype=np.float64).reshape(self.shape)
+
+    @property
+    def squares_overflow(self) -> bool:
+        """Whether squares of the heights in m would overflow or underflow."""
+        return not self.is_lazy and not SMALLEST_UNIT <= self.unit <= LARGEST_UNIT and not self.is_constant
+
+    def in_own_unit(self) -> Surface:
+        """Return the same surface with the scaled heights taken as metres."""
+        return Surface(self.source, self.grid, 1.0, self.heights, self._is_plane)
+
+    @property
+    def is_lazy(self) -> bool:
+        """Whether the heights are not in memory yet."""
+        return self._heights is None and is_lazy(self.source)
+
+    @property
+    def axes(self) -> int:
+        """Number of axes: 2 for a surface, 1 for a profile."""
+        return len(self.grid.shape)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(ny, nx), with ny = 1 for a profile."""
+        return (1, *self.grid.shape)[-2:]  # type: ignore[return-value]
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """(dy, dx) in m; dy = dx for a profile."""
+        return self.grid.spacing[0], self.grid.spacing[-1]
+
+    @property
+    def periodic(self) -> tuple[bool, bool]:
+        """Which of (y, x) are periodic; y of a profile is not."""
+        return (False, *self.grid.periodic)[-2:]  # type: ignore[return-value]
+
+    @property
+    def relative_spacing(self) -> tuple[float, ...]:
+        """Spacings divided by dx: (dy/dx, 1), or (1,) for a profile."""
+        return tuple(spacing / self.grid.spacing[-1] for spacing in self.grid.spacing)
+
+    @property
+    def plane_spacing(self) -> tuple[float, float]:
+        """(dy/dx, 1), also for a profile."""
+        return self.spacing[0] / self.spacing[1], 1.0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no height is missing."""
+        return bool(np.isfinite(self.raw.min()))
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether all observed heights are equal."""
+        return bool(np.nanmax(self.raw) == np.nanmin(self.raw))
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether all observed heights lie on a plane, except for rounding."""
+        if self._is_plane is None:
+            heights = self.heights
+            # heights far from zero are rounded to coarser numbers
+            rounding = max(ROUNDING, 4.0 * np.spacing(float(np.nanmax(np.abs(self.raw)))) / self.unit)
+            # second differences of a few rows and columns mostly make the least-squares plane unnecessary
+            bends = [
+                np.diff(lines, 2) for lines in (heights[:: 1 + heights.shape[0] // 16], heights[:, ::64].T)
+            ]
+            is_bent = any(np.nanmax(np.abs(bend), initial=0.0) > 1e3 * rounding for bend in bends)
+            self._is_plane = not is_bent and self._distance_from_plane() <= rounding
+        return self._is_plane
+
+    def _distance_from_plane(self) -> float:
+        """Return the largest distance from the least-squares plane, in scaled height."""
+        observed = np.isfinite(self.heights)
+        y, x = (index.astype(float) for index in np.nonzero(observed))
+        columns = np.stack([np.ones(x.size), x, y][: 1 + self.axes], axis=1) / max(self.shape)
+        q = np.linalg.qr(columns)[0]
+        heights = self.heights[observed] - self.heights[observed].mean()
+        return float(np.abs(heights - q @ (q.T @ heights)).max())
+
+    def slabs(self, overlap: int, unit: float = 1.0) -> Iterator[tuple[Array, int]]:
+        """Yield slabs of rows in m, each with up to `overlap` rows of the next and the number of its own.
+
+        Heights in memory are divided by `unit`, a power of two.
+        """
+        if not self.is_lazy or self.axes == 1:
+            raw = self.raw if unit == 1.0 else self.raw / unit
+            yield np.ascontiguousarray(raw), self.shape[0]
+            return
+        ny, nx = self.shape
+        rows = max(SLAB // nx, 4 * overlap, 1)
+        for start in range(0, ny, rows):
+            slab = self.source.isel(y=slice(start, start + rows + overlap)).values
+            yield np.ascontiguousarray(slab, dtype=np.float64), min(rows, ny - start)
+
+
+def is_lazy(array: xr.DataArray) -> bool:
+    """Return whether the heights are not in memory yet (dask)."""
+    return array.chunks is not None
+
+
+def check_surface(
+    problems: Problems,
+    surface: Any,
+    *,
+    smallest: int = 3,
+    gaps: bool = True,
+    profile: bool = True,
+    squares: bool = False,
+    points: bool = False,
+    reserved: Collection[str] = (),
+) -> bool:
+    """Check the argument `surface`; `read_surfaces` then splits it.
+
+    Parameters
+    ----------
+    problems : Problems
+    surface : DataArray
+        Dims (..., y, x), or (..., x) where `profile` allows one.
+    smallest : int
+        Smallest number of points along each axis.
+    gaps : bool
+        Allow NaN.
+    squares : bool
+        The squares of the heights in m must be finite numbers.
+    points : bool
+        Require enough observed points for an estimate: 25, or 8 of a profile.
+    reserved : collection of str
+        Names of the result, which no leading dim may have.
+    """
+    before = len(problems.found)
+    problems.surface(
+        "surface",
+        surface,
+        finite=False,
+        smallest=smallest,
+        leading=True,
+        profile=profile,
+        decades=DECADES,
+    )
+    check_leading(surface, reserved, problems)
+    if len(problems.found) > before or is_lazy(surface):
+        return len(problems.found) == before
+    axes = len(_core_dims(surface))
+    _check_heights(problems, surface.values, axes, gaps)
+    if len(problems.found) == before:
+        stack = np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:])))
+        if points:
+            _check_number_of_points(problems, stack, 8 if axes == 1 else 25)
+        if squares:
+            _check_squares(problems, stack)
+    return len(problems.found) == before
+
+
+def check_scales(problems: Problems, scales: Any, surface: xr.DataArray | None) -> None:
+    """Check a window of lengths (low, high) in m; it must overlap the lengths of a valid `surface`."""
+    if scales is None or not problems.numbers("scales", scales, above=0):
+        return
+    values = np.atleast_1d(np.asarray(scales, dtype=np.float64))
+    if values.size != 2 or not values[0] < values[-1]:
+        problems.add("scales", "two ascending lengths in metres, (low, high)", scales)
+    elif surface is not None:
+        grid = read_grid(surface, _core_dims(surface))
+        shortest, longest = min(grid.spacing), max(grid.extent)
+        overlaps = values[0] < longest and values[1] > shortest
+        expected = f"a window that meets the lengths of the surface, {shortest:g} m to {longest:g} m"
+        problems.require(bool(overlaps), "scales", expected, scales)
+
+
+def read_surfaces(surface: xr.DataArray) -> list[Surface]:
+    """Split a valid surface along its leading dims; the order is that of these dims flattened."""
+    core = _core_dims(surface)
+    grid = read_grid(surface, core)
+    leading = [dim for dim in surface.dims if dim not in core]
+    indices = np.ndindex(*(surface.sizes[dim] for dim in leading))
+    return [Surface(surface.isel(dict(zip(leading, index, strict=True))), grid) for index in indices]
+
+
+def read_scales(scales: Any) -> Scales:
+    """Return a valid window of lengths as two numbers."""
+    return None if scales is None else (float(scales[0]), float(scales[1]))
+
+
+def _core_dims(surface: xr.DataArray) -> tuple[str, ...]:
+    return ("y", "x") if "y" in surface.dims else ("x",)
+
+
+def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) -> None:
+    if heights.size == 0:
+        problems.add("surface", "at least one surface", f"shape {heights.shape}")
+        return
+    if np.isfinite(heights.min()) and np.isfinite(heights.max()):
+        return
+    problems.require(
+        not np.isinf(heights).any(), "surface", "heights that are finite or NaN", "infinite heights"
+    )
+    core = int(np.prod(heights.shape[-axes:]))
+    if not gaps:
+        problems.finite("surface", heights, remedy="see fractalcontact.surfaces.fill")
+    elif not np.isfinite(heights).reshape(-1, core).any(axis=1).all():
+        problems.add("surface", "observed heights", "nothing but NaN")
+
+
+def _check_number_of_points(problems: Problems, stack: Array, smallest: int) -> None:
+    size = stack.shape[1]
+    if size >= smallest and np.isfinite(stack.min()):
+        return
+    counts = np.count_nonzero(np.isfinite(stack), axis=1)
+    if counts.min() < smallest:
+        problems.add("surface", f"at least {smallest} observed points", int(counts[counts < smallest][0]))
+
+
+def _check_squares(problems: Problems, stack: Array) -> None:
+    ranges = [_height_range(np.asarray(heights, dtype=np.float64)) for heights in stack]
+    units = [_height_unit(low, high) for low, high in ranges if high > low]
+    if any(not SMALLEST_UNIT <= unit <= LARGEST_UNIT for unit in units):
+        expected = (
+            f"heights over a range of {SMALLEST_UNIT:.0e} m to {LARGEST_UNIT:.0e} m, "
+            "whose squares are numbers"
+        )
+        problems.add("surface", expected, f"a range of about {max(units):.0e} m")
+
+
+def _height_range(heights: Array) -> tuple[float, float]:
+    low, high = float(heights.min()), float(heights.max())
+    if np.isnan(low):
+        low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
+    return low, high
+
+
+def _height_unit(low: float, high: float) -> float:
+    """Return the power of two next above the range of heights."""
+    return float(np.ldexp(1.0, np.frexp(high - low)[1])) if high > low else 1.0
