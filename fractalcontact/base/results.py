@@ -23,6 +23,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
@@ -96,8 +97,8 @@ def public_result(
             if achieved_error is not None:
                 facts.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start
-            if hasattr(result, "data_vars") and "run_time" not in result.variables:
-                result["run_time"] = elapsed
+            if isinstance(result, xr.Dataset):
+                _set_run_time(result, elapsed)
             facts.setdefault("run_time", elapsed)
             return stamp(label(result, keep_notes=True), name, parameters, **facts)
 
@@ -109,6 +110,19 @@ def public_result(
         return public
 
     return decorate
+
+
+def _set_run_time(dataset: xr.Dataset, seconds: float) -> None:
+    """Set `run_time` unless the function has done so.
+
+    A scalar NaN reserved for it is overwritten, which is faster than adding a variable: that aligns all
+    indexes, and takes a tenth of the time of a small analysis.
+    """
+    variable = dataset.variables.get("run_time")
+    if variable is None:
+        dataset["run_time"] = seconds
+    elif variable.ndim == 0 and np.isnan(variable.values):
+        variable.values = np.float64(seconds)
 
 
 def public_name(function: Callable[..., Any]) -> str:

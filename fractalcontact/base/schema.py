@@ -402,23 +402,26 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         A name is not in the table.
     """
     data = data.copy(deep=False)
-    for name, coordinate in data.coords.items():
+    coordinates = data.coords.variables  # not DataArrays, which take 30 microseconds each to make
+    for name, coordinate in coordinates.items():
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
-            _label_own(str(name), coordinate.variable)
+            _label_own(str(name), coordinate)
         else:
             reason = coordinate.attrs.get("reason") if keep_notes else None
-            _label_variable(str(name), coordinate.variable, is_coordinate=True)
+            _label_variable(str(name), coordinate, is_coordinate=True)
             if reason is not None:
-                coordinate.variable.attrs["reason"] = reason
-    if hasattr(data, "data_vars"):
-        for name, variable in data.data_vars.items():
-            notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}
-            if name in QUANTITIES and variable.attrs.get("units") in QUANTITIES[name].other_units:
-                notes["units"] = variable.attrs["units"]
-            _label_variable(str(name), variable.variable, is_coordinate=False)
-            variable.variable.attrs.update(notes)
-    else:
+                coordinate.attrs["reason"] = reason
+    if not hasattr(data, "data_vars"):
         _label_variable(str(data.name), data.variable, is_coordinate=False)
+        return data
+    for name, variable in data.variables.items():
+        if name in coordinates:
+            continue
+        notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}
+        if name in QUANTITIES and variable.attrs.get("units") in QUANTITIES[str(name)].other_units:
+            notes["units"] = variable.attrs["units"]
+        _label_variable(str(name), variable, is_coordinate=False)
+        variable.attrs.update(notes)
     return data
 
 

@@ -25,6 +25,7 @@ ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
     "lacunarity": _lacunarity.analyse,
 }
 MEASURES = ("islands", "percolation", *ANALYSES)
+NOT_COLLECTED = ("scale_min", "scale_max", "run_time")
 LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 
 Variable = tuple[tuple[str, ...], Array]
@@ -142,7 +143,7 @@ def measure_planes(
 def _add_analysis(result: Measurements, name: str, dataset: xr.Dataset, all_sizes: Array) -> None:
     """Add the variables of one analysis, under names that are unique among all of them."""
     for key, variable in dataset.variables.items():
-        if key in dataset.coords or key in ("scale_min", "scale_max"):
+        if key in dataset.coords or key in NOT_COLLECTED:
             continue
         new, dims, values = _unique_name(name, str(key)), tuple(map(str, variable.dims)), variable.values
         if "box_size" in dims:

@@ -217,6 +217,7 @@ def build_dataset(
     }
     on_grid = (planes.plane_coords or {}) if on_plane else {}
     of_rows = _row_coords(planes, *rows) if rows else {}
+    variables = {**variables, "run_time": ((), np.nan)}  # reserved for `public_result`
     dataset = xr.Dataset(variables, coords={**leading, **on_grid, **of_rows, **(coords or {})})
     for name, attributes in (notes or {}).items():
         dataset[name].attrs.update(attributes)
