@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
-from fractalcontact.base.memory import leave_dask
+from fractalcontact.base.memory import block_dask_import
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         gc.set_threshold(MADE)
     options = _parser().parse_args(arguments)
     if arguments is None and not getattr(options, "workers", 0):
-        leave_dask()
+        block_dask_import()
     warnings.showwarning = _say_warning
     try:
         with leaving(_leave):
@@ -137,9 +137,9 @@ def _run(options: argparse.Namespace) -> int:
 
 def _memory() -> str:
     """Return the most memory that this process has held, where the system tells."""
-    from fractalcontact.base.memory import most_memory
+    from fractalcontact.base.memory import peak_memory
 
-    most = most_memory()
+    most = peak_memory()
     return f"; at most {most / 1e6:.0f} MB of memory" if most else ""
 
 

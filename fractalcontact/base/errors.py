@@ -1,21 +1,21 @@
-"""The exceptions and warnings of the package, one class for each cause."""
+"""Exceptions and warnings of the package, one class for each cause."""
 
 from collections.abc import Sequence
 
 
 class FractalContactError(Exception):
-    """Anything this package raises on purpose."""
+    """Base class of all exceptions of the package."""
 
 
 class InvalidInput(FractalContactError, ValueError):
-    """The call cannot be carried out as asked; lists every problem found.
+    """An argument or a file is invalid; lists every problem.
 
     Attributes
     ----------
     where : str
         The public name that was called, or the file that was read.
     problems : tuple of str
-        One line for each problem: the argument, what was expected, what came.
+        One line for each problem: the argument, what was expected, what was given.
     """
 
     def __init__(self, where: str, problems: Sequence[str]) -> None:
@@ -24,14 +24,14 @@ class InvalidInput(FractalContactError, ValueError):
         super().__init__(where, self.problems)
 
     def __str__(self) -> str:
-        """Put each problem on a line of its own."""
+        """Return a line for each problem."""
         return "\n".join(
             [f"{self.where}: {_count(len(self.problems))}", *(f"  - {p}" for p in self.problems)]
         )
 
 
 class UnreadableFile(InvalidInput):
-    """A file is corrupt, of an unknown format, or lacks what is needed to read it in metres."""
+    """A file is corrupt, of an unknown format, or does not state its units or size."""
 
 
 class MissingExtra(FractalContactError, ImportError):
@@ -46,24 +46,24 @@ class MissingExtra(FractalContactError, ImportError):
     """
 
     def __init__(self, purpose: str, library: str, extra: str) -> None:
-        super().__init__(purpose, library, extra)  # all of them, for a copy is made from these
+        super().__init__(purpose, library, extra)  # pickle rebuilds the error from all of them
 
     def __str__(self) -> str:
-        """Say what is missing, and how to come by it."""
+        """Return what is missing and how to install it."""
         purpose, library, extra = self.args
         return f"{purpose} needs {library}: pip install 'fractalcontact[{extra}]'"
 
 
 class FractalContactWarning(UserWarning):
-    """A result is given, and the caller should know something about it."""
+    """Base class of all warnings of the package."""
 
 
 class ScaleWarning(FractalContactWarning):
-    """The size or the heights of a surface are implausible for the instrument: check its units."""
+    """Size or heights of a surface are implausible for its instrument: check the units."""
 
 
 class ConvergenceWarning(FractalContactWarning):
-    """At least one step stopped before its tolerance was met; `converged` says which."""
+    """At least one load step did not reach its tolerance; see the variable `converged`."""
 
 
 def _count(number: int) -> str:

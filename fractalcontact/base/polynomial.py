@@ -1,4 +1,4 @@
-"""Least-squares planes and quadrics under planes with gaps, arrays only."""
+"""Least-squares polynomials of heights with gaps: levelling and mean slopes, on plain arrays."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ RANK = 1e-10  # smallest singular value over the largest for which the points fi
 
 
 def shifted(heights: Array) -> tuple[Array, float, float]:
-    """Return (heights - reference) / scale with the reference and the scale, a power of two.
+    """Return (heights - reference) / scale, the reference (an observed height), and the scale (a power of 2).
 
-    The reference is an observed height, so that the subtraction loses nothing where heights are close to
-    each other; NaN stays. Scaled values lie within -1 and 1.
+    Subtracting an observed height loses no digits of heights that are close to each other. Scaled values are
+    within -1 and 1; NaN stays.
     """
     observed = heights[np.isfinite(heights)]
     reference = float(observed[observed.size // 2])
@@ -29,12 +29,12 @@ def shifted(heights: Array) -> tuple[Array, float, float]:
 
 
 def detrended(heights: Array, order: int) -> tuple[Array, bool]:
-    """Return the heights less their least-squares polynomial, and whether the points fix it.
+    """Return the heights minus their least-squares polynomial, and whether the points determine it.
 
     Parameters
     ----------
     heights : ndarray, shape (ny, nx) or (nx,)
-        NaN where missing; at least one value is there.
+        NaN where missing; at least one value is finite.
     order : int
         Total degree of the polynomial.
     """
@@ -46,7 +46,7 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
     singular = np.linalg.svd(gram, compute_uv=False)
     if singular[-1] < RANK * singular[0]:
         return heights, False
-    for _ in range(2):  # the second pass takes out what rounding left in the first
+    for _ in range(2):  # the second pass removes the rounding error of the first
         right = np.array([_project(values, functions) for functions in basis])
         values -= _surface(basis, np.linalg.solve(gram, right))
         values[~observed] = 0.0
@@ -56,7 +56,7 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
 
 
 def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
-    """Return the slope of the mean plane along each axis, y first; NaN where the points do not fix it."""
+    """Return the slope of the mean plane along each axis, y first; NaN if it is undetermined."""
     values, _, scale = shifted(heights)
     observed = np.isfinite(values)
     values[~observed] = 0.0
@@ -72,7 +72,7 @@ def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
 
 
 def _basis(shape: tuple[int, ...], order: int) -> list[tuple[Array, ...]]:
-    """Return products of Legendre polynomials of the axes on -1 ... 1, by total degree, y power rising."""
+    """Return products of Legendre polynomials on -1 ... 1 for each axis, ordered by degree, then y power."""
     axes = [np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, n), order).T for n in shape]
     powers = itertools.product(range(order + 1), repeat=len(shape))
     chosen = sorted((p for p in powers if sum(p) <= order), key=lambda p: (sum(p), p))

@@ -1,4 +1,4 @@
-"""Progress bars for stages that may take more than a moment; silent unless asked for."""
+"""Progress bars on the error stream."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 def track(
     items: Iterable[T], enabled: bool, description: str, *, unit: str = "step", total: int | None = None
 ) -> Iterable[T]:
-    """Iterate over `items`, showing a bar on the error stream when `enabled`."""
+    """Iterate over `items`; show a bar if `enabled` and the loop takes longer than a second."""
     if not enabled:
         return items
     from tqdm import tqdm

@@ -1,8 +1,6 @@
-"""Where a result comes from: the call, its parameters, the machine-room that computed it, and when.
+"""Provenance of a result: the call, its parameters, versions, threads and time, as attributes.
 
-Everything a file needs to explain itself stands in the attributes that `stamp` sets. No path of a home
-folder is written, and nothing that could differ between two identical runs stands outside the attributes
-and `run_time`.
+No path of a home folder is written. Identical runs differ only in these attributes and in `run_time`.
 """
 
 from __future__ import annotations
@@ -13,25 +11,23 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import wraps
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.schema import CONVENTIONS
 from fractalcontact.base.threads import thread_count
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PAPER = (
     "Borri-Brunetto, Carpinteri and Chiaia, Contact, closure and friction behaviour of rough crack concrete "
     "surfaces, FRAMCOS-3 (1998)"
 )
 
-T = TypeVar("T", "xr.Dataset", "xr.DataArray")
+T = TypeVar("T", xr.Dataset, xr.DataArray)
 P = ParamSpec("P")
-R = TypeVar("R", bound="xr.Dataset | xr.DataArray")
+R = TypeVar("R", bound=xr.Dataset | xr.DataArray)
 
 
 def stamp(
@@ -57,7 +53,7 @@ def stamp(
     references : str
         The source of the method.
     **facts
-        Further entries of the provenance: random entropy, run time, achieved error ...
+        Further entries of the provenance: random stream, run time, achieved error ...
     """
     version = _version()
     entry = {
@@ -135,7 +131,7 @@ def plain(value: Any) -> Any:
 
 
 def _read(provenance: Any) -> Any:
-    """Return the provenance of an input; what others wrote under that name stays as it is."""
+    """Return the provenance of an input as an object; text of another origin is kept as text."""
     try:
         return json.loads(provenance)
     except (TypeError, ValueError):

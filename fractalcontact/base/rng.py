@@ -1,4 +1,4 @@
-"""Random streams (SPEC 7): one way in, and a record from which any of them can be made again."""
+"""Random streams (SPEC 7), and a JSON record from which a stream can be restored."""
 
 from __future__ import annotations
 
@@ -21,56 +21,56 @@ RNGLike = (
 
 
 def generator(rng: RNGLike) -> np.random.Generator:
-    """Return a Generator for anything `numpy.random.default_rng` takes, or for what `record` returned.
+    """Return a Generator from an argument of `numpy.random.default_rng`, or from a `record`.
 
     Raises
     ------
     InvalidInput
-        It takes no such thing.
+        The argument is neither.
     """
     try:
-        return _again(rng) if isinstance(rng, Mapping) else np.random.default_rng(rng)
+        return _restored(rng) if isinstance(rng, Mapping) else np.random.default_rng(rng)
     except (TypeError, ValueError, KeyError, AttributeError) as error:
-        expected = "a Generator, a whole number >= 0 or several of them, the record of a stream, or None"
+        expected = "a Generator, an integer >= 0 or several of them, the record of a stream, or None"
         raise InvalidInput("fractalcontact", [f"rng: expected {expected}, got {rng!r}"]) from error
 
 
 def record(rng: np.random.Generator) -> dict[str, Any]:
-    """Return a stream as it stands, in plain JSON types, for `generator` to make it again.
+    """Return the present state of a stream in plain JSON types, for `generator` to restore it.
 
-    Entropy, spawn key and how many children it has had tell a stream that nothing was drawn from; one that
-    has been drawn from is told by its state as well. Large numbers are written as strings.
+    Entropy, spawn key and number of spawned children identify a fresh stream; after a draw the state of the
+    bit generator is recorded too. Large integers are written as strings.
     """
     bits = rng.bit_generator
-    seed, kind = bits.seed_seq, type(bits)
-    told: dict[str, Any] = {"bit_generator": kind.__name__, "entropy": None, "spawn_key": []}
+    seed, bit_generator = bits.seed_seq, type(bits)
+    entry: dict[str, Any] = {"bit_generator": bit_generator.__name__, "entropy": None, "spawn_key": []}
     if not isinstance(seed, np.random.SeedSequence):
-        return told | {"state": _plain(bits.state)}
+        return entry | {"state": _plain(bits.state)}
     entropy = np.asarray(seed.entropy, dtype=object)
     words = [str(int(word)) for word in entropy.flat]
-    told["entropy"] = words if entropy.ndim else words[0]
-    told["spawn_key"] = [int(key) for key in seed.spawn_key]
-    told["children"] = int(seed.n_children_spawned)
+    entry["entropy"] = words if entropy.ndim else words[0]
+    entry["spawn_key"] = [int(key) for key in seed.spawn_key]
+    entry["children"] = int(seed.n_children_spawned)
     state = _plain(bits.state)
-    if state != _plain(kind(_seed(told)).state):
-        told["state"] = state
-    return told
+    if state != _plain(bit_generator(_seed(entry)).state):
+        entry["state"] = state
+    return entry
 
 
-def _again(told: Mapping[str, Any]) -> np.random.Generator:
-    """Make a stream from its record."""
-    kind = getattr(np.random, told["bit_generator"])
-    bits = kind(_seed(told) if told["entropy"] is not None else None)
-    if "state" in told:
-        bits.state = _numbers(told["state"])
+def _restored(entry: Mapping[str, Any]) -> np.random.Generator:
+    """Return the stream of a record."""
+    bit_generator = getattr(np.random, entry["bit_generator"])
+    bits = bit_generator(_seed(entry) if entry["entropy"] is not None else None)
+    if "state" in entry:
+        bits.state = _numbers(entry["state"])
     return np.random.Generator(bits)
 
 
-def _seed(told: Mapping[str, Any]) -> np.random.SeedSequence:
-    entropy = told["entropy"]
-    words = int(entropy) if isinstance(entropy, str) else [int(word) for word in entropy]
+def _seed(entry: Mapping[str, Any]) -> np.random.SeedSequence:
+    entropy = entry["entropy"]
+    integers = int(entropy) if isinstance(entropy, str) else [int(word) for word in entropy]
     return np.random.SeedSequence(
-        words, spawn_key=tuple(told["spawn_key"]), n_children_spawned=told.get("children", 0)
+        integers, spawn_key=tuple(entry["spawn_key"]), n_children_spawned=entry.get("children", 0)
     )
 
 

@@ -1,6 +1,6 @@
-"""From a curve over scales to a slope: local slopes, weighted fits, the window of a fit.
+"""Power-law fits of scaling curves: weighted lines through logarithms, and local slopes.
 
-Curves are measured elsewhere; here they are only fitted. A slope is d ln value / d ln scale.
+A slope is d ln value / d ln scale.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 class Line:
     """A straight line through ln value against ln scale.
 
-    `standard_error` is that of ordinary least squares with independent errors; the points of a scaling
-    curve are not independent, so no confidence interval may be made from it alone.
+    `standard_error` assumes independent errors. Points of a scaling curve are correlated, so it gives no
+    confidence interval by itself.
     """
 
     slope: float
@@ -39,13 +39,13 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
     Returns
     -------
     Line
-        NaN where fewer than two points are left.
+        NaN if fewer than two points can be used.
     """
     scale, value = np.asarray(scale, float), np.asarray(value, float)
     weights = np.ones(scale.shape) if weights is None else np.asarray(weights, float)
     (x, x_unit), (y, y_unit) = logarithm(scale), logarithm(value)
-    good = np.isfinite(x) & np.isfinite(y) & (weights > 0)
-    x, y, w = x[good], y[good], weights[good]
+    usable = np.isfinite(x) & np.isfinite(y) & (weights > 0)
+    x, y, w = x[usable], y[usable], weights[usable]
     if x.size < 2 or np.ptp(x) == 0:
         return Line(np.nan, np.nan, np.nan, int(x.size))
     w = w / w.sum()
@@ -61,7 +61,7 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
 def local_slope(scale: Array, value: Array) -> Array:
     """Return d ln value / d ln scale at every point (centred; one-sided at the ends).
 
-    `value` has the scale on its last axis; leading axes are free. NaN where the value is not positive.
+    `value` has the scale on its last axis and any leading axes. NaN where the value is not positive.
     """
     scale, value = np.asarray(scale, float), np.asarray(value, float)
     if scale.size < 2:
@@ -71,9 +71,9 @@ def local_slope(scale: Array, value: Array) -> Array:
 
 
 def logarithm(values: Array) -> tuple[Array, Array]:
-    """Return ln (values / 2^k) and k, which takes the unit out: so no unit changes a bit of a slope.
+    """Return ln(values / 2^k) and k, so that the unit of the values changes no bit of a slope.
 
-    Each curve, along the last axis, has a unit of its own; k has shape (..., 1).
+    Each curve, along the last axis, has its own k, which has shape (..., 1).
     """
     lowest = np.min(values, axis=-1, keepdims=True, initial=np.inf, where=np.isfinite(values) & (values > 0))
     unit = np.frexp(np.where(np.isfinite(lowest), lowest, 0.5))[1]

@@ -1,21 +1,19 @@
-"""Every name that a result may carry, with its unit, its meaning and its form on disk.
+"""Names, units, meanings and encodings of all variables that a result may have.
 
-Labels are outputs: a public function builds its Dataset and passes it through `label`, which sets
-`units`, `long_name` and the NetCDF encoding of every variable and coordinate from the table below and
-drops whatever was inherited. A name that is not in the table is an error. Units are UDUNITS in SI; angles
-are degrees and counts are "1". Nothing is named `load`, which is a method of xarray.
+A public function passes its result through `label`, which sets `units`, `long_name` and the NetCDF encoding
+of every variable and coordinate from the table below; other attributes are dropped. A name that is not in
+the table is an error. Units are UDUNITS in SI; angles are in degrees, counts in "1". No name is `load`,
+which is a method of xarray.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
+import xarray as xr
 
 CONVENTIONS = "CF-1.11"
 CORE_DIMS = ("y", "x")
@@ -35,7 +33,7 @@ class Quantity:
 
 
 OPEN, CONTACT, YIELDED = 0, 1, 2
-SMALL = 4096  # bytes of what is no map, up to which compressing takes more room than it saves
+SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
 _STATE = {
     "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
     "flag_meanings": "open contact yielded",
@@ -61,8 +59,8 @@ _EVENT = {
     "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
     "flag_meanings": "continuation birth death merge split merge_and_split",
 }
-_NO_INTERVAL = {"comment": "NaN where no honest interval can be given"}
-_NO_CENTRE = {"comment": "NaN where an island winds around the whole period"}
+_NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
+_NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
 QUANTITIES: dict[str, Quantity] = {
@@ -79,14 +77,14 @@ QUANTITIES: dict[str, Quantity] = {
     "height": Quantity("m", "surface height"),
     "valid": Quantity("1", "cell was observed"),
     "filled_points": Quantity("1", "number of missing points that were filled"),
-    "removed_points": Quantity("1", "number of spikes that were taken out"),
+    "removed_points": Quantity("1", "number of spikes that were removed"),
     "missing_points": Quantity("1", "number of missing points"),
     "mean_height": Quantity("m", "mean height"),
     "rms_height": Quantity("m", "root mean square height about the mean"),
-    "mean_absolute_height": Quantity("m", "mean distance of the heights from their mean"),
-    "peak_height": Quantity("m", "greatest height above the mean"),
-    "valley_depth": Quantity("m", "greatest depth below the mean"),
-    "peak_to_valley": Quantity("m", "greatest less smallest height"),
+    "mean_absolute_height": Quantity("m", "mean absolute deviation of the heights from their mean"),
+    "peak_height": Quantity("m", "largest height above the mean"),
+    "valley_depth": Quantity("m", "largest depth below the mean"),
+    "peak_to_valley": Quantity("m", "largest minus smallest height"),
     "skewness": Quantity("1", "skewness of the heights"),
     "kurtosis": Quantity("1", "kurtosis of the heights (3 for a Gaussian surface)"),
     "rms_slope": Quantity("1", "root mean square of the surface gradient (both components)"),
@@ -97,7 +95,7 @@ QUANTITIES: dict[str, Quantity] = {
     "rms_curvature": Quantity("m-1", "root mean square of the mean curvature"),
     "nayak_parameter": Quantity("1", "bandwidth parameter of Nayak, m0 m4 / m2^2"),
     "developed_area_ratio": Quantity("1", "area of the surface over the area of its plane"),
-    "developed_area_excess": Quantity("1", "area of the surface over the area of its plane, less one"),
+    "developed_area_excess": Quantity("1", "area of the surface over the area of its plane, minus one"),
     # dimensions
     "method": Quantity(None, "estimator"),
     "hurst": Quantity("1", "Hurst exponent"),
@@ -372,14 +370,14 @@ QUANTITIES: dict[str, Quantity] = {
     "member_count": Quantity("1", "number of surfaces"),
 }
 
-T = TypeVar("T", "xr.Dataset", "xr.DataArray")
+T = TypeVar("T", xr.Dataset, xr.DataArray)
 
 
 NOTES = ("long_name", "comment", "reason")
 
 
 def label(data: T, *, keep_notes: bool = False) -> T:
-    """Return `data` with the labels of this table; nothing else is kept but the period of an axis.
+    """Return `data` with the labels of this table; of other attributes only the period of an axis is kept.
 
     Parameters
     ----------
@@ -394,7 +392,7 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     Returns
     -------
     Dataset or DataArray
-        A shallow copy. Attributes of a Dataset itself are kept: they are set by `base.provenance`.
+        A shallow copy. Attributes of the Dataset itself are kept: `base.provenance` sets them.
 
     Raises
     ------
@@ -428,7 +426,7 @@ def label(data: T, *, keep_notes: bool = False) -> T:
 def encoded(dataset: xr.Dataset) -> xr.Dataset:
     """Return a shallow copy whose variables carry the encoding of this table and no other.
 
-    What a file or an operation left in `encoding` would otherwise decide how the data are written again.
+    Otherwise the encoding left by a file or an operation would decide how the data are written.
     """
     dataset = dataset.copy(deep=False)
     for name, variable in dataset.variables.items():

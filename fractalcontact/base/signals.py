@@ -1,4 +1,4 @@
-"""A polite stop: the first SIGINT or SIGTERM is noted and the work ends where it may; a second is obeyed."""
+"""SIGINT and SIGTERM: the first one finishes the current task, a second one stops at once."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from types import FrameType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-ECHO = 0.5  # seconds: `timeout` and terminals may send the same signal twice
+ECHO = 0.5  # seconds in which a signal counts as a repetition: `timeout` and terminals may send it twice
 
 
 class Stop:
-    """Whether a stop was asked for; true from the first signal on.
+    """State of a stop request; true from the first signal on.
 
     Attributes
     ----------
     number : int
-        The signal, 0 while there was none.
+        The signal; 0 before any.
     """
 
     def __init__(self) -> None:
         self.number = 0
 
     def __bool__(self) -> bool:
-        """Say whether a signal came."""
+        """Return whether a signal was received."""
         return self.number != 0
 
 
 class Stopped(KeyboardInterrupt):
-    """The work ended early, in good order, because a signal asked for it.
+    """The work ended early, after its current task, because of a signal.
 
     Attributes
     ----------
@@ -40,9 +40,9 @@ class Stopped(KeyboardInterrupt):
         The signal.
     """
 
-    def __init__(self, number: int, told: str) -> None:
+    def __init__(self, number: int, message: str) -> None:
         self.number = number
-        super().__init__(f"stopped by {signal.Signals(number).name}; {told}")
+        super().__init__(f"stopped by {signal.Signals(number).name}; {message}")
 
 
 Handler = Callable[[int, FrameType | None], object]
@@ -50,10 +50,10 @@ Handler = Callable[[int, FrameType | None], object]
 
 @contextmanager
 def noted(enabled: bool = True) -> Iterator[Stop]:
-    """Note SIGINT and SIGTERM inside the block instead of obeying them.
+    """Record SIGINT and SIGTERM inside the block instead of acting on them.
 
-    A second signal, half a second after the first or later, does what it did before the block. Outside the
-    main thread, or if not `enabled`, signals are left alone.
+    A second signal, at least `ECHO` after the first, has its usual effect. Outside the main thread, or if not
+    `enabled`, signals keep their handlers.
     """
     stop, first = Stop(), 0.0
 
@@ -83,10 +83,10 @@ def leaving(handler: Handler) -> Iterator[None]:
 
 
 def _set(handlers: Mapping[signal.Signals, Any]) -> dict[signal.Signals, Any]:
-    """Set handlers and return those that stood before; outside the main thread there is nothing to set."""
+    """Set handlers and return the previous ones; outside the main thread nothing is set."""
     if threading.current_thread() is not threading.main_thread():
         return {}
-    # None stands for a handler that was not set from Python, and cannot be set again
+    # None stands for a handler that was not set from Python and cannot be restored
     before = {number: signal.getsignal(number) or signal.SIG_DFL for number in handlers}
     for number, handler in handlers.items():
         signal.signal(number, handler)

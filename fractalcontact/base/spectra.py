@@ -1,12 +1,12 @@
-"""Power spectra of surfaces: the conventions, written once.
+"""Power spectra of surfaces: conventions, periodogram, radial average and moments.
 
 Wavenumbers q are in rad m-1. The two-dimensional power spectral density C (m4) of heights z on ny x nx
-cells of dy x dx is C(q) = dx dy |Z(q)|^2 / (nx ny), Z being the plain sum of z exp(-i q r). The mean square
-of the heights is then the sum of C over all modes, divided by the extent A: the discrete form of the
-integral of C dqx dqy / (2 pi)^2. For a profile, C (m3) = dx |Z|^2 / nx and A is its length.
+cells of dy x dx is C(q) = dx dy |Z(q)|^2 / (nx ny), where Z is the sum of z exp(-i q r). The mean square of
+the heights is the sum of C over all modes divided by the extent A: the discrete form of the integral of
+C dqx dqy / (2 pi)^2. For a profile, C (m3) = dx |Z|^2 / nx and A is its length.
 
-Only the half-plane of a real transform is kept; `weights` counts each of its columns once (q_x = 0, and the
-Nyquist column of an even grid) or twice.
+Densities have the half-plane of a real transform; `half_weights` counts each of its columns once (q_x = 0,
+and the Nyquist column of an even grid) or twice.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def half_weights(nx: int) -> Array:
-    """Return how often each column of the half-plane counts in a sum over all modes, shape (nx//2 + 1,)."""
+    """Return the weight of each half-plane column in a sum over all modes, shape (nx//2 + 1,)."""
     weights = np.full(nx // 2 + 1, 2.0)
     weights[0] = 1.0
     if nx % 2 == 0:
@@ -44,7 +44,7 @@ def radial_wavenumber(shape: Sequence[int], spacing: Sequence[float]) -> Array:
 
 
 def window_weights(n: int, name: str | None) -> Array:
-    """Return a taper of n points with mean square 1: None (all ones) or "hann"."""
+    """Return a window of n points with mean square 1: None (all ones) or "hann"."""
     if name is None:
         return np.ones(n)
     if name != "hann":
@@ -61,11 +61,11 @@ def periodogram(
     Parameters
     ----------
     heights : ndarray, shape (..., ny, nx), or (..., nx) with one spacing
-        Finite. No mean and no plane is removed: do that first where it matters.
+        Finite; neither mean nor plane is removed.
     spacing : sequence of float
-        (dy, dx) in metres; its length tells a plane from a profile.
+        (dy, dx) in metres for a plane, (dx,) for a profile.
     window : None, "hann", or one of them for each axis
-        Taper of the free axes; its loss of mean square is made good.
+        Window of the non-periodic axes, with mean square 1.
 
     Returns
     -------
@@ -98,17 +98,17 @@ def radial_average(
     shape, spacing : pairs
         (ny, nx) and (dy, dx) of the heights.
     edges : ndarray, optional
-        Ascending edges of the rings in rad m-1 (the lower one belongs to the ring). Default: rings as wide
-        as the coarser step of the wavenumbers, centred on its multiples; below the first of them, rings as
-        wide as the finer step, so that every mode but the mean is in a ring.
+        Ascending edges of the rings in rad m-1 (a ring includes its lower edge). Default: rings as wide as
+        the coarser step of the wavenumbers, centred on its multiples; below the first of them, rings as wide
+        as the finer step, so that every mode except the mean is in a ring.
 
     Returns
     -------
     q : ndarray, shape (k,)
-        Mean wavenumber of the modes in each ring that is not empty.
+        Mean wavenumber of the modes in each non-empty ring.
     mean : ndarray, shape (..., k)
     counts : ndarray of int64, shape (k,)
-        Modes in each ring, in the whole plane; half as many are independent.
+        Modes of the full plane in each ring; half of them are independent.
     """
     radius = radial_wavenumber(shape, spacing)
     weights = np.broadcast_to(half_weights(shape[-1]), radius.shape)
@@ -143,7 +143,7 @@ class Moments:
     """Mean squares of the heights, of their gradient and of their Laplacian.
 
     For an isotropic surface they are the radial moments of the spectrum, <|q|^n C> for n = 0, 2, 4. The mean
-    height is not in them.
+    height is excluded.
 
     Attributes
     ----------
@@ -213,8 +213,8 @@ def _square(waves: Sequence[Array]) -> Array:
 def aliased_power_law(waves: tuple[Array, Array], hurst: float, images: int = 5) -> Array:
     """Return the spectral density of a sampled fractional Brownian surface, up to a factor.
 
-    All waves that a square grid takes for one and the same are summed, |w + 2 pi k| to the power
-    -2 - 2 hurst over all k; those beyond `images` along either axis as an integral.
+    It is the sum of |w + 2 pi k|^(-2 - 2 hurst) over all integer vectors k, the aliases of w on a square
+    grid; those beyond `images` along either axis are summed as an integral.
 
     Parameters
     ----------

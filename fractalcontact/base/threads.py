@@ -1,7 +1,8 @@
-"""How many threads the transforms and the parallel loops may use: one number, decided here; and their pool.
+"""Number of threads of the transforms and parallel loops, and the thread pool of `in_bands`.
 
-The environment variable `FRACTALCONTACT_THREADS` sets it; otherwise it is the number of processors that
-this process may run on. `limit` changes it for a `with` block.
+The environment variable `FRACTALCONTACT_THREADS` sets the number. Without it, it is the number of
+processors available to this process, limited by `OMP_NUM_THREADS` and `NUMBA_NUM_THREADS` where they are
+set. `limit` changes it inside a `with` block. No result depends on it.
 """
 
 from __future__ import annotations
@@ -14,28 +15,44 @@ from contextvars import ContextVar
 from queue import SimpleQueue
 from typing import Any
 
+SHARE = 32768  # elements worth a thread of their own
+LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+
 _limit: ContextVar[int | None] = ContextVar("fractalcontact_threads", default=None)
 
 
 def thread_count() -> int:
-    """Return the number of threads in force here."""
-    chosen = _limit.get() or asked()
+    """Return the number of threads to use here."""
+    chosen = _limit.get() or requested_count()
     if chosen is not None:
         return chosen
+    limits = [_environment_count(name) for name in LIMITS]
+    return min([_available_processors(), *(count for count in limits if count is not None)])
+
+
+def requested_count() -> int | None:
+    """Return the number in `FRACTALCONTACT_THREADS`; None if it is not set."""
+    return _environment_count("FRACTALCONTACT_THREADS")
+
+
+def _environment_count(name: str) -> int | None:
+    """Return the positive integer in an environment variable; None if there is none.
+
+    OpenMP allows a list with one entry for each level of nesting; the first one counts.
+    """
+    word = os.environ.get(name, "").partition(",")[0].strip()
+    return int(word) if word.isdecimal() and int(word) > 0 else None
+
+
+def _available_processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def asked() -> int | None:
-    """Return the number that the environment asks for, None if it asks for none."""
-    word = os.environ.get("FRACTALCONTACT_THREADS", "")
-    return int(word) if word.isdigit() and int(word) > 0 else None
-
-
 @contextmanager
 def limit(threads: int) -> Iterator[None]:
-    """Use at most this many threads inside the block."""
+    """Use this number of threads inside the block."""
     token = _limit.set(max(1, int(threads)))
     try:
         yield
@@ -44,36 +61,43 @@ def limit(threads: int) -> Iterator[None]:
 
 
 def in_bands(function: Callable[..., None], count: int, work: int, *arguments: Any) -> None:
-    """Call what holds no Python lock as ``function(start, stop, *arguments)`` over bands of ``range(count)``.
+    """Call ``function(start, stop, *arguments)`` over bands of ``range(count)``, in parallel.
 
-    The bands run on the threads of `base.threads` when there is enough `work` (elements) to share; which
-    band does what must not change a bit of the result, so that sums are kept per item and added up later.
-    Unlike a `prange` loop this may be called from several threads at once, and it compiles fast.
+    The function must release the global interpreter lock, and its result must not depend on the bands: keep
+    sums for each item and add them up afterwards. Unlike a `prange` loop this may be called from several
+    threads at once, and it compiles fast.
+
+    Parameters
+    ----------
+    function : callable
+    count : int
+        Number of items.
+    work : int
+        Number of elements processed; below `SHARE` elements for each thread, fewer threads are used.
+    *arguments
+        Further arguments of the function.
     """
     threads = min(thread_count(), count, max(1, work // SHARE))
     if threads <= 1:
         function(0, count, *arguments)
         return
     edges = [count * k // threads for k in range(threads + 1)]
-    shares = [_Share(function, (edges[k], edges[k + 1], *arguments)) for k in range(1, threads)]
-    helpers = _helpers(threads - 1)
-    for share in shares:
-        helpers.put(share)
+    bands = [_Band(function, (edges[k], edges[k + 1], *arguments)) for k in range(1, threads)]
+    queue = _worker_queue(threads - 1)
+    for band in bands:
+        queue.put(band)
     try:
         function(edges[0], edges[1], *arguments)
-    finally:  # nothing is written any more once this returns
-        for share in shares:
-            share.done.acquire()
-    for share in shares:
-        if share.error is not None:
-            raise share.error
+    finally:  # wait even after an error: the other bands still write into the arrays
+        for band in bands:
+            band.done.acquire()
+    for band in bands:
+        if band.error is not None:
+            raise band.error
 
 
-SHARE = 32768  # elements that are worth a thread
-
-
-class _Share:
-    """What one helper is to do."""
+class _Band:
+    """A call that one worker thread makes."""
 
     def __init__(self, function: Callable[..., None], arguments: tuple[Any, ...]) -> None:
         self.function, self.arguments = function, arguments
@@ -81,8 +105,8 @@ class _Share:
         self.done = threading.Lock()
         self.done.acquire()
 
-    def carry_out(self) -> None:
-        """Call the function; what it raises is kept for the caller."""
+    def run(self) -> None:
+        """Call the function; an exception is stored for the calling thread."""
         try:
             self.function(*self.arguments)
         except BaseException as error:
@@ -90,21 +114,24 @@ class _Share:
         self.done.release()
 
 
-_queues: dict[tuple[int, int], SimpleQueue[_Share]] = {}
+_queues: dict[tuple[int, int], SimpleQueue[_Band]] = {}
 _lock = threading.Lock()
 
 
-def _helpers(count: int) -> SimpleQueue[_Share]:
-    """Return the queue of so many waiting threads: a hand-over takes a third of what an executor's does."""
+def _worker_queue(count: int) -> SimpleQueue[_Band]:
+    """Return the queue of `count` waiting threads.
+
+    Handing over a call takes a third of the time of an executor of `concurrent.futures`.
+    """
     key = (os.getpid(), count)  # threads do not survive a fork
     with _lock:
         if key not in _queues:
             _queues[key] = SimpleQueue()
             for _ in range(count):
-                threading.Thread(target=_help, args=(_queues[key],), daemon=True).start()
+                threading.Thread(target=_work, args=(_queues[key],), daemon=True).start()
         return _queues[key]
 
 
-def _help(queue: SimpleQueue[_Share]) -> None:
+def _work(queue: SimpleQueue[_Band]) -> None:
     while True:
-        queue.get().carry_out()
+        queue.get().run()

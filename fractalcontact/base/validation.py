@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from fractalcontact.base.grid import Grid
 
 T = TypeVar("T")
-LARGEST_INTEGER = 1 << 53  # the integers beyond it are not all representable as float64
+LARGEST_INTEGER = 1 << 53  # larger integers are not all representable as float64
 
 
 class Problems:
@@ -39,7 +39,7 @@ class Problems:
     Parameters
     ----------
     where : str
-        The public name that was called, or the file that was read.
+        Public name of the function that is called, or the file that is read.
     error : type, default InvalidInput
         The exception to raise.
     """
@@ -53,12 +53,12 @@ class Problems:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if isinstance(value, InvalidInput):
             self._extend(value.problems)
             raise self.error(self.where, self.found) from value
-        if kind is None and self.found:
+        if error_type is None and self.found:
             raise self.error(self.where, self.found)
 
     def add(self, argument: str, expected: str, got: object) -> None:
@@ -243,12 +243,10 @@ class Problems:
         decades : int, optional
             Allowed powers of ten of a metre, up and down, for heights and their range.
         """
-        from fractalcontact.base.grid import DECADES, check_surface
+        from fractalcontact.base.grid import DECADES, surface_faults  # loads xarray
 
-        before = len(self.found)
-        check_surface(
+        faults = surface_faults(
             value,
-            self,
             argument,
             finite=finite,
             smallest=smallest,
@@ -256,14 +254,19 @@ class Problems:
             profile=profile,
             decades=DECADES if decades is None else decades,
         )
-        return len(self.found) == before
+        return self._add_all(faults)
 
     def grid(self, argument: str, array: Any, *, dims: Sequence[str] = ("y", "x")) -> bool:
         """Check that `dims` are the last dims of a DataArray and have uniform coordinates in metres."""
-        from fractalcontact.base.grid import grid_of
+        from fractalcontact.base.grid import grid_faults  # loads xarray
 
+        return self._add_all(grid_faults(array, argument, dims))
+
+    def _add_all(self, faults: Iterable[tuple[str, str, object]]) -> bool:
+        """Note every fault; return whether there is none."""
         before = len(self.found)
-        grid_of(array, self, argument, dims=dims)
+        for fault in faults:
+            self.add(*fault)
         return len(self.found) == before
 
     def periodic(self, argument: str, value: Any, grid: Grid) -> bool:

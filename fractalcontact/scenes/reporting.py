@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.netcdf import Outline, outline
+from fractalcontact.base.outline import Outline, outline
 from fractalcontact.base.tables import table
 from fractalcontact.scenes.statements import paper_table
 

@@ -90,7 +90,7 @@ class _Sent:
         says otherwise.
         """
         _keep_freed_memory()
-        with threads.limit(threads.asked() or 1):
+        with threads.limit(threads.requested_count() or 1):
             result = self.task(self.store, _StopAfar(self.run))
         return result, getattr(self.store, "added", {})
 

@@ -16,7 +16,7 @@ import tracemalloc
 from functools import _lru_cache_wrapper
 from pathlib import Path
 
-from fractalcontact.base.memory import most_memory
+from fractalcontact.base.memory import peak_memory
 
 TASK, REPORT = "task.pickle", "report.json"
 PACKAGE = "fractalcontact"
@@ -25,7 +25,7 @@ SPLIT = ("scipy", "skimage", "matplotlib")  # libraries whose subpackages are li
 
 def main(folder):
     """Load libraries or run a scene, as the task says; run it a second time to trace its arrays."""
-    before = most_memory()
+    before = peak_memory()
     task = pickle.loads((folder / TASK).read_bytes())
     for name in task["libraries"]:
         importlib.import_module(name)
@@ -33,7 +33,7 @@ def main(folder):
     if task["scene"] is not None:
         avoid_dask()
         report = run_scene(task["scene"], folder / "first")
-    report |= {"libraries": libraries(), "memory": most_memory() - before, "kernels": kernels()}
+    report |= {"libraries": libraries(), "memory": peak_memory() - before, "kernels": kernels()}
     if task["traced"]:
         report["array_memory"] = traced_memory(task["scene"], folder / "second")
     (folder / REPORT).write_text(json.dumps(report), encoding="utf-8")

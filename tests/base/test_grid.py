@@ -1,13 +1,13 @@
-"""The grid: cell centres, spacing, periods that end with a crop, edges of a mask."""
+"""Grids: spacing, periodicity, crops, faults of surfaces, edges of a mask."""
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.checks import Problems
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.grid import check_surface, contact_edges, grid_of, plane_coords, resolve_periodic
+from fractalcontact.base.grid import contact_edges, periodic_axes, plane_coords, read_grid
+from fractalcontact.base.validation import Problems
 
 
 def plane(shape=(6, 5), spacing=(2e-6, 1e-6), periodic=(True, True), origin=0.0):
@@ -18,31 +18,32 @@ def plane(shape=(6, 5), spacing=(2e-6, 1e-6), periodic=(True, True), origin=0.0)
 
 def grid(array):
     with Problems("test") as problems:
-        return grid_of(array, problems, "surface")
+        assert problems.grid("surface", array)
+    return read_grid(array)
 
 
 def test_shape_spacing_extent_and_area():
-    found = grid(plane())
-    assert found.shape == (6, 5)
-    np.testing.assert_allclose(found.spacing, (2e-6, 1e-6), rtol=1e-14)
-    np.testing.assert_allclose(found.extent, (12e-6, 5e-6), rtol=1e-14)
-    np.testing.assert_allclose(found.nominal_area, 60e-12, rtol=1e-14)
-    assert found.periodic == (True, True)
+    result = grid(plane())
+    assert result.shape == (6, 5)
+    np.testing.assert_allclose(result.spacing, (2e-6, 1e-6), rtol=1e-14)
+    np.testing.assert_allclose(result.extent, (12e-6, 5e-6), rtol=1e-14)
+    np.testing.assert_allclose(result.nominal_area, 60e-12, rtol=1e-14)
+    assert result.periodic == (True, True)
 
 
-def test_a_crop_of_a_periodic_face_is_free():
+def test_crop_of_a_periodic_surface_is_not_periodic():
     assert grid(plane().isel(x=slice(0, 4))).periodic == (True, False)
     assert grid(plane().isel(y=slice(1, None))).periodic == (False, True)
     assert grid(plane().isel(y=slice(None, None, 2), x=slice(0, 5))).periodic == (True, True)
 
 
 def test_spacing_scales_exactly_with_powers_of_two():
-    face = plane()
-    scaled = face.assign_coords(x=face.x * 2.0**-20, y=face.y * 2.0**-20)
-    assert grid(scaled).spacing == tuple(s * 2.0**-20 for s in grid(face).spacing)
+    surface = plane()
+    scaled = surface.assign_coords(x=surface.x * 2.0**-20, y=surface.y * 2.0**-20)
+    assert grid(scaled).spacing == tuple(s * 2.0**-20 for s in grid(surface).spacing)
 
 
-def test_a_large_offset_of_the_coordinates_is_no_fault():
+def test_large_offset_of_the_coordinates_is_valid():
     np.testing.assert_allclose(grid(plane(origin=1e4)).spacing[1], 1e-6, rtol=1e-5)
 
 
@@ -62,31 +63,31 @@ def test_a_large_offset_of_the_coordinates_is_no_fault():
         (lambda a: a.astype(complex), "real numbers"),
     ],
 )
-def test_every_fault_of_a_surface_is_named(spoil, word):
+def test_faults_of_a_surface_are_named(spoil, word):
     with pytest.raises(InvalidInput, match=word), Problems("test") as problems:
-        check_surface(spoil(plane()), problems)
+        problems.surface("surface", spoil(plane()))
 
 
 @pytest.mark.parametrize("dims", [("x", "y"), ("row", "column")])
 def test_wrong_dims_are_one_fault(dims):
-    """The sizes of other axes are not held against the face."""
-    face = xr.DataArray(np.zeros((6, 5)), dims=dims)
+    """The sizes of other axes are no further fault."""
+    surface = xr.DataArray(np.zeros((6, 5)), dims=dims)
     with pytest.raises(InvalidInput) as caught, Problems("test") as problems:
-        check_surface(face, problems, smallest=4)
+        problems.surface("surface", surface, smallest=4)
     assert len(caught.value.problems) == 1
 
 
-def test_periodic_may_be_called_free_but_never_the_reverse():
-    face = plane()
-    with Problems("test") as problems:
-        assert resolve_periodic(False, grid(face), problems, "periodic") == (False, False)
-        assert resolve_periodic(None, grid(face), problems, "periodic") == (True, True)
-        assert resolve_periodic(True, grid(face), problems, "periodic") == (True, True)
+def test_periodic_axes_may_be_declared_free_but_not_the_reverse():
+    surface = plane()
+    for choice, axes in ((False, (False, False)), (None, (True, True)), (True, (True, True))):
+        with Problems("test") as problems:
+            assert problems.periodic("periodic", choice, grid(surface))
+        assert periodic_axes(choice, grid(surface)) == axes
     with pytest.raises(InvalidInput, match="periodic"), Problems("test") as problems:
-        resolve_periodic(True, grid(face.isel(x=slice(0, 4))), problems, "periodic")
+        assert not problems.periodic("periodic", True, grid(surface.isel(x=slice(0, 4))))
 
 
-def test_edges_of_a_mask_counted_by_hand():
+def test_edges_of_a_small_mask():
     mask = np.array([[1, 0, 0], [1, 1, 0], [0, 0, 0]], bool)
     np.testing.assert_array_equal(contact_edges(mask), [3, 2])
     np.testing.assert_array_equal(contact_edges(mask, (True, True)), [4, 4])
@@ -102,13 +103,13 @@ def test_edges_of_a_mask_counted_by_hand():
         fc.surfaces.level,
         fc.surfaces.despike,
         fc.joints.roughness_coefficient,
-        lambda face: fc.contact.press(face, contact_modulus=1e9, closure=1e-6),
-        lambda face: fc.joints.Crack(face, young=1e9, poisson=0.2),
-        lambda face: fc.joints.register(face, face),
+        lambda surface: fc.contact.press(surface, contact_modulus=1e9, closure=1e-6),
+        lambda surface: fc.joints.Crack(surface, young=1e9, poisson=0.2),
+        lambda surface: fc.joints.register(surface, surface),
         fc.joints.transmissivity,
     ],
 )
-def test_sizes_whose_squares_are_no_numbers_are_refused_in_words(use, size):
+def test_sizes_without_representable_squares_are_refused(use, size):
     heights = np.random.default_rng(1).random((24, 24))
     with pytest.raises(InvalidInput, match="expected heights of 0 or of 1e-100 to 1e100 m"):
         use(fc.surfaces.from_array(size * heights, 1.0))
@@ -117,7 +118,7 @@ def test_sizes_whose_squares_are_no_numbers_are_refused_in_words(use, size):
             use(fc.surfaces.from_array(heights, size))
 
 
-def test_a_range_that_is_below_all_squares_is_refused_and_a_flat_is_not():
+def test_too_small_range_is_refused_and_a_constant_surface_is_not():
     heights = np.where(np.eye(8) > 0, 1e-120, 0.0)
     with pytest.raises(InvalidInput, match="heights of 0 or"):
         fc.surfaces.describe(fc.surfaces.from_array(heights, 1.0))

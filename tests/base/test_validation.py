@@ -1,14 +1,10 @@
-"""Validation: every problem of a call in one error, and the one path of every public result."""
-
-import json
+"""Validation: all problems of a call in one error, and conversions of valid values."""
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.results import public_name, public_result
 from fractalcontact.base.validation import (
     Problems,
     float_array,
@@ -90,45 +86,71 @@ def test_surface_and_periodicity_are_checked():
     assert len(problems_of(lambda p: p.surface("surface", surface.where(surface < 1)))) == 1
 
 
-def _check_mean(problems, data, *, scale):
-    problems.number("scale", scale, above=0)
+def test_every_problem_is_listed():
+    with pytest.raises(InvalidInput) as caught, Problems("somewhere") as problems:
+        problems.number("young", -3.0, above=0)
+        problems.choice("method", "quick", ("fast", "elimination"))
+        problems.integer("members", 0, at_least=1)
+        problems.numbers("shear", [0.0, np.nan], at_least=0)
+        problems.exactly_one(closure=None, normal_force=None)
+    text = str(caught.value)
+    assert len(caught.value.problems) == 5
+    assert "somewhere: 5 problems" in text
+    words = ("young", "> 0", "-3.0", "'quick'", "'elimination'", "members", "shear", "nan")
+    for part in (*words, "closure / normal_force"):
+        assert part in text
 
 
-@public_result(title="Mean height", references="Nobody (2000)", achieved_error="exact", check=_check_mean)
-def mean(data, *, scale=1.0):
-    """Mean of the data."""
-    value = xr.Dataset({"mean_height": ((), scale * float(data.mean()), {"comment": "of all points"})})
-    value.attrs["points"] = data.size
-    return value
+def test_valid_call_has_no_problem():
+    with Problems("somewhere") as problems:
+        assert problems.number("a", 2, above=0, below=3)
+        assert problems.numbers("b", [1, 2])
+        assert problems.choices("c", ["x", "y", "x"], ("x", "y"))
+        assert problems.exactly_one(p=None, q=1)
+    np.testing.assert_array_equal(float_array([1, 2]), [1.0, 2.0])
+    assert word_tuple(["x", "y", "x"]) == ("x", "y")
+    assert given_option(p=None, q=1) == ("q", 1)
 
 
-def test_a_public_result_is_labelled_timed_and_documented():
-    found = mean(fc.surfaces.from_array(np.eye(4), 1e-3), scale=2.0)
-    provenance = json.loads(found.attrs["provenance"])
-    assert found["mean_height"].attrs["units"] == "m"
-    assert found["mean_height"].attrs["comment"] == "of all points"
-    assert found.attrs["references"] == "Nobody (2000)"
-    assert found.attrs["title"] == "Mean height"
-    assert provenance["parameters"]["scale"] == 2.0
-    assert provenance["points"] == 16
-    assert provenance["achieved_error"] == "exact"
-    assert provenance["run_time"] == float(found["run_time"]) > 0
-    assert "points" not in found.attrs
+@pytest.mark.parametrize("value", [True, "3", None, [1, 2], 1j, np.nan, np.inf, [], [[1.0]]])
+def test_one_finite_number_is_required(value):
+    with pytest.raises(InvalidInput), Problems("somewhere") as problems:
+        problems.number("a", value)
 
 
-def test_defaults_are_recorded():
-    parameters = json.loads(mean(fc.surfaces.from_array(np.eye(4), 1e-3)).attrs["provenance"])["parameters"]
-    assert parameters["scale"] == 1.0
+@pytest.mark.parametrize(
+    ("bounds", "inside", "outside"),
+    [
+        ({"above": 0}, 1e-300, 0.0),
+        ({"at_least": 0}, 0.0, -1e-300),
+        ({"below": 1}, 0.999, 1.0),
+        ({"at_most": 1}, 1, 1.1),
+    ],
+)
+def test_bounds_hold_at_their_ends(bounds, inside, outside):
+    with Problems("somewhere") as problems:
+        problems.number("a", inside, **bounds)
+    with pytest.raises(InvalidInput), Problems("somewhere") as problems:
+        problems.number("a", outside, **bounds)
 
 
-def test_validate_checks_and_computes_nothing():
-    mean.validate(None, scale=1.0)
-    with pytest.raises(InvalidInput, match="scale: expected a finite number > 0"):
-        mean.validate(None, scale=0)
-    with pytest.raises(InvalidInput, match="scale"):
-        mean(None, scale=-1)
+def test_problems_raised_inside_are_added_to_those_before():
+    with pytest.raises(InvalidInput) as caught, Problems("outer") as problems:
+        problems.add("a", "x", "y")
+        raise InvalidInput("inner", ["b: expected c, got d"])
+    assert caught.value.problems == ("a: expected x, got 'y'", "b: expected c, got d")
 
 
-def test_public_names_leave_out_private_modules():
-    assert public_name(fc.save) == "fractalcontact.base.netcdf.save"
-    assert public_name(mean).endswith("mean")
+def test_other_exceptions_pass_through():
+    with pytest.raises(ZeroDivisionError), Problems("outer") as problems:
+        problems.add("a", "x", "y")
+        raise ZeroDivisionError
+
+
+def test_ragged_sequences_are_refused():
+    with pytest.raises(InvalidInput) as caught, Problems("somewhere") as problems:
+        problems.number("young", [1.0, [2.0]])
+        problems.numbers("loads", [1.0, [2.0]])
+        problems.choices("keep", ["gap", ["state"]], ("gap", "state"))
+    text = "\n".join(caught.value.problems)
+    assert all(f"{name}: expected" in text for name in ("young", "loads", "keep"))

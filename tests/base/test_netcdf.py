@@ -1,4 +1,4 @@
-"""Files: round trip, compliance, temporary names, clear errors."""
+"""NetCDF files: round trip, compliance, interrupted writes, clear errors."""
 
 import subprocess
 import sys
@@ -35,42 +35,42 @@ def test_round_trip_of_a_dataset(tmp_path, result):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_round_trip_of_a_data_array_and_a_tree(tmp_path, result):
+def test_round_trip_of_an_array_and_a_tree(tmp_path, result):
     gap = result["gap"].assign_attrs(result.attrs)
     xr.testing.assert_identical(fc.open(fc.save(gap, tmp_path / "gap.nc")), gap)
     tree = xr.DataTree.from_dict({"/": xr.Dataset(), "/joints/closure": result})
-    found = fc.open(fc.save(tree, tmp_path / "tree.nc"))
-    xr.testing.assert_identical(found["joints/closure"].to_dataset(), result)
-    assert found.attrs["Conventions"] == "CF-1.11"
+    reopened = fc.open(fc.save(tree, tmp_path / "tree.nc"))
+    xr.testing.assert_identical(reopened["joints/closure"].to_dataset(), result)
+    assert reopened.attrs["Conventions"] == "CF-1.11"
 
 
-def test_a_plain_to_netcdf_is_clean(tmp_path, result, compliance):
+def test_plain_to_netcdf_is_cf_compliant(tmp_path, result, compliance):
     result.to_netcdf(tmp_path / "plain.nc")
     assert compliance(tmp_path / "plain.nc") == []
 
 
-def test_a_saved_array_is_clean(tmp_path, result, compliance):
+def test_saved_array_is_cf_compliant(tmp_path, result, compliance):
     assert compliance(fc.save(result["gap"].assign_attrs(result.attrs), tmp_path / "gap.nc")) == []
 
 
-def test_the_checker_does_find_a_fault(tmp_path, result, compliance):
+def test_checker_detects_a_fault(tmp_path, result, compliance):
     result["gap"].attrs["units"] = "furlong per joke"
     result.to_netcdf(tmp_path / "wrong.nc")
     assert compliance(tmp_path / "wrong.nc") != []
 
 
-def test_encoding_on_disk(tmp_path, result):
+def test_encoding_in_the_file(tmp_path, result):
     path = fc.save(result, tmp_path / "result.nc")
-    with xr.open_dataset(path) as found:
-        assert found["gap"].encoding["chunksizes"] == (1, 4, 5)
-        assert found["gap"].encoding["zlib"]
-        assert found["gap"].encoding["complevel"] == 4
-        assert found["gap"].encoding["shuffle"]
-        assert "_FillValue" not in found["x"].encoding
-        assert found["state"].dtype == np.int8
+    with xr.open_dataset(path) as dataset:
+        assert dataset["gap"].encoding["chunksizes"] == (1, 4, 5)
+        assert dataset["gap"].encoding["zlib"]
+        assert dataset["gap"].encoding["complevel"] == 4
+        assert dataset["gap"].encoding["shuffle"]
+        assert "_FillValue" not in dataset["x"].encoding
+        assert dataset["state"].dtype == np.int8
 
 
-def test_a_killed_write_leaves_no_half_file_and_the_next_one_clears_up(tmp_path, result):
+def test_killed_write_leaves_no_incomplete_file(tmp_path, result):
     code = (
         "import sys, os, signal, xarray as xr, fractalcontact as fc\n"
         "import fractalcontact.base.netcdf as n\n"
@@ -90,7 +90,7 @@ def test_a_killed_write_leaves_no_half_file_and_the_next_one_clears_up(tmp_path,
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_an_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
+def test_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
     path = fc.save(result, tmp_path / "result.nc")
     before = path.read_bytes()
     monkeypatch.setattr(
@@ -103,12 +103,12 @@ def test_an_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch)
 
 
 @pytest.mark.parametrize("name", ["result.txt", "result"])
-def test_a_wrong_name_is_refused(tmp_path, result, name):
+def test_wrong_suffix_is_refused(tmp_path, result, name):
     with pytest.raises(InvalidInput, match=r"\.nc"):
         fc.save(result, tmp_path / name)
 
 
-def test_what_cannot_be_read_says_so(tmp_path, result):
+def test_unreadable_files_are_refused(tmp_path, result):
     with pytest.raises(UnreadableFile, match="existing"):
         fc.open(tmp_path / "none.nc")
     path = fc.save(result, tmp_path / "result.nc")
@@ -118,24 +118,3 @@ def test_what_cannot_be_read_says_so(tmp_path, result):
     (tmp_path / "text.nc").write_text("hello")
     with pytest.raises(UnreadableFile, match="complete"):
         fc.open(tmp_path / "text.nc")
-
-
-def test_an_unknown_name_has_no_label():
-    with pytest.raises(KeyError):
-        schema.label(xr.Dataset({"nonsense": 1.0}))
-
-
-def test_labels_are_not_inherited(result):
-    spoiled = (result["gap"] ** 2).rename("gap")
-    spoiled.attrs["units"] = "furlong"
-    assert schema.label(spoiled).attrs == {"long_name": "gap between the bodies", "units": "m"}
-
-
-def test_every_unit_of_the_table_is_one_that_udunits_knows():
-    from cf_units import Unit
-
-    for name, quantity in schema.QUANTITIES.items():
-        if quantity.units is not None:
-            Unit(quantity.units)
-        assert quantity.long_name, name
-    assert "load" not in schema.QUANTITIES

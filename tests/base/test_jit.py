@@ -1,4 +1,4 @@
-"""Kernels are kept on disk where there is a place for them, and work where there is none."""
+"""Kernels run whether or not their compiled code can be saved."""
 
 import numpy as np
 from numba.core import caching
@@ -13,14 +13,14 @@ def add_up(values):
     return total
 
 
-def test_kernels_run_where_no_folder_can_be_written(monkeypatch):
+def test_kernels_run_without_a_cache_folder(monkeypatch):
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
     for decorate in (jit.kernel, jit.sum_kernel, jit.gap_sum_kernel, jit.parallel_kernel):
         decorate(add_up)
     assert jit.kernel(add_up)(np.arange(5.0)) == 10.0
 
 
-def test_a_full_disk_ends_no_kernel(monkeypatch):
+def test_kernels_run_on_a_full_disk(monkeypatch):
     tried = []
 
     def full(*arguments):

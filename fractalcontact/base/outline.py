@@ -1,0 +1,68 @@
+"""Content of a NetCDF file without its arrays, read without xarray for a fast start of the command line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fractalcontact.base.errors import UnreadableFile
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Content of a group: its attributes, sizes and attributes of each variable, and some values."""
+
+    attrs: dict[str, Any]
+    variables: dict[str, tuple[dict[str, int], dict[str, Any]]]
+    numbers: dict[str, Any]
+
+
+def outline(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[str, Outline]:
+    """Return the content of a NetCDF file by group, with the values of the variables selected by `read`.
+
+    Raises
+    ------
+    UnreadableFile
+        The file does not exist, is truncated, or is not NetCDF.
+    """
+    import netCDF4  # loads slowly
+
+    source = Path(path)
+    where = "fractalcontact.open"
+    if not source.is_file():
+        raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    groups: dict[str, Outline] = {}
+
+    def walk(group: Any, name_of_group: str) -> None:
+        groups[name_of_group or "/"] = Outline(
+            dict(group.__dict__),
+            {
+                str(name): (_sizes(variable), dict(variable.__dict__))
+                for name, variable in group.variables.items()
+            },
+            {
+                str(name): variable[...]
+                for name, variable in group.variables.items()
+                if getattr(variable.dtype, "kind", "O") in "biuf" and read(str(name))
+            },
+        )
+        for name, child in group.groups.items():
+            walk(child, f"{name_of_group}/{name}")
+
+    try:
+        with netCDF4.Dataset(source) as file:
+            walk(file, "")
+    except (OSError, RuntimeError) as error:
+        raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+    return groups
+
+
+def _sizes(variable: Any) -> dict[str, int]:
+    """Return dims and lengths, without the dim of the characters of a string."""
+    sizes = dict(zip(variable.dimensions, map(int, variable.shape), strict=True))
+    return {
+        dim: size for dim, size in sizes.items() if not (variable.dtype == "S1" and dim.startswith("string"))
+    }
