@@ -1,4 +1,4 @@
-"""How the site is built: sphinx-build -W -b html gallery gallery/_build/html (no network needed)."""
+"""Configuration of the site: sphinx-build -W -b html gallery gallery/_build/html (no network needed)."""
 
 import atexit
 import os
@@ -7,8 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # the helpers of the examples stand beside this file
-# one study for all examples of the paper, computed anew by every build
+sys.path.insert(0, str(Path(__file__).parent))  # helpers of the examples
+# one study for all examples of the 1998 paper, computed once per build
 if "FRACTALCONTACT_GALLERY" not in os.environ:
     os.environ["FRACTALCONTACT_GALLERY"] = tempfile.mkdtemp(prefix="fractalcontact-gallery-")
     atexit.register(shutil.rmtree, os.environ["FRACTALCONTACT_GALLERY"], ignore_errors=True)
@@ -31,7 +31,7 @@ extensions = [
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "GALLERY_HEADER.rst", "README.*"]
 
-# the examples stand in the source folder of the site, and their copies beneath it
+# sphinx-gallery copies the examples from the source folder of the site to a folder below it
 suppress_warnings = ["sphinx_gallery.duplicate_filename"]
 
 autosummary_generate = True
@@ -59,10 +59,11 @@ sphinx_gallery_conf = {
     "copyfile_regex": r".*_study\.py",
 }
 
+PAGES = ("index", "data_model", "conventions", "glossary", "architecture", "extremes", "theory", "theory_*")
 html_theme = "pydata_sphinx_theme"
 html_title = f"fractalcontact {version}"
 html_show_sourcelink = False
-html_sidebars = {"index": [], "data_model": [], "conventions": [], "extremes": []}
+html_sidebars = dict.fromkeys(PAGES, [])
 html_theme_options = {
     "show_prev_next": False,
     "navbar_end": ["theme-switcher"],

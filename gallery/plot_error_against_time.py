@@ -1,21 +1,20 @@
 """
-What accuracy costs
-===================
+Error against run time
+======================
 
-Two solvers for the contact of two bodies: the one of the paper, which solves a dense system and drops
-the points in tension until none is left, and the fast one, which never sets up a matrix. Both are put
-to the sphere of Hertz, whose force is known, on ever finer grids. Further down is more accurate,
-further left is faster.
+Two solvers for the contact of two bodies are compared: the dense elimination of the 1998 paper, which drops
+points in tension until none is left, and the FFT solver, which never forms a matrix. Both solve the contact
+of a sphere, whose force is known (Hertz), on successively finer grids. Lower is more accurate, further left is faster.
 """
 
 import fractalcontact as fc
 
-fc.accuracy.measure("contact", budget=1)  # compiles, so that what follows times no compiler
+fc.accuracy.measure("contact", budget=1)  # compiles the kernels, so that compile time is not measured
 measured = fc.accuracy.measure("contact", budget=12)["contact"].to_dataset()
 print(measured)
 
 # %%
-# The contests that are measured beside it, over rough faces, are drawn by the same function.
+# The function also draws the other benchmarks of this group, with rough surfaces.
 
 sphere = measured.isel(method=measured["contest"] == "sphere")
 figure = fc.plotting.error_against_time(sphere)

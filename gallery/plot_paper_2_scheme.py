@@ -1,9 +1,9 @@
 """
-The paper, figure 2: the scheme of the simulation
-=================================================
+1998 paper, figure 2: scheme of the simulation
+==============================================
 
-The block slides over the face in one of four directions. Seen from the side the two faces, which fitted
-when the crack opened, now ride on each other: the joint opens by the dilatancy.
+The block slides over the lower face in one of four directions. The two faces, which were mated before shear, are then in contact
+at few points, and the joint opens by the dilatancy.
 """
 
 from shared_study import study

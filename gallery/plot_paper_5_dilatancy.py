@@ -1,10 +1,10 @@
 """
-The paper, figure 5: dilatancy
-==============================
+1998 paper, figure 5: dilatancy
+===============================
 
-Rigid faces climb to a plateau within the first millimetre; towards East and South they then go on
-climbing with the mean slope of the face. Elastic faces climb less, the less the harder they are
-pressed. Below, the domains of contact under 30 kN: at 8 mm the faces have decorrelated.
+The rigid dilatancy rises steeply within the first millimetre. Towards East and South it goes on rising with the mean slope
+of the surface. The elastic dilatancy decreases with the normal force. Below, the contact domains under 30 kN; at
+8 mm the two faces are no longer correlated.
 """
 
 from shared_study import study
@@ -17,8 +17,8 @@ print(study["joints/elastic_dilatancy"].to_dataset())
 figure = fc.plotting.paper_figure(study, 5)
 
 # %%
-# The slope of the dilatancy adds to the basic friction angle. At the first tenths of a millimetre,
-# where the asperities still fit, the joint is strongest.
+# The slope of the dilatancy curve adds to the basic friction angle. The joint is strongest within the first tenths of a millimetre,
+# where the asperities still fit.
 
 friction = fc.plotting.friction(study["joints/friction"], reach=8e-4)
 print(study["joints/friction"].to_dataset())

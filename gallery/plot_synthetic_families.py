@@ -1,11 +1,10 @@
 """
-Four ways to make up a rough surface
-====================================
+Four families of synthetic surfaces
+===================================
 
-All four are asked for the same Hurst exponent, 0.7. What they give is told by their variograms: a
-self-affine surface has the slope 2 H = 1.4 at every lag. Fractional Brownian surfaces are made to have
-it exactly. The others are made for other ends: spectral surfaces are periodic and have cut-offs,
-midpoint displacement is quick, Weierstrass surfaces are sums of few waves.
+All four surfaces have the nominal Hurst exponent 0.7. Their variograms show what they have in common: that of a self-affine
+surface has the slope 2 H = 1.4 at every lag. Fractional Brownian surfaces have it exactly. Spectral surfaces are periodic and
+have cut-offs, midpoint displacement is fast, Weierstrass surfaces are sums of few waves.
 """
 
 from matplotlib.figure import Figure
@@ -13,50 +12,46 @@ from matplotlib.figure import Figure
 import fractalcontact as fc
 
 N, SPACING, HURST = 257, 1e-5, 0.7
-
-families = {
-    "fbm": fc.surfaces.fbm((N, N), SPACING, hurst=HURST, rms_increment=1e-6, rng=1),
-    "spectral": fc.surfaces.spectral((N, N), SPACING, hurst=HURST, rms_height=2e-5, rng=1),
-    "midpoint": fc.surfaces.midpoint((N, N), SPACING, hurst=HURST, rms_increment=1e-6, rng=1),
-    "weierstrass": fc.surfaces.weierstrass((N, N), SPACING, hurst=HURST, rms_height=2e-5, rng=1),
+SIZE = {
+    "fbm": {"rms_increment": 1e-6},
+    "spectral": {"rms_height": 2e-5},
+    "midpoint": {"rms_increment": 1e-6},
+    "weierstrass": {"rms_height": 2e-5},
 }
-print(families["fbm"])
 
-reliefs = Figure(figsize=(9.2, 7.4), layout="constrained")
-for ax, (name, face) in zip(reliefs.subplots(2, 2).ravel(), families.items(), strict=True):
-    fc.plotting.surface(face, title=name, ax=ax)
+
+def generate(family, seed):
+    """Return one surface of a family."""
+    return getattr(fc.surfaces, family)((N, N), SPACING, hurst=HURST, rng=seed, **SIZE[family])
+
+
+surfaces = {family: generate(family, 1) for family in SIZE}
+print(surfaces["fbm"])
+
+maps = Figure(figsize=(9.2, 7.4), layout="constrained")
+for ax, (family, surface) in zip(maps.subplots(2, 2).ravel(), surfaces.items(), strict=True):
+    fc.plotting.surface(surface, title=family, ax=ax)
 
 # %%
-# The variograms of single surfaces wander at lags beyond a tenth of the face, where few independent
-# pairs are left. Means over a dozen surfaces of each family show what the generators do.
+# The variogram of a single surface fluctuates at lags above a tenth of its extent, where few independent
+# pairs are left. The mean of a dozen surfaces shows the family.
 
-curves = {name: fc.dimensions.variogram(face, max_lag=N * SPACING / 3) for name, face in families.items()}
-print(curves["fbm"])
+print(fc.dimensions.variogram(surfaces["fbm"], max_lag=N * SPACING / 3))
+means = {}
+for family in SIZE:
+    curves = [fc.dimensions.variogram(generate(family, seed), max_lag=N * SPACING / 3) for seed in range(12)]
+    means[family] = sum(curve.variogram for curve in curves) / 12
 
-
-def make(name, seed):
-    """Return one more surface of a family."""
-    size = {"rms_height": 2e-5} if name in ("spectral", "weierstrass") else {"rms_increment": 1e-6}
-    return getattr(fc.surfaces, name)((N, N), SPACING, hurst=HURST, rng=seed, **size)
-
-
-means = {
-    name: sum(
-        fc.dimensions.variogram(make(name, seed), max_lag=N * SPACING / 3).variogram for seed in range(12)
-    )
-    / 12
-    for name in families
-}
-
-picture = Figure(figsize=(9.2, 3.6), layout="constrained")
-left, right = picture.subplots(1, 2)
-for name, mean in means.items():
+variograms = Figure(figsize=(9.2, 3.6), layout="constrained")
+left, right = variograms.subplots(1, 2)
+for family, mean in means.items():
     lag = mean.lag * 1e6
-    left.loglog(lag, mean * 1e12, label=name)
-    right.semilogx(lag, (mean / mean.lag ** (2 * HURST)) / (mean / mean.lag ** (2 * HURST))[0], label=name)
+    compensated = mean / mean.lag ** (2 * HURST)
+    left.loglog(lag, mean * 1e12, label=family)
+    right.semilogx(lag, compensated / compensated[0], label=family)
 right.axhline(1, color="black", lw=0.9, ls=":")
 left.set_ylabel("variogram (µm²)")
-right.set_ylabel("variogram over lag$^{2H}$, first lag = 1")
+right.set_ylabel("variogram / lag$^{2H}$, first lag = 1")
 for ax in (left, right):
     ax.set_xlabel("lag (µm)")
     ax.spines[["top", "right"]].set_visible(False)

@@ -2,10 +2,10 @@
 Two dimensions of a contact domain
 ==================================
 
-The set of true contacts has been called a fractal in two senses. Its box dimension counts boxes on one map,
-at one resolution: it grows with the load, from 0 for a point through 1 to 2 for a plane. The other asks how
-the area shrinks as the surface is resolved more finely: theory gives 1 + H, whatever the load. The two are
-different quantities, and neither stands for the other.
+The set of true contacts has been called fractal in two senses. Its box dimension counts boxes on one map at one
+resolution; it grows with the load from 0 (a point) to 2 (a plane). The other dimension describes how the contact
+area decreases as the surface is resolved more finely; theory gives 1 + H at any load. They are different
+quantities.
 """
 
 import numpy as np
@@ -16,40 +16,43 @@ MODULUS, SLOPE, N = 1e10, 0.1, 256
 pressure = MODULUS * SLOPE * np.array([1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.4, 1.5])
 
 
-def face(hurst):
+def rough_surface(hurst):
     return fc.surfaces.spectral((N, N), 1e-5, hurst=hurst, rms_slope=SLOPE, short_cutoff=4e-5, rng=1)
 
 
 # %%
-# On one map, at growing load: two surfaces, of Hurst exponent 0.8 and 0.3, and a random dust of as many
-# cells. Counted over all sizes of box the dust's dimension is at least as large: that number measures how
-# much is covered. Small boxes tell the contacts from a dust, and the smoother surface from the rougher.
+# Box dimensions of two surfaces at growing load, with the Hurst exponents 0.8 and 0.3, and of their random null. Over all box
+# sizes the null has a dimension at least as large: this dimension measures mainly coverage. With small
+# boxes the contacts differ from the null, and the smoother surface from the rougher one.
 
-counted = {}
+dimensions = {}
 for hurst in (0.8, 0.3):
-    state = fc.contact.press(face(hurst), contact_modulus=MODULUS, nominal_pressure=pressure)["state"]
-    every, small = (fc.domains.box_dimension(state, scales=2 ** np.arange(k)) for k in (9, 6))
-    counted[hurst] = fc.domains.box_dimension(state)
-    columns = [every.coverage, every.box_dimension, every.null_dimension, small.box_dimension]
-    print(f"H = {hurst}: coverage, all boxes, dust, boxes to 32 cells, dust")
-    print(np.array([*columns, small.null_dimension]).T.round(3))
+    state = fc.contact.press(rough_surface(hurst), contact_modulus=MODULUS, nominal_pressure=pressure)[
+        "state"
+    ]
+    all_sizes, small = (fc.domains.box_dimension(state, scales=2 ** np.arange(k)) for k in (9, 6))
+    dimensions[hurst] = fc.domains.box_dimension(state)
+    columns = [all_sizes.coverage, all_sizes.box_dimension, all_sizes.null_dimension]
+    columns += [small.box_dimension, small.null_dimension]
+    print(f"H = {hurst}: coverage, all boxes, null, boxes up to 32 cells, null")
+    print(np.array(columns).T.round(3))
 
-print(counted[0.8])
-smooth = fc.plotting.box_dimension(counted[0.8])
-rough = fc.plotting.box_dimension(counted[0.3])
-
-# %%
-# Where the local dimension is level over a range of sizes a power law holds there. At low load it falls: the
-# contacts are smooth islands, seen from afar as points.
-
-slopes = fc.plotting.local_slopes(counted[0.8])
+print(dimensions[0.8])
+smooth = fc.plotting.box_dimension(dimensions[0.8])
+rough = fc.plotting.box_dimension(dimensions[0.3])
 
 # %%
-# Over resolutions: the same surface with ever shorter waves left out, on ever coarser grids, under one load.
+# A power law holds where the local dimension is constant over a range of sizes. At low load it decreases: the
+# contacts are smooth islands that look like points from afar.
+
+slopes = fc.plotting.local_slopes(dimensions[0.8])
+
+# %%
+# The area dimension: the same surface with successively shorter waves left out, on coarser grids, under one load.
 
 
-def coarsened(surface, factor):
-    """Keep the waves that a grid coarser by a factor can carry."""
+def coarsen(surface, factor):
+    """Return a surface with the waves that a grid coarser by a factor can represent."""
     modes = np.fft.fft2(surface.values)
     kept = np.fft.fftfreq(N // factor, 1 / (N // factor)).astype(int)
     heights = np.fft.ifft2(modes[np.ix_(kept, kept)]).real / factor**2
@@ -57,10 +60,10 @@ def coarsened(surface, factor):
 
 
 for hurst in (0.8, 0.3):
-    whole = fc.surfaces.spectral((N, N), 1e-5, hurst=hurst, rms_slope=2 * SLOPE, rng=1)
+    fine = fc.surfaces.spectral((N, N), 1e-5, hurst=hurst, rms_slope=2 * SLOPE, rng=1)
     load = {"contact_modulus": MODULUS, "nominal_pressure": MODULUS * SLOPE * np.array([0.01, 0.03])}
-    masks = [fc.contact.press(coarsened(whole, factor), **load)["state"] for factor in (1, 2, 4, 8)]
-    found = fc.domains.area_dimension(masks, corrected=True)
-    print(f"H = {hurst}: theory {1 + hurst}, measured {found.area_dimension.values.round(2)}")
+    masks = [fc.contact.press(coarsen(fine, factor), **load)["state"] for factor in (1, 2, 4, 8)]
+    result = fc.domains.area_dimension(masks, corrected=True)
+    print(f"H = {hurst}: theory {1 + hurst}, measured {result.area_dimension.values.round(2)}")
 
-print(found)
+print(result)

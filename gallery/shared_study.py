@@ -1,4 +1,4 @@
-"""The shipped study of the paper, computed once and read back by every example that shows a part of it."""
+"""The shipped study of the 1998 paper, computed once and read by every example that shows a part of it."""
 
 import os
 import tempfile
@@ -10,11 +10,11 @@ HERE = Path(__file__).parent
 
 
 def study():
-    """Return the study as a tree; it is kept in a temporary folder until the code changes."""
+    """Return the study as a DataTree; it is stored in a temporary folder until the code changes."""
     sources = Path(fc.__file__).parent.rglob("*.py")
     age = max(int(path.stat().st_mtime) for path in sources)
-    kept = Path(tempfile.gettempdir(), f"fractalcontact-study-{age}")
-    folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", kept))
+    default = Path(tempfile.gettempdir(), f"fractalcontact-study-{age}")
+    folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", default))
     if not (folder / "result.nc").exists():
         fc.scenes.run("concrete_crack", out=folder, progress=False)
     return fc.open(folder / "result.nc")
