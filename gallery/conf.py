@@ -63,7 +63,7 @@ PAGES = ("index", "data_model", "conventions", "glossary", "architecture", "extr
 html_theme = "pydata_sphinx_theme"
 html_title = f"fractalcontact {version}"
 html_show_sourcelink = False
-html_sidebars = dict.fromkeys(PAGES, [])
+html_sidebars = {page: [] for page in PAGES}
 html_theme_options = {
     "show_prev_next": False,
     "navbar_end": ["theme-switcher"],

@@ -2,10 +2,10 @@
 Discretisation error of a contact
 =================================
 
-The error of a contact solution due to the grid decreases with the spacing s. The order depends on the edge of the
-contact: it is 2 where the pressure goes to zero at the edge, and 1 where the pressure is singular there, as under a flat
-punch, or where the circular plates have a radius other than that of second order. This example compares solutions
-with closed forms.
+The error of a contact solution due to the grid decreases with the spacing s. The order depends on the
+edge of the contact: it is 2 where the pressure goes to zero at the edge, and 1 where the pressure is
+singular there, as under a flat punch, or where the circular plates have a radius other than that of
+second order. This example compares solutions with closed forms.
 """
 
 import numpy as np
@@ -108,9 +108,9 @@ error = xr.merge(parts, join="outer", compat="no_conflicts")
 print(error)
 
 # %%
-# The orders are the slopes of the curves; grey lines have the slopes 1 (dotted) and 2 (dashed). The raw contact area is too large
-# by a part of its perimeter, and this error decreases in proportion to the spacing; the corrected area has a third of it.
-# The area of a wave changes by whole rows of grid points.
+# The orders are the slopes of the curves; grey lines have the slopes 1 (dotted) and 2 (dashed). The raw
+# contact area is too large by a part of its perimeter, and this error decreases in proportion to the
+# spacing; the corrected area has a third of it. The area of a wave changes by whole rows of grid points.
 
 order = -np.log(error).assign_coords(radius=np.log(RADII)).polyfit("radius", 1).sel(degree=1, drop=True)
 order = order.rename({name: name.removesuffix("_polyfit_coefficients") for name in order})

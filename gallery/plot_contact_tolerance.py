@@ -2,8 +2,8 @@
 Iteration error of a contact
 ============================
 
-The reported residual bounds the square of the error of the pressure in the energy norm. This example compares solutions at
-growing tolerance with a solution at the smallest tolerance.
+The reported residual bounds the square of the error of the pressure in the energy norm. This example
+compares solutions at growing tolerance with a solution at the smallest tolerance.
 """
 
 import numpy as np
@@ -43,8 +43,9 @@ for case, (surface, pressure) in cases.items():
 print(errors)
 
 # %%
-# The bound (dashed) is for the worst case. The relative rms error of the pressure is about the residual itself (dotted), that of
-# the closure at a given force is smaller, and the contact area is exact long before the default tolerance of 1e-8.
+# The bound (dashed) is for the worst case. The relative rms error of the pressure is about the residual
+# itself (dotted), that of the closure at a given force is smaller, and the contact area is exact long
+# before the default tolerance of 1e-8.
 
 figure = Figure(figsize=(8.4, 3.2), layout="constrained")
 axes = figure.subplots(1, 3, sharex=True)

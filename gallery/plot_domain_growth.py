@@ -2,8 +2,8 @@
 Contact domain from first touch to saturation
 =============================================
 
-A periodic rough surface is pressed from first touch to almost full contact. The contact domain begins as a few points,
-merges into islands, and ends as a plane with holes.
+A periodic rough surface is pressed from first touch to almost full contact. The contact domain begins as
+a few points, merges into islands, and ends as a plane with holes.
 """
 
 import numpy as np
@@ -22,9 +22,9 @@ print(pressed)
 maps = fc.plotting.contact_domains(pressed.isel(step=[0, 3, 6, 8, 10, 13]))
 
 # %%
-# The box dimension begins near 1, with a few clusters, and ends at 2. That of the random null (randomly placed cells of equal
-# coverage) begins near 0 and is larger above a coverage of about a quarter. The difference between the two shows
-# the clustering of the contacts; the box dimension alone does not.
+# The box dimension begins near 1, with a few clusters, and ends at 2. That of the random null (randomly
+# placed cells of equal coverage) begins near 0 and is larger above a coverage of about a quarter. The
+# difference between the two shows the clustering of the contacts; the box dimension alone does not.
 
 dimensions = fc.domains.box_dimension(pressed["state"])
 print(dimensions)

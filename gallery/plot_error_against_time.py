@@ -2,9 +2,10 @@
 Error against run time
 ======================
 
-Two solvers for the contact of two bodies are compared: the dense elimination of the 1998 paper, which drops
-points in tension until none is left, and the FFT solver, which never forms a matrix. Both solve the contact
-of a sphere, whose force is known (Hertz), on successively finer grids. Lower is more accurate, further left is faster.
+Two solvers for the contact of two bodies are compared: the dense elimination of the 1998 paper, which
+drops points in tension until none is left, and the FFT solver, which never forms a matrix. Both solve the
+contact of a sphere, whose force is known (Hertz), on successively finer grids. Lower is more accurate,
+further left is faster.
 """
 
 import fractalcontact as fc

@@ -2,9 +2,10 @@
 Cube counting depends on the unit of height
 ===========================================
 
-Cubes are as high as they are wide, so that cube counting compares heights with lengths. A surface with very small heights
-fits into a single layer of cubes and counts as a plane; with large heights it counts as rough. The option
-`vertical_scale` sets this ratio, and it belongs to the result. The variogram does not depend on it.
+Cubes are as high as they are wide, so that cube counting compares heights with lengths. A surface with
+very small heights fits into a single layer of cubes and counts as a plane; with large heights it counts
+as rough. The option `vertical_scale` sets this ratio, and it belongs to the result. The variogram does
+not depend on it.
 """
 
 import numpy as np
@@ -20,9 +21,9 @@ counts = [fc.dimensions.cube_counts(surface, vertical_scale=float(scale)) for sc
 print(counts[0])
 
 # %%
-# The dimension is the mean slope of the counts, here over all cube sizes. It rises from 2 as the heights are
-# magnified, and then stays below the true value: the highest and lowest point of a column of cubes are
-# missed if they lie between grid points.
+# The dimension is the mean slope of the counts, here over all cube sizes. It rises from 2 as the heights
+# are magnified, and then stays below the true value: the highest and lowest point of a column of cubes
+# are missed if they lie between grid points.
 
 slopes = [-np.polyfit(np.log(count.cube_size), np.log(count.cube_count), 1)[0] for count in counts]
 estimates = fc.dimensions.estimate(surface, ["variogram", "cube_counts"])

@@ -2,9 +2,9 @@
 From a measured file to the fractal dimension
 =============================================
 
-If the environment variable ``FRACTALCONTACT_DATA`` names a folder with the file, this example reads a scanned surface of
-gneiss (65 x 65 mm, spacing 0.3 mm; Cunha and others, 2024). Otherwise it takes the land surface that
-matplotlib installs.
+If the environment variable ``FRACTALCONTACT_DATA`` names a folder with the file, this example reads a
+scanned surface of gneiss (65 x 65 mm, spacing 0.3 mm; Cunha and others, 2024). Otherwise it takes the
+land surface that matplotlib installs.
 """
 
 import os
@@ -37,7 +37,7 @@ print(estimates)
 scaling = fc.plotting.dimension_curves(curves, estimates)
 
 # %%
-# The dimensions with their intervals. They need not agree: the methods use different windows of scales, and a real
-# surface is self-affine within a part of its scales at best.
+# The dimensions with their intervals. They need not agree: the methods use different windows of scales,
+# and a real surface is self-affine within a part of its scales at best.
 
 dimensions = fc.plotting.dimensions(estimates)

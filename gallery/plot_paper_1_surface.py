@@ -2,8 +2,8 @@
 1998 paper, figure 1: crack surface and delta-surface
 =====================================================
 
-The crack surface has 512 x 512 points, 80 µm apart. A block of 2 x 2 cm from its centre is sheared by 8 mm towards West. The
-delta-surface is the height difference of the two faces.
+The crack surface has 512 x 512 points, 80 µm apart. A block of 2 x 2 cm from its centre is sheared by 8
+mm towards West. The delta-surface is the height difference of the two faces.
 """
 
 from shared_study import study
@@ -16,14 +16,14 @@ print(study["surfaces"].to_dataset())
 figure = fc.plotting.paper_figure(study, 1)
 
 # %%
-# The paper gives fractal dimensions from 2.15 to 2.29 for its surface (shaded). The surface here is synthetic, with
-# similar roughness.
+# The paper gives fractal dimensions from 2.15 to 2.29 for its surface (shaded). The surface here is
+# synthetic, with similar roughness.
 
 dimensions = fc.plotting.dimensions(study["dimensions"], band=(2.15, 2.29))
 print(study["dimensions"].to_dataset())
 
 # %%
-# Each dimension is the slope of a scaling curve in a stated window of scales. A dimension is defined only where the local
-# slope is constant.
+# Each dimension is the slope of a scaling curve in a stated window of scales. A dimension is defined only
+# where the local slope is constant.
 
 curves = fc.plotting.dimension_curves(study["dimensions"])

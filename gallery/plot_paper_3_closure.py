@@ -2,8 +2,9 @@
 1998 paper, figure 3: closure laws and real contact area
 ========================================================
 
-After each shear displacement the block is pressed down. With growing shear the closure increases, the interface becomes softer, and the contact
-area at equal force decreases. The area grows nearly in proportion to the force.
+After each shear displacement the block is pressed down. With growing shear the closure increases, the
+interface becomes softer, and the contact area at equal force decreases. The area grows nearly in
+proportion to the force.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 1998 paper, figure 4: contact domain under growing force
 ========================================================
 
-At a shear displacement of 0.4 mm the contacts begin as scattered points and grow into islands. The letters are
-those on the closure law of figure 3.
+At a shear displacement of 0.4 mm the contacts begin as scattered points and grow into islands. The
+letters are those on the closure law of figure 3.
 """
 
 from shared_study import study
@@ -16,12 +16,13 @@ print(study["domains/box_dimension"].to_dataset())
 figure = fc.plotting.paper_figure(study, 4)
 
 # %%
-# The box dimension of the domain beside its random null (randomly placed cells of equal coverage). A box count alone does not
-# distinguish a fractal set from scattered points; the difference from the null does.
+# The box dimension of the domain beside its random null (randomly placed cells of equal coverage). A box
+# count alone does not distinguish a fractal set from scattered points; the difference from the null does.
 
 box_dimension = fc.plotting.box_dimension(study["domains/box_dimension"])
 
 # %%
-# The lacunarity stays high up to the size of the clusters of contacts, where that of the null is close to one.
+# The lacunarity stays high up to the size of the clusters of contacts, where that of the null is close to
+# one.
 
 lacunarity = fc.plotting.lacunarity(study["domains/lacunarity"], shear=4e-4)

@@ -2,8 +2,9 @@
 1998 paper, figure 5: dilatancy
 ===============================
 
-The rigid dilatancy rises steeply within the first millimetre. Towards East and South it goes on rising with the mean slope
-of the surface. The elastic dilatancy decreases with the normal force. Below, the contact domains under 30 kN; at
+The rigid dilatancy rises steeply within the first millimetre. Towards East and South it goes on rising
+with the mean slope of the surface. The elastic dilatancy decreases with the normal force. Below, the
+contact domains under 30 kN; at
 8 mm the two faces are no longer correlated.
 """
 
@@ -17,8 +18,8 @@ print(study["joints/elastic_dilatancy"].to_dataset())
 figure = fc.plotting.paper_figure(study, 5)
 
 # %%
-# The slope of the dilatancy curve adds to the basic friction angle. The joint is strongest within the first tenths of a millimetre,
-# where the asperities still fit.
+# The slope of the dilatancy curve adds to the basic friction angle. The joint is strongest within the
+# first tenths of a millimetre, where the asperities still fit.
 
 friction = fc.plotting.friction(study["joints/friction"], reach=8e-4)
 print(study["joints/friction"].to_dataset())

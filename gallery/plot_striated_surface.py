@@ -2,9 +2,9 @@
 Directional roughness
 =====================
 
-A ground surface is rough across its striae and smooth along them. `directions` estimates the Hurst exponent and the height
-increments in each direction, and tests whether the differences are significant. This example compares a striated
-surface with an isotropic one; both are cut from larger surfaces.
+A ground surface is rough across its striae and smooth along them. `directions` estimates the Hurst
+exponent and the height increments in each direction, and tests whether the differences are significant.
+This example compares a striated surface with an isotropic one; both are cut from larger surfaces.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ import fractalcontact as fc
 
 
 def cut_surface(anisotropy_ratio):
-    """Return every fourth point of a part of a surface, so that it is not periodic and has no short cut-off."""
+    """Return every fourth point of a part of a surface: not periodic, without short cut-off."""
     large = fc.surfaces.spectral(
         (1024, 1024), 1e-5, hurst=0.7, rms_height=2e-5, anisotropy_ratio=anisotropy_ratio, azimuth=30.0, rng=1
     )

@@ -2,9 +2,10 @@
 Four families of synthetic surfaces
 ===================================
 
-All four surfaces have the nominal Hurst exponent 0.7. Their variograms show what they have in common: that of a self-affine
-surface has the slope 2 H = 1.4 at every lag. Fractional Brownian surfaces have it exactly. Spectral surfaces are periodic and
-have cut-offs, midpoint displacement is fast, Weierstrass surfaces are sums of few waves.
+All four surfaces have the nominal Hurst exponent 0.7. Their variograms show what they have in common:
+that of a self-affine surface has the slope 2 H = 1.4 at every lag. Fractional Brownian surfaces have it
+exactly. Spectral surfaces are periodic and have cut-offs, midpoint displacement is fast, Weierstrass
+surfaces are sums of few waves.
 """
 
 from matplotlib.figure import Figure

@@ -2,10 +2,10 @@
 Two dimensions of a contact domain
 ==================================
 
-The set of true contacts has been called fractal in two senses. Its box dimension counts boxes on one map at one
-resolution; it grows with the load from 0 (a point) to 2 (a plane). The other dimension describes how the contact
-area decreases as the surface is resolved more finely; theory gives 1 + H at any load. They are different
-quantities.
+The set of true contacts has been called fractal in two senses. Its box dimension counts boxes on one map
+at one resolution; it grows with the load from 0 (a point) to 2 (a plane). The other dimension describes
+how the contact area decreases as the surface is resolved more finely; theory gives 1 + H at any load.
+They are different quantities.
 """
 
 import numpy as np
@@ -21,9 +21,10 @@ def rough_surface(hurst):
 
 
 # %%
-# Box dimensions of two surfaces at growing load, with the Hurst exponents 0.8 and 0.3, and of their random null. Over all box
-# sizes the null has a dimension at least as large: this dimension measures mainly coverage. With small
-# boxes the contacts differ from the null, and the smoother surface from the rougher one.
+# Box dimensions of two surfaces at growing load, with the Hurst exponents 0.8 and 0.3, and of their
+# random null. Over all box sizes the null has a dimension at least as large: this dimension measures
+# mainly coverage. With small boxes the contacts differ from the null, and the smoother surface from the
+# rougher one.
 
 dimensions = {}
 for hurst in (0.8, 0.3):
@@ -42,13 +43,14 @@ smooth = fc.plotting.box_dimension(dimensions[0.8])
 rough = fc.plotting.box_dimension(dimensions[0.3])
 
 # %%
-# A power law holds where the local dimension is constant over a range of sizes. At low load it decreases: the
-# contacts are smooth islands that look like points from afar.
+# A power law holds where the local dimension is constant over a range of sizes. At low load it decreases:
+# the contacts are smooth islands that look like points from afar.
 
 slopes = fc.plotting.local_slopes(dimensions[0.8])
 
 # %%
-# The area dimension: the same surface with successively shorter waves left out, on coarser grids, under one load.
+# The area dimension: the same surface with successively shorter waves left out, on coarser grids, under
+# one load.
 
 
 def coarsen(surface, factor):

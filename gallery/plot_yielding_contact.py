@@ -2,8 +2,9 @@
 Contact with a hardness
 =======================
 
-With a hardness the contact pressure has an upper limit. Where it is reached the surface is indented permanently: unloading follows a
-different curve, some closure remains without force, and reloading is elastic until the previous force is exceeded.
+With a hardness the contact pressure has an upper limit. Where it is reached the surface is indented
+permanently: unloading follows a different curve, some closure remains without force, and reloading is
+elastic until the previous force is exceeded.
 """
 
 import numpy as np
