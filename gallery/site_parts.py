@@ -1,24 +1,26 @@
-"""The two parts of the site that sphinx does not bring: figures without pyplot, and the table of names."""
+"""Extensions of sphinx for this site: figures without pyplot, and tables made from the package."""
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
 
 
 def setup(app):
-    """Make the directive `names` known to sphinx."""
+    """Register the directives and hooks of this file."""
     app.add_directive("names", Names)
     app.add_directive("extremes", Extremes)
-    app.connect("autodoc-process-docstring", escape_bars)
+    app.connect("autodoc-process-docstring", prepare_docstring)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def escape_bars(app, what, name, obj, options, lines):  # noqa: ARG001
-    """Keep absolute values, `|a - b|`, from being read as substitutions."""
+def prepare_docstring(app, what, name, obj, options, lines):  # noqa: ARG001
+    """Shorten module docstrings to their first paragraph; escape bars, `|a - b|`, which would be substitutions."""
+    if what == "module" and "" in lines:
+        del lines[lines.index("") :]
     lines[:] = [line.replace("|", r"\|") for line in lines]
 
 
 class Names(Directive):
-    """A table of every name that a result may carry, with its unit and meaning, straight from the schema."""
+    """A table of all names in results with units and meaning, from the schema."""
 
     def run(self):
         from fractalcontact.base.schema import QUANTITIES
@@ -31,7 +33,7 @@ class Names(Directive):
 
 
 class Extremes(Directive):
-    """The catalogue of extreme cases, each examined by this build, with what came out worst."""
+    """The catalogue of extreme cases, run by this build, with the largest error of each case."""
 
     def run(self):
         from fractalcontact import accuracy
@@ -39,22 +41,22 @@ class Extremes(Directive):
 
         cases = {name: case for name, case in accuracy.cases.items() if not case.large}
         head, *rows = worst_rows({name: accuracy.examine(case) for name, case in cases.items()})
-        told = [
+        table_rows = [
             (name, accuracy.cases[name].story, nodes.literal(text=quantity), *rest)
             for name, quantity, *rest in rows
         ]
-        return [table((16, 28, 26, 12, 12, 8, 8), (head[0], "what is extreme", *head[1:]), told)]
+        return [table((16, 28, 26, 12, 12, 8, 8), (head[0], "description", *head[1:]), table_rows)]
 
 
 def table(widths, head, rows):
     """Return a table; a cell is text or a node."""
-    whole, group, body = nodes.table(), nodes.tgroup(cols=len(widths)), nodes.tbody()
+    result, group, body = nodes.table(), nodes.tgroup(cols=len(widths)), nodes.tbody()
     group += [nodes.colspec(colwidth=width) for width in widths]
     group += nodes.thead("", _row(head))
     body += [_row(row) for row in rows]
     group += body
-    whole += group
-    return whole
+    result += group
+    return result
 
 
 def _row(cells):
@@ -70,7 +72,7 @@ def _get_sg_image_scraper():
 
 
 def save_figures(_, block_vars, gallery_conf):
-    """Save the figures that a block of an example left behind; return the text that shows them."""
+    """Save the new figures of a block of an example; return the text that shows them."""
     from matplotlib.figure import Figure
     from sphinx_gallery.scrapers import figure_rst
 
