@@ -13,7 +13,7 @@ def setup(app):
 
 
 def prepare_docstring(app, what, name, obj, options, lines):  # noqa: ARG001
-    """Shorten module docstrings to their first paragraph; escape bars, `|a - b|`, which would be substitutions."""
+    """Keep the first paragraph of a module docstring; escape the bars of `|a - b|`."""
     if what == "module" and "" in lines:
         del lines[lines.index("") :]
     lines[:] = [line.replace("|", r"\|") for line in lines]
