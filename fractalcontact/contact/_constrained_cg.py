@@ -114,7 +114,7 @@ class ContactSystem:
 
 @dataclass
 class Energy:
-    """Sums over the current pressure."""
+    """Sums over the current pressure: closure, objective, and the scale of the error."""
 
     force: float  # sum p
     work: float  # sum p u

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -96,7 +97,7 @@ class InfluenceMatrix:
 
 @dataclass(frozen=True)
 class Balance:
-    """A set without tension: its nodes, their pressures, and d(closure)/d(sum of pressure)."""
+    """A set of nodes without tension: their pressures, the closure, and d(closure)/d(sum of pressure)."""
 
     nodes: Array
     pressure: Array
@@ -106,21 +107,21 @@ class Balance:
 
 
 def eliminate_at_closure(influence: InfluenceMatrix, nodes: Array, closure: float) -> Balance:
-    """Drop tension nodes from `nodes` under an imposed closure."""
+    """Eliminate the nodes in tension under an imposed closure."""
     rounds = 0
     while True:
         rounds += 1
         right = np.stack([closure - influence.gap[nodes], np.ones(nodes.size)], axis=1)
-        columns = solve_dense(influence.between(nodes, nodes), right, assume_a="pos", check_finite=False)
-        pressure = columns[:, 0]
+        solution = solve_dense(influence.between(nodes, nodes), right, assume_a="pos", check_finite=False)
+        pressure = solution[:, 0]
         if pressure.min() >= 0:
             break
         nodes = nodes[pressure > 0]
-    return Balance(nodes, pressure, closure, 1.0 / float(columns[:, 1].sum()), rounds)
+    return Balance(nodes, pressure, closure, 1.0 / float(solution[:, 1].sum()), rounds)
 
 
 def eliminate_at_force(influence: InfluenceMatrix, nodes: Array, force: float) -> Balance:
-    """Drop tension nodes from `nodes` while their pressures add up to `force`."""
+    """Eliminate the nodes in tension while the pressures add up to `force`; the closure is an unknown."""
     rounds = 0
     while True:
         rounds += 1
@@ -130,12 +131,12 @@ def eliminate_at_force(influence: InfluenceMatrix, nodes: Array, force: float) -
         matrix[:n, n], matrix[n, n] = -1.0, 0.0
         right = np.zeros((n + 1, 2))
         right[:n, 0], right[n] = -influence.gap[nodes], (force, 1.0)
-        columns = solve_dense(matrix, right, check_finite=False)
-        pressure = columns[:n, 0]
+        solution = solve_dense(matrix, right, check_finite=False)
+        pressure = solution[:n, 0]
         if pressure.min() >= 0:
             break
         nodes = nodes[pressure > 0]
-    return Balance(nodes, pressure, float(columns[n, 0]), float(columns[n, 1]), rounds)
+    return Balance(nodes, pressure, float(solution[n, 0]), float(solution[n, 1]), rounds)
 
 
 def verified(influence: InfluenceMatrix, nodes: Array, eliminate: Callable[[Array], Balance]) -> Balance:
@@ -160,9 +161,8 @@ def solve_force(influence: InfluenceMatrix, force: float) -> Balance:
     trial = influence.gap.size if influence.periodic else min(64, influence.gap.size)
     while True:
         check_size(trial)
-        balance = verified(
-            influence, np.sort(order[:trial]), lambda nodes: eliminate_at_force(influence, nodes, force)
-        )
+        nodes = np.sort(order[:trial])
+        balance = verified(influence, nodes, partial(eliminate_at_force, influence, force=force))
         if trial == influence.gap.size or balance.closure <= influence.gap[order[trial]]:
             return balance
         trial = min(4 * trial, influence.gap.size)
@@ -173,16 +173,15 @@ def solve_closure(influence: InfluenceMatrix, closure: float) -> Balance:
     if not influence.periodic:
         nodes = np.flatnonzero(influence.gap < closure)
         check_size(nodes.size)
-        return verified(influence, nodes, lambda nodes: eliminate_at_closure(influence, nodes, closure))
+        return verified(influence, nodes, partial(eliminate_at_closure, influence, closure=closure))
     check_size(influence.gap.size)
     force = 0.5 * closure / float(influence.table[0, 0])
     nodes, rounds, last = np.arange(influence.gap.size), 0, np.inf
     while True:
-        aim = force
-        balance = verified(influence, nodes, lambda nodes: eliminate_at_force(influence, nodes, aim))  # noqa: B023
+        balance = verified(influence, nodes, partial(eliminate_at_force, influence, force=force))
         rounds += balance.rounds
-        same, miss = np.array_equal(nodes, balance.nodes), closure - balance.closure
-        rounded = abs(miss) <= 1e-15 * closure or (same and abs(miss) >= 0.5 * last)
+        same_set, miss = np.array_equal(nodes, balance.nodes), closure - balance.closure
+        rounded = abs(miss) <= 1e-15 * closure or (same_set and abs(miss) >= 0.5 * last)
         if rounded or rounds > MAX_ROUNDS:
             return replace(balance, rounds=rounds)
         nodes, last = balance.nodes, abs(miss)

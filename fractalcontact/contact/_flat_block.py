@@ -41,9 +41,9 @@ def flat_stiffness(
     disc_radius: str | float = "second_order",
     loading: str = "rigid",
 ) -> float:
-    """Force per closure of two perfectly mating faces, in N/m.
+    """Stiffness of a block with two perfectly mating surfaces: force per closure.
 
-    The bulk part of a closure is force / stiffness; `press` returns exactly that for a face of zero range.
+    The bulk part of a closure is force / stiffness; `press` returns exactly that for a flat surface.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def flat_stiffness(
     boundary, influence, disc_radius
         As for `press`.
     loading : {"rigid", "uniform"}
-        "rigid": the faces approach by the same amount everywhere, as rigid flats would make them; "uniform":
-        the pressure is the same everywhere, and the closure is its mean settlement.
+        "rigid": the closure is the same everywhere, as between rigid flats; "uniform": the pressure is the
+        same everywhere, and the closure is the mean displacement.
 
     Returns
     -------
     float
-        Stiffness in N/m, solved to 1e-13; infinite for periodic bodies, whose mean settlement is not a
-        property of their surface.
+        Stiffness in N/m, solved to 1e-13; infinite for periodic bodies, whose mean displacement is a rigid
+        motion.
 
     Raises
     ------
@@ -74,6 +74,12 @@ def flat_stiffness(
     -----
     A square of edge L has 1.15230 E* L (rigid; the capacitance of the unit square, Read 1997) or
     E* L/0.9464020 (uniform) in the limit of small spacing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> round(fc.contact.flat_stiffness((64, 64), 1 / 64, contact_modulus=1.0, loading="uniform"), 3)
+    1.056
     """
     with Problems("fractalcontact.contact.flat_stiffness") as problems:
         problems.number("contact_modulus", contact_modulus, above=0)

@@ -1,4 +1,4 @@
-"""Influence coefficients: the settlement of one node under a unit force on another.
+"""Influence coefficients: the displacement of one node under a unit force on another.
 
 Everything here is for a contact modulus of 1, so a coefficient is in 1/m. Sources: Boussinesq (1885); Love
 (1929, Phil. Trans. A 228:377) for the rectangle; Sneddon (1946) for the plate; the lattice sums are those of
@@ -21,9 +21,10 @@ NEAR = 12  # cells summed one by one before the tail of a lattice sum
 
 
 def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radius: float) -> Array:
-    """Settlement at node (i, j) under a unit force on a rigid circular plate of `radius` at (0, 0).
+    """Return the displacement at node (i, j) under a unit force on a rigid circular plate at (0, 0).
 
-    1/(2a) at the plate itself and asin(a/r)/(pi a) away from it. Shape (ny, nx), 1/m for a modulus of 1.
+    For radius a it is 1/(2a) at the plate itself and asin(a/r)/(pi a) away from it. Shape (ny, nx), 1/m for a
+    modulus of 1.
     """
     distance = np.hypot(np.arange(shape[0])[:, None] * spacing[0], np.arange(shape[1])[None, :] * spacing[1])
     distance[0, 0] = 1.0
@@ -33,7 +34,7 @@ def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radi
 
 
 def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    """Settlement at node (i, j) under a unit force spread evenly over the cell of (0, 0).
+    """Return the displacement at node (i, j) under a unit force spread evenly over the cell of (0, 0).
 
     Shape (ny, nx), 1/m for a modulus of 1. Near cells by the closed form, far ones by Gauss quadrature,
     because the closed form loses digits with the square of the distance.
@@ -52,22 +53,8 @@ def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) ->
     return table
 
 
-def spectral_compliance(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    """Periodic body: amplitude of the settlement over that of the pressure, 2/|q|, zero for the mean.
-
-    Shape (ny, nx//2 + 1), in m for a modulus of 1; the mean settlement is a rigid motion and is left out.
-    """
-    from fractalcontact.base.fft import wavenumbers
-
-    qy = wavenumbers(shape[0], spacing[0])[:, None]
-    qx = wavenumbers(shape[1], spacing[1], real=True)[None, :]
-    q = np.hypot(qy, qx)
-    q[0, 0] = np.inf
-    return np.asarray(2.0 / q)
-
-
 def disc_radius(choice: str | float, spacing: tuple[float, float]) -> float:
-    """Radius of the plate in the unit of `spacing`, by name or as a length."""
+    """Return the radius of the plate in the unit of `spacing`, by name or as a length."""
     if not isinstance(choice, str):
         return float(choice)
     if choice == "inscribed":
@@ -80,10 +67,10 @@ def disc_radius(choice: str | float, spacing: tuple[float, float]) -> float:
 
 @lru_cache(maxsize=64)
 def second_order_radius(ratio: float) -> float:
-    """Radius, over the square root of the cell area, that makes the plates second-order accurate.
+    """Return the radius, over the root of the cell area, that makes the plates second-order accurate.
 
-    It is the smaller root of the lattice sum that states: under uniform pressure the plates settle as much
-    as the half-space does. For equal spacings it is known beforehand.
+    It is the smaller root of a lattice sum: under uniform pressure the plates are displaced as much as the
+    half-space is. For equal spacings it is a constant.
     """
     if ratio == 1.0:
         return SQUARE_RADIUS
@@ -101,7 +88,7 @@ def second_order_radius(ratio: float) -> float:
 
 
 def local_excess(radius: float, ratio: float) -> float:
-    """Settlement under unit pressure beyond that of the half-space; cell area 1, modulus 1."""
+    """Return the displacement under unit pressure beyond that of the half-space; cell area and modulus 1."""
     distance = _lattice(ratio, NEAR)
     tail = 0.0
     coefficient = 1.0  # of x^(2k+1) in asin x
@@ -115,9 +102,9 @@ def local_excess(radius: float, ratio: float) -> float:
 
 @lru_cache(maxsize=512)
 def epstein_zeta(power: int, ratio: float) -> float:
-    """Sum of r^-power over a rectangular lattice of cell area 1 without its origin; odd `power`.
+    """Sum r^-power over a rectangular lattice of cell area 1 without its origin; odd `power`.
 
-    For power 1 the integral over the plane is taken out of the sum.
+    For power 1 the integral over the plane is subtracted from the sum.
     """
     from scipy.special import gamma
 
@@ -129,7 +116,7 @@ def epstein_zeta(power: int, ratio: float) -> float:
 
 
 def least_symbol(radius: float, ratio: float) -> float:
-    """Least value of the plates' symbol over the Brillouin zone, over that of the half-space there.
+    """Return the least value of the plates' symbol over that of the half-space, in the Brillouin zone.
 
     Where it is not positive the operator is indefinite, and no contact problem has a unique solution.
     Sum over the lattice of K(r) exp(i q r), with the slow 1/r part after Ewald.
@@ -160,21 +147,21 @@ def least_symbol(radius: float, ratio: float) -> float:
 
 
 def erf_part(distance: Array) -> Array:
-    """Long-range part of 1/r, whose lattice sum is done in the dual lattice."""
+    """Return the long-range part of 1/r, whose lattice sum is done in the dual lattice."""
     from scipy.special import erf
 
     return np.asarray(erf(np.sqrt(np.pi) * distance) / distance)
 
 
 def _lattice(ratio: float, cells: int) -> Array:
-    """Distances of the nodes of a lattice of cell area 1 from the origin, without the origin."""
+    """Return the distances of the nodes of a lattice of cell area 1 from the origin, without the origin."""
     index = np.arange(-cells, cells + 1)
     distance = np.hypot(index[:, None] * np.sqrt(ratio), index[None, :] / np.sqrt(ratio)).ravel()
     return np.asarray(distance[distance > 0])
 
 
 def _upper_gamma(twice: int, x: Array) -> Array:
-    """Upper incomplete gamma function of half an odd integer, twice/2, which may be negative."""
+    """Return the upper incomplete gamma function of half an odd integer, twice/2, which may be negative."""
     from scipy.special import erfc
 
     value, order = np.sqrt(np.pi) * erfc(np.sqrt(x)), 0.5

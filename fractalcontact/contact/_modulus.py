@@ -10,7 +10,7 @@ from fractalcontact.base.validation import Problems
 def effective_modulus(
     young: float, poisson: float, young2: float | None = None, poisson2: float | None = None
 ) -> float:
-    """Contact modulus E* of a pair of bodies, in Pa.
+    """Contact modulus E* of a pair of elastic bodies, in Pa.
 
     1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 
@@ -38,6 +38,16 @@ def effective_modulus(
     References
     ----------
     Johnson, K. L. (1985) Contact Mechanics, eq. 3.32 and 4.20.
+
+    Examples
+    --------
+    Concrete on concrete, and concrete under a rigid flat:
+
+    >>> import fractalcontact as fc
+    >>> round(fc.contact.effective_modulus(30e9, 0.2) / 1e9, 3)
+    15.625
+    >>> round(fc.contact.effective_modulus(30e9, 0.2, young2=float("inf")) / 1e9, 3)
+    31.25
     """
     with Problems("fractalcontact.contact.effective_modulus") as problems:
         _check_body(problems, "young", young, "poisson", poisson)

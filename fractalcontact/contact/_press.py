@@ -1,4 +1,4 @@
-"""A rough surface pressed by a flat: the labelled entry to the contact solver."""
+"""Elastic contact of a rough surface with a flat: `press`."""
 
 from __future__ import annotations
 
@@ -21,9 +21,8 @@ from fractalcontact.contact._scaling import make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-WHERE = "fractalcontact.contact.press"
 UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
-BEYOND = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
+BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -82,98 +81,73 @@ def press(
 ) -> xr.Dataset:
     """Press a rigid flat down on a rough elastic surface, without friction or adhesion.
 
-    The pair of bodies enters through its contact modulus alone, so the flat may stand for a second elastic
-    body and the surface for the composite of two rough faces. The highest point of the surface touches at
-    closure 0. In the solution gap >= 0, pressure >= 0 and one of them is zero at every node, with
-
-        gap = (top - height) + settlement - closure.
-
-    Heights count up; closure, settlement and indentation count down, into the surface; pressure is positive
-    in compression.
+    At every node gap >= 0 and pressure >= 0, and one of them is zero, with
+    gap = (top - height) + displacement - closure. Heights count up, closure and displacement down; pressure
+    is positive in compression. Theory, error control and measured accuracy: page `theory_contact`.
 
     Parameters
     ----------
     surface : DataArray, dims (y, x)
-        Heights in m, up; no NaN. At least 3 points along each axis; the spacings may differ.
+        Heights in m, without NaN; at least 3 points along each axis.
     contact_modulus : float
-        E* of the pair in Pa, see `effective_modulus`.
+        E* of the pair of bodies in Pa, see `effective_modulus`.
     closure, normal_force, nominal_pressure : float or sequence of float
-        Exactly one of them: approach of the bodies from first touch (m), force (N), or force over the whole
-        extent (Pa). A sequence is a path of load, which may go up and down. Each step starts from the
-        solution before it, which changes iterations and not answers beyond the tolerance: an elastic surface
-        has no memory.
+        Exactly one of them: approach from first touch (m), force (N), or force over the whole extent (Pa). A
+        sequence is a load path, which may go up and down.
     boundary : {None, "periodic", "free"}
-        None: what the axes of the surface say. A periodic surface may be called free, never the reverse.
+        None: periodic where both axes of the surface are. A periodic surface may be declared free.
     influence : {None, "disc", "square", "spectral"}
-        Settlement under the force on a node. "disc": a rigid circular plate (Borri-Brunetto et al. 1998),
-        the default for free bodies; "square": uniform pressure on the cell (Love 1929); "spectral":
-        2/(E* |q|), for periodic bodies, which have no other.
+        Influence coefficients of free bodies: rigid circular plates (the default) or uniform pressure on
+        square cells (Love 1929); of periodic bodies: 2/(E* |q|).
     disc_radius : {"second_order", "inscribed", "equal_area"} or float
-        Radius of the plate, or a length in m. "second_order" makes the error quadratic in the spacing (0.4366
-        of it on a square grid); it exists for spacings in a ratio of up to 2.
+        Radius of the plates, or a length in m. "second_order" makes the error quadratic in the spacing.
     hardness : float, optional
-        Greatest pressure (Pa). Where it is reached the surface yields: the overlap of the bodies there is
-        indentation, which stays. Unloading is elastic, loading back follows it, and yielding goes on where
-        it ended; under a growing load the steps in between make no difference. A force of all of hardness
-        times area determines the indentation from below only.
+        Largest pressure (Pa). Where it is reached the surface yields, and the overlap stays as indentation.
     tolerance : float
-        Bound on `residual`, the scale-free optimality error: weighted open gap plus greatest overlap over the
-        mean settlement (see Notes).
+        Bound on `residual`, the scale-free optimality error.
     method : {"fast", "elimination"}
-        "fast": conjugate gradients with Fourier transforms; "elimination": the dense active set of the paper,
-        for small faces.
+        Constrained conjugate gradients, or the dense active set of the 1998 paper for small surfaces.
     keep : sequence out of "state", "pressure", "gap", "displacement", "residual_height"
-        Maps (step, y, x) to return: open, contact or yielded (int8 flags); pressure (Pa); gap (m, zero in
-        contact); settlement (m; without its mean for a periodic body); and the heights (m) that the surface
-        would have if it were unloaded after the step, lower than at first where it has yielded.
+        Maps (step, y, x) to return: flags open, contact, yielded; Pa; m; m; heights after unloading (m).
     progress : bool
-        Show a bar over the steps.
+        Show a progress bar over the steps.
 
     Returns
     -------
     Dataset over `step`
-        Coordinates closure (m), normal_force (N), nominal_pressure (Pa); contact_area (m2, cells in contact),
-        contact_fraction (raw), corrected_contact_fraction (perimeter-corrected), mean_gap (m), elastic_energy
-        (J, half of pressure times settlement), with a hardness plastic_work (J, spent on indentation since
-        the start of the path), iterations, transforms (pairs), residual, converged, stop_reason (int8 flags:
-        converged, rounding, stagnated, iteration_limit, force_missed, beyond_full_contact), run_time (s); the
-        maps; and scalars nominal_area (m2), contact_modulus (Pa), disc_radius (m, for "disc").
+        Coordinates closure, normal_force, nominal_pressure; contact_area, contact_fraction,
+        corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
+        transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
+        disc_radius (for "disc"). NaN where a periodic body is closed beyond its mean plane.
 
     Raises
     ------
     InvalidInput
-        Lists everything wrong with the call; also a force above hardness times area, and a load more than
-        1e90 times larger or smaller than what the heights and the modulus set as its scale.
+        Lists everything wrong with the call, such as a force above hardness times area.
 
     Warns
     -----
     ConvergenceWarning
         A step stopped before its tolerance was met, or its force is not determined.
 
-    Notes
-    -----
-    Under force control the closure is the pressure-weighted mean of gap and settlement, whose error is of
-    second order in that of the pressure. For a periodic body the settlement has no mean, and
-    closure = top - mean height - mean gap (with a hardness, mean residual height). Such a body cannot be
-    closed to its mean plane or beyond: there the force and what hangs on it are NaN, with the reason in their
-    attributes, everything is in contact, and the path goes on.
-
-    The energy of the elastic body obeys d(elastic_energy) = normal_force d(closure); with a hardness the work
-    of the force is d(elastic_energy) + d(plastic_work).
-
-    A step stops as "converged"; at "rounding", where the tolerance asks for more than the rounding of the
-    closure leaves; "stagnated" or at the "iteration_limit", short of the tolerance; with "force_missed",
-    where the pressures do not add up to the force; or as "beyond_full_contact".
-
-    The residual is (mean open gap weighted by pressure + greatest overlap) over the mean settlement weighted
-    by pressure. It bounds the square of the relative error of the pressure in the energy norm; what that
-    means for pressures, areas and closures is measured in the gallery.
-
     References
     ----------
     Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3; Polonsky and Keer (1999), Wear 231:206;
-    Stanley and Kato (1997), J. Tribol. 119:481; Bugnicourt et al. (2018), Tribol. Int. 121:69; Yastrebov,
+    Stanley and Kato (1997), J. Tribol. 119:481; Bugnicourt et al. (2018), Tribol. Lett. 66:29; Yastrebov,
     Anciaux and Molinari (2017), Tribol. Int. 114:161 (perimeter correction).
+
+    Examples
+    --------
+    The force on a ball of radius 1 m, over that of Hertz:
+
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> x = 1e-4 * np.arange(-20, 21)
+    >>> ball = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2, 1e-4)
+    >>> pressed = fc.contact.press(ball, contact_modulus=1e9, closure=2e-6)
+    >>> hertz = 4 / 3 * 1e9 * 2e-6**1.5
+    >>> round(float(pressed["normal_force"][0]) / hertz, 3)
+    1.0
     """
     options = ContactOptions(boundary, influence, disc_radius, hardness, tolerance, method)
     load = LoadPath.from_keywords(
@@ -185,14 +159,12 @@ def press(
     names = word_tuple(keep)
     scalars: list[dict[str, Any]] = []
     maps: dict[str, list[Array]] = {name: [] for name in names}
-    steps = solve_path(path)
-    for _ in track(path.values, progress, "press"):
-        step = next(steps)
+    for step in track(solve_path(path), progress, "press", total=len(path.values)):
         scalars.append(_scalars(step, grid, path.body.periodic))
         for name in names:
             maps[name].append(_map(step, name, heights))
     result = _dataset(surface, grid, path, scalars, maps)
-    _explain(result)
+    _add_reasons(result)
     _warn(result)
     result.attrs = {
         "boundary": "periodic" if path.body.periodic else "free",
@@ -221,7 +193,7 @@ def _scaled_path(
 
 
 def _map(step: Step, name: str, heights: Array) -> Array:
-    """One map of one step."""
+    """Return one map of a step."""
     if name == "state":
         return _state(step)
     if name == "residual_height":
@@ -230,14 +202,14 @@ def _map(step: Step, name: str, heights: Array) -> Array:
 
 
 def _state(step: Step) -> Array:
-    """Flags open, contact, yielded."""
+    """Return the flags open, contact, yielded."""
     state = np.where(step.contact, np.int8(CONTACT), np.int8(OPEN))
     state[step.contact & step.yielded] = YIELDED
     return state
 
 
 def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
-    """Scalars of one step."""
+    """Return the scalars of a step."""
     contact = step.contact
     cells = int(np.count_nonzero(contact))
     edges = int(contact_edges(contact, (periodic, periodic)).sum())
@@ -284,17 +256,17 @@ def _dataset(
     return xr.Dataset(variables, coords)
 
 
-def _explain(result: xr.Dataset) -> None:
-    """Give the reason beside what is not determined."""
+def _add_reasons(result: xr.Dataset) -> None:
+    """Give the reason of NaN beside what is not determined."""
     beyond = result["stop_reason"] == STOP_REASONS["beyond_full_contact"]
     if beyond.any():
         for name in UNDETERMINED:
             if name in result.variables:
-                result[name].attrs["reason"] = BEYOND
+                result[name].attrs["reason"] = BEYOND_REASON
 
 
 def _warn(result: xr.Dataset) -> None:
-    """Say which steps did not converge."""
+    """Warn of the steps that did not converge."""
     failed = np.flatnonzero(~result["converged"].values)
     if failed.size:
         words, why = list(STOP_REASONS), result["stop_reason"].values
@@ -302,4 +274,5 @@ def _warn(result: xr.Dataset) -> None:
             f"step {i}: {words[why[i]]} (residual {result['residual'].values[i]:.2g})" for i in failed[:5]
         )
         more = f" and {failed.size - 5} more" if failed.size > 5 else ""
-        warnings.warn(f"{WHERE}: not converged: {reasons}{more}", ConvergenceWarning, stacklevel=4)
+        message = f"fractalcontact.contact.press: not converged: {reasons}{more}"
+        warnings.warn(message, ConvergenceWarning, stacklevel=4)
