@@ -1,1 +1,1 @@
-"""What every room stands on: names and units, errors, checks, the grid, transforms, files."""
+"""Shared infrastructure: validation, errors, labels and units, grids, spectra, transforms, threads, files."""

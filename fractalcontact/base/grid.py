@@ -72,14 +72,12 @@ def read_grid(array: xr.DataArray, dims: Sequence[str] = ("y", "x")) -> Grid:
     return Grid(tuple(int(array.sizes[dim]) for dim in dims), tuple(spacing), tuple(periodic))
 
 
-def periodic_axes(given: bool | None, grid: Grid, *, whole: bool = False) -> tuple[bool, ...]:
-    """Return which axes are periodic: those of the grid for None, otherwise all or none as given.
+def periodic_axes(choice: bool | None, grid: Grid) -> tuple[bool, ...]:
+    """Return which axes are periodic: those of the grid for None, otherwise all or none.
 
-    With `whole`, None means periodic only if all axes are. `Problems.periodic` checks the choice.
+    `Problems.periodic` checks the choice.
     """
-    if given is None:
-        return (all(grid.periodic),) * len(grid.shape) if whole else grid.periodic
-    return (bool(given),) * len(grid.shape)
+    return grid.periodic if choice is None else (bool(choice),) * len(grid.shape)
 
 
 def centres(n: int, spacing: float, origin: float = 0.0) -> Array:
@@ -225,52 +223,3 @@ def _within(length: float, decades: int) -> bool:
 
 def _decades(decades: int) -> str:
     return f"1e-{decades} to 1e{decades} m"
-
-
-# ---- replaced by `Problems.surface`, `Problems.grid` and `Problems.periodic`
-
-
-def grid_of(array: Any, problems: Any, argument: str, *, dims: Sequence[str] = ("y", "x")) -> Grid:
-    """Read the grid of `dims`; note what is wrong."""
-    faults = list(grid_faults(array, argument, dims))
-    for fault in faults:
-        problems.add(*fault)
-    fallback = Grid((1,) * len(dims), (1.0,) * len(dims), (False,) * len(dims))
-    return fallback if faults else read_grid(array, dims)
-
-
-def check_surface(
-    surface: Any,
-    problems: Any,
-    argument: str = "surface",
-    *,
-    finite: bool = True,
-    smallest: int = 3,
-    leading: bool = False,
-    profile: bool = False,
-    decades: int = DECADES,
-) -> Grid:
-    """Check heights in metres on a uniform plane and return their grid."""
-    options: dict[str, Any] = {"leading": leading, "profile": profile, "decades": decades}
-    faults = list(surface_faults(surface, argument, finite=finite, smallest=smallest, **options))
-    for fault in faults:
-        problems.add(*fault)
-    if not isinstance(surface, xr.DataArray):
-        return Grid((smallest, smallest), (1.0, 1.0), (False, False))
-    dims = core_dims(surface) if profile else ("y", "x")
-    if list(grid_faults(surface, argument, dims)):
-        return Grid((smallest,) * len(dims), (1.0,) * len(dims), (False,) * len(dims))
-    return read_grid(surface, dims)
-
-
-def resolve_periodic(
-    given: Any, grid: Grid, problems: Any, argument: str, *, whole: bool = False
-) -> tuple[bool, ...]:
-    """Return which axes are periodic; note a wrong choice."""
-    if given is not None and not isinstance(given, (bool, np.bool_)):
-        problems.add(argument, "None, True or False", given)
-        return grid.periodic
-    if given and grid.known:
-        expected = "periodic axes (attribute `period` of x and y equal to n * spacing)"
-        problems.require(all(grid.periodic), argument, expected, given)
-    return periodic_axes(given, grid, whole=whole)

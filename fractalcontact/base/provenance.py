@@ -6,12 +6,9 @@ No path of a home folder is written. Identical runs differ only in these attribu
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import wraps
 from pathlib import PurePath
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -26,8 +23,6 @@ PAPER = (
 )
 
 T = TypeVar("T", xr.Dataset, xr.DataArray)
-P = ParamSpec("P")
-R = TypeVar("R", bound=xr.Dataset | xr.DataArray)
 
 
 def stamp(
@@ -78,32 +73,6 @@ def stamp(
         }
     )
     return data
-
-
-def accounted(error: str | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let the results of a function say in their provenance how long it took, and their error.
-
-    Parameters
-    ----------
-    error : str, optional
-        The achieved error in words, of a function that has no number for it.
-    """
-
-    def let(function: Callable[P, R]) -> Callable[P, R]:
-        @wraps(function)
-        def told(*arguments: P.args, **options: P.kwargs) -> R:
-            start = time.perf_counter()
-            result = function(*arguments, **options)
-            entry = json.loads(result.attrs["provenance"])
-            entry.setdefault("run_time", time.perf_counter() - start)
-            if error is not None:
-                entry.setdefault("achieved_error", error)
-            result.attrs["provenance"] = json.dumps(entry)
-            return result
-
-        return told
-
-    return let
 
 
 def plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The one path of every public call: check, time, compute, label, record where the result comes from.
+"""Decorator of public functions: validation, run time, labels and provenance of their results.
 
     def _check(problems, mask, *, connectivity, **_):
         problems.choice("connectivity", connectivity, (4, 8))
@@ -8,7 +8,7 @@
         ...
         return xr.Dataset(variables, coords, attrs={"labelled_by": "scikit-image"})
 
-The function returns plain variables and coordinates under names of `base.schema`. Attributes `comment`,
+The function returns plain variables and coordinates with names of `base.schema`. Attributes `comment`,
 `reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
 entries of its provenance, except `title` and `references`, which replace those of the decorator, and
 `parameters`, a dict that replaces recorded arguments: a default that depends on others, a path to shorten.
@@ -37,7 +37,7 @@ R_co = TypeVar("R_co", covariant=True)
 
 
 class PublicFunction(Protocol[P, R_co]):
-    """A public function; `validate` takes the same arguments, checks them and computes nothing."""
+    """A public function; its `validate` takes the same arguments and only checks them."""
 
     __name__: str
     __signature__: inspect.Signature
@@ -46,7 +46,7 @@ class PublicFunction(Protocol[P, R_co]):
         """Compute the result."""
 
     def validate(self, *arguments: P.args, **options: P.kwargs) -> None:
-        """Raise `InvalidInput` where the call would."""
+        """Raise `InvalidInput` if the call would."""
 
 
 def public_result(
@@ -57,16 +57,16 @@ def public_result(
     check: Callable[..., None] | None = None,
     error: type[InvalidInput] = InvalidInput,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
-    """Return a decorator that validates, times, labels and documents the result of a public function.
+    """Return a decorator that validates the call of a public function and labels its result.
 
     Parameters
     ----------
     title : str
-        What the result is, in a few words.
+        Title of the result, in a few words.
     references : str
         The source of the method.
     achieved_error : str, optional
-        The error in words, for a result that carries no number for it.
+        The error in words, for a result without a number for it.
     check : callable, optional
         Called as ``check(problems, **arguments)`` with a `Problems` and every argument, defaults included,
         before the function; its problems are raised together.
@@ -91,16 +91,16 @@ def public_result(
             start = time.perf_counter()
             parameters = checked(*arguments, **options)
             result = function(*arguments, **options)
-            facts: dict[str, Any] = {"title": title, "references": references} | result.attrs
+            entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {}
-            parameters = parameters | facts.pop("parameters", {})
+            parameters = parameters | entries.pop("parameters", {})
             if achieved_error is not None:
-                facts.setdefault("achieved_error", achieved_error)
+                entries.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start
             if isinstance(result, xr.Dataset):
                 _set_run_time(result, elapsed)
-            facts.setdefault("run_time", elapsed)
-            return stamp(label(result, keep_notes=True), name, parameters, **facts)
+            entries.setdefault("run_time", elapsed)
+            return stamp(label(result, keep_notes=True), name, parameters, **entries)
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
             checked(*arguments, **options)

@@ -1,11 +1,11 @@
-"""Argument validation: every problem of a call is collected, and all are raised in one error.
+"""Argument validation: all problems of a call are collected and raised in one error.
 
     with Problems("fractalcontact.contact.press") as problems:
         problems.number("contact_modulus", contact_modulus, above=0)
         problems.choice("method", method, ("fast", "elimination"))
 
-A check answers True or False and changes nothing. On leaving the block one `InvalidInput` lists every
-problem; without one, all values are valid. A check that needs valid values asks first:
+A check returns True or False and converts nothing. At the end of the block one `InvalidInput` lists every
+problem; if there is none, all values are valid. A check that needs valid values depends on the others:
 
         if problems.surface("surface", surface) and problems.number("lag", lag, above=0):
             problems.require(lag < extent, "lag", f"less than {extent:g} m", lag)

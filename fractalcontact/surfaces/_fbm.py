@@ -76,8 +76,7 @@ def fbm(
     members : int, optional
         Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
     rng : None, int, SeedSequence, BitGenerator or Generator
-        Random stream (SPEC 7). Its record, `json.loads(surface.attrs["provenance"])["random"]`, given as
-        `rng` makes the same surface again.
+        Random stream (SPEC 7), or `json.loads(surface.attrs["provenance"])["random"]` of an earlier surface.
 
     Returns
     -------
@@ -92,8 +91,7 @@ def fbm(
 
     Notes
     -----
-    Stein's embedding: a stationary field on a torus plus a random plane. Torus size and memory are in the
-    documentation, "Theory: surfaces".
+    Size of the torus and memory: see the documentation, "Theory: surfaces".
 
     References
     ----------

@@ -140,8 +140,7 @@ def spectral(
     members : int, optional
         Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
     rng : None, int, SeedSequence, BitGenerator or Generator
-        Random stream (SPEC 7). Its record, `json.loads(surface.attrs["provenance"])["random"]`, given as
-        `rng` makes the same surface again.
+        Random stream (SPEC 7), or `json.loads(surface.attrs["provenance"])["random"]` of an earlier surface.
 
     Returns
     -------

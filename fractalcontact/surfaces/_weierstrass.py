@@ -83,8 +83,7 @@ def weierstrass(
     members : int, optional
         Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
     rng : None, int, SeedSequence, BitGenerator or Generator
-        Random stream (SPEC 7) of the phases and of the first direction. Its record,
-        `json.loads(surface.attrs["provenance"])["random"]`, given as `rng` makes the same surface again.
+        Random stream (SPEC 7), or `json.loads(surface.attrs["provenance"])["random"]` of an earlier surface.
 
     Returns
     -------
@@ -98,8 +97,7 @@ def weierstrass(
 
     Notes
     -----
-    The finite range of wavelengths biases the slope of the variogram; see the documentation,
-    "Theory: surfaces".
+    The finite range of wavelengths biases the variogram; see the documentation, "Theory: surfaces".
 
     References
     ----------
