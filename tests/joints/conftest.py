@@ -1,8 +1,10 @@
-"""Faces that the tests of this room share. The units are metres; heights up; E is +x and N is +y."""
+"""Surfaces and cracks shared by the tests of joints. Metres, heights up; E is +x and N is +y."""
 
 import numpy as np
 import pytest
 import xarray as xr
+
+import fractalcontact as fc
 
 
 @pytest.fixture(scope="session")
@@ -40,3 +42,20 @@ def rough():
         return heights / heights.std()
 
     return make
+
+
+@pytest.fixture(scope="session")
+def crack(make_face, rough):
+    """A 48-cell block on a 96-cell face, 80 um apart, steep enough to hold the faces apart."""
+    face = make_face(2e-4 * rough((96, 96), 11), 8e-5)
+    return fc.joints.Crack(face, young=30e9, poisson=0.2, block=48 * 8e-5)
+
+
+@pytest.fixture(scope="session")
+def teeth(make_face):
+    """Dilatancy of teeth of 10 degrees, 20 mm long, with a basic angle of 30 degrees, in both directions."""
+    x, spacing, period = np.arange(200), 1e-3, 20
+    tooth = np.abs((x + period / 2) % period - period / 2) * spacing * np.tan(np.radians(10))
+    face = make_face(np.broadcast_to(tooth, (6, 200)), spacing)
+    crack = fc.joints.Crack(face, block=(6e-3, 0.1), young=3e10, poisson=0.2, basic_friction_angle=30)
+    return fc.joints.dilatancy(crack, shear=np.arange(9) * spacing, direction=("E", "W"))

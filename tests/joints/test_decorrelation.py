@@ -1,4 +1,4 @@
-"""Loss of correlation: exact sums, known lengths, intervals that cover."""
+"""Decorrelation: exact sums, known lengths, coverage of the interval."""
 
 import numpy as np
 import pytest
@@ -8,20 +8,20 @@ import fractalcontact as fc
 MATERIAL = {"young": 30e9, "poisson": 0.2}
 
 
-def correlated(n, length, seed, kind="exponential"):
+def correlated(n, length, seed, spectrum="exponential"):
     """Return a periodic Gaussian face and the shear at which its correlation has fallen to 1/e."""
     q = np.hypot(2 * np.pi * np.fft.fftfreq(n)[:, None], 2 * np.pi * np.fft.rfftfreq(n)[None, :])
     density = {
         "exponential": (1 + (q * length) ** 2) ** -1.5,
         "gaussian": np.exp(-((q * length) ** 2) / 4),
         "rolled off": (1 + (q * length) ** 2) ** -1.8,
-    }[kind]
+    }[spectrum]
     correlation = np.fft.irfft2(density, (n, n))[0, : n // 2]
     correlation = correlation / correlation[0] - np.exp(-1)
     k = int(np.argmax(correlation < 0))
-    known = k - 1 + correlation[k - 1] / (correlation[k - 1] - correlation[k])
+    length_at_1_e = k - 1 + correlation[k - 1] / (correlation[k - 1] - correlation[k])
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((n, n)))
-    return np.fft.irfft2(noise * np.sqrt(density), (n, n)), known
+    return np.fft.irfft2(noise * np.sqrt(density), (n, n)), length_at_1_e
 
 
 def test_periodic_correlation_is_the_autocovariance(make_face, rough):
@@ -52,7 +52,7 @@ def test_block_sums_on_a_free_face(make_face, rough):
     assert result.correlation.sel(shear=3.0).item() == pytest.approx(expected, rel=1e-9)
 
 
-def test_mated_faces_start_at_one(make_face, rough):
+def test_correlation_of_mated_faces_starts_at_one(make_face, rough):
     crack = fc.joints.Crack(make_face(rough((64, 64), 3)), block=20, **MATERIAL)
     result = fc.joints.decorrelation_length(crack)
     np.testing.assert_allclose(result.correlation.sel(shear=0), 1, rtol=1e-14)
@@ -61,7 +61,7 @@ def test_mated_faces_start_at_one(make_face, rough):
     assert result.shear.size == 23
 
 
-def test_a_wave_forgets_at_a_known_shear(make_face):
+def test_length_of_a_wave(make_face):
     # correlation cos(kv): 1/e at v = acos(1/e)/k
     x = np.arange(240)
     face = make_face(np.broadcast_to(np.cos(2 * np.pi * x / 80), (240, 240)), periodic=True)
@@ -69,23 +69,23 @@ def test_a_wave_forgets_at_a_known_shear(make_face):
     result = fc.joints.decorrelation_length(crack, direction=("E", "N"))
     expected = np.arccos(np.exp(-1)) * 80 / (2 * np.pi)
     assert result.decorrelation_length.sel(direction="E") == pytest.approx(expected, abs=5e-3)
-    # along its crests a wave forgets nothing
+    # along its crests a wave stays correlated
     assert np.isnan(result.decorrelation_length.sel(direction="N"))
     assert "still correlated" in result.missing_reason.sel(direction="N").item()
 
 
-def test_a_known_length_with_its_interval(make_face):
-    heights, known = correlated(512, 3.0, 1)
+def test_known_length_with_its_interval(make_face):
+    heights, expected = correlated(512, 3.0, 1)
     crack = fc.joints.Crack(make_face(heights[:300, :300] * 1e-6, 1e-4), block=0.0128, **MATERIAL)
     result = fc.joints.decorrelation_length(crack)
     assert (result.decorrelation_length_low < result.decorrelation_length).all()
     assert (result.decorrelation_length < result.decorrelation_length_high).all()
-    assert result.decorrelation_length.mean() == pytest.approx(known * 1e-4, rel=0.15)
+    assert result.decorrelation_length.mean() == pytest.approx(expected * 1e-4, rel=0.15)
     assert (result.missing_reason == "").all()
     assert result.decorrelation_length.attrs["units"] == "m"
 
 
-def test_no_interval_where_the_block_is_too_small(make_face):
+def test_no_interval_for_a_small_block(make_face):
     heights, _ = correlated(512, 12.0, 1)
     crack = fc.joints.Crack(make_face(heights[:300, :300]), block=128, **MATERIAL)
     result = fc.joints.decorrelation_length(crack, direction="E")
@@ -98,7 +98,7 @@ def test_no_interval_where_the_block_is_too_small(make_face):
 
 @pytest.mark.parametrize("height", [0.0, 3.3, 1e9])
 @pytest.mark.parametrize("slope", [0.0, 0.1])
-def test_planes_say_so(make_face, height, slope):
+def test_planes_have_no_length(make_face, height, slope):
     heights = height + slope * np.indices((20, 20))[1]
     crack = fc.joints.Crack(make_face(heights, 0.3), block=9 * 0.3, **MATERIAL)
     result = fc.joints.decorrelation_length(crack)
@@ -106,7 +106,7 @@ def test_planes_say_so(make_face, height, slope):
     assert (result.missing_reason == "the faces are planes").all()
 
 
-def test_a_length_below_one_cell_has_no_interval(make_face):
+def test_length_below_one_cell_has_no_interval(make_face):
     noise = np.random.default_rng(0).standard_normal((80, 80))
     result = fc.joints.decorrelation_length(fc.joints.Crack(make_face(noise), block=40, **MATERIAL))
     assert (result.decorrelation_length < 1).all()
@@ -114,7 +114,7 @@ def test_a_length_below_one_cell_has_no_interval(make_face):
     assert "below the first shear" in result.missing_reason[0].item()
 
 
-def test_long_travels_are_sampled_in_geometric_steps(make_face, rough):
+def test_long_travel_is_sampled_in_geometric_steps(make_face, rough):
     crack = fc.joints.Crack(make_face(rough((400, 400), 1)), block=20, **MATERIAL)
     shear = fc.joints.decorrelation_length(crack, direction="E").shear.values
     assert shear.size <= 129
@@ -123,19 +123,19 @@ def test_long_travels_are_sampled_in_geometric_steps(make_face, rough):
     assert (shear == np.rint(shear)).all()
 
 
-def test_units_do_not_matter(make_face, rough):
+def test_units_change_nothing(make_face, rough):
     heights = rough((96, 96), 1)
-    one = fc.joints.Crack(make_face(heights), block=40, **MATERIAL)
-    two = fc.joints.Crack(make_face(heights * 2.0**-30, 2.0**-14), block=40 * 2.0**-14, **MATERIAL)
-    a, b = fc.joints.decorrelation_length(one), fc.joints.decorrelation_length(two)
-    np.testing.assert_array_equal(a.correlation, b.correlation.values)
-    np.testing.assert_array_equal(a.decorrelation_length * 2.0**-14, b.decorrelation_length)
+    crack = fc.joints.Crack(make_face(heights), block=40, **MATERIAL)
+    scaled = fc.joints.Crack(make_face(heights * 2.0**-30, 2.0**-14), block=40 * 2.0**-14, **MATERIAL)
+    result, result_scaled = fc.joints.decorrelation_length(crack), fc.joints.decorrelation_length(scaled)
+    np.testing.assert_array_equal(result.correlation, result_scaled.correlation.values)
+    np.testing.assert_array_equal(result.decorrelation_length * 2.0**-14, result_scaled.decorrelation_length)
 
 
-def test_messages(make_face, rough):
-    whole = fc.joints.Crack(make_face(rough((32, 32), 1)), **MATERIAL)
+def test_invalid_arguments_are_refused(make_face, rough):
+    full = fc.joints.Crack(make_face(rough((32, 32), 1)), **MATERIAL)
     with pytest.raises(ValueError, match="smaller than its face"):
-        fc.joints.decorrelation_length(whole)
+        fc.joints.decorrelation_length(full)
     crack = fc.joints.Crack(make_face(rough((32, 32), 1)), block=10, **MATERIAL)
     with pytest.raises(ValueError, match="ascending from 0"):
         fc.joints.decorrelation_length(crack, shear=[1.0, 2.0])
@@ -143,24 +143,25 @@ def test_messages(make_face, rough):
         fc.joints.decorrelation_length(3)
     heights = rough((32, 32), 1)
     heights[15, 22] = np.nan
-    holed = fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    incomplete = fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
     with pytest.raises(ValueError, match="missing"):
-        fc.joints.decorrelation_length(holed, direction="E")
+        fc.joints.decorrelation_length(incomplete, direction="E")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "length"), [("exponential", 3.0), ("exponential", 6.0), ("gaussian", 6.0), ("rolled off", 4.0)]
+    ("spectrum", "length"),
+    [("exponential", 3.0), ("exponential", 6.0), ("gaussian", 6.0), ("rolled off", 4.0)],
 )
-def test_the_interval_covers(make_face, kind, length):
+def test_coverage_of_the_interval(make_face, spectrum, length):
     inside, total = 0, 0
     for seed in range(300):
-        heights, known = correlated(512, length, seed, kind)
+        heights, expected = correlated(512, length, seed, spectrum)
         crack = fc.joints.Crack(make_face(heights[:256, :256]), block=128, **MATERIAL)
-        found = fc.joints.decorrelation_length(crack, direction="E", shear=np.arange(40.0))
-        if np.isfinite(found.decorrelation_length_low):
+        result = fc.joints.decorrelation_length(crack, direction="E", shear=np.arange(40.0))
+        if np.isfinite(result.decorrelation_length_low):
             total += 1
-            inside += bool(found.decorrelation_length_low <= known <= found.decorrelation_length_high)
+            inside += bool(result.decorrelation_length_low <= expected <= result.decorrelation_length_high)
     assert total > 250
     # two standard deviations of 300 draws are 2.5 %
     assert 0.925 <= inside / total <= 0.985

@@ -1,4 +1,4 @@
-"""Every result of the room is labelled, comes back from a file, and is compliant."""
+"""Every result of the subpackage is labelled, survives a file, and complies with the CF conventions."""
 
 import numpy as np
 import pytest

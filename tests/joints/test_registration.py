@@ -1,4 +1,4 @@
-"""Mated position: known shifts, turns and tilts are found again; a measured pair is matched."""
+"""Registration of two faces: known motions, noise, gaps, and the measured gneiss pair."""
 
 import json
 import os
@@ -11,6 +11,8 @@ import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 
 S = 3e-4
+DATA = os.environ.get("FRACTALCONTACT_DATA", "")
+measured = pytest.mark.skipif(not DATA, reason="FRACTALCONTACT_DATA is not set")
 
 
 def moved_pair(rough, shift, *, noise=0.0, seed=3, angle=0.0, size=120):
@@ -36,14 +38,14 @@ def moved_pair(rough, shift, *, noise=0.0, seed=3, angle=0.0, size=120):
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (1.3, -2.7), (0.5, 0.5), (-17.25, 9.0), (25.0, 30.4)])
-def test_a_known_shift_is_found(make_face, rough, shift):
+def test_known_shift_is_recovered(make_face, rough, shift):
     lower, upper = moved_pair(rough, shift)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     assert result.shift_y / S == pytest.approx(shift[0], abs=2e-3)
     assert result.shift_x / S == pytest.approx(shift[1], abs=2e-3)
     assert result.rotation == pytest.approx(0, abs=5e-3)
     assert result.converged
-    # the mean aperture stays what was measured over the common part
+    # the mean aperture over the common part stays as measured
     seen = np.isfinite(result.height.values)
     assert np.nanmean(result.aperture) == pytest.approx(5e-4, abs=2e-6)
     np.testing.assert_allclose((result.height - lower).values[seen], 5e-4, atol=8e-5)
@@ -51,17 +53,17 @@ def test_a_known_shift_is_found(make_face, rough, shift):
 
 
 @pytest.mark.parametrize("angle", [6.0, 20.0])
-def test_a_turn_of_a_few_degrees_is_found_and_a_larger_one_refused(make_face, rough, angle):
+def test_rotation_beyond_a_few_degrees_is_refused(make_face, rough, angle):
     lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle, size=150))
     if angle > 10:
-        # too far for the first guess: no position, or one that is told to be none
+        # too far for the first guess: an error, or a warning that the position is not determined
         with pytest.raises((ValueError, ConvergenceWarning), match="turned by a few degrees at most"):
             fc.joints.register(lower, upper)
     else:
         assert fc.joints.register(lower, upper).rotation == pytest.approx(angle, abs=0.02)
 
 
-def test_a_whole_shift_moves_heights_and_leaves_out_what_was_not_seen(make_face, rough):
+def test_unobserved_heights_stay_missing(make_face, rough):
     lower, upper = moved_pair(rough, (4.0, -3.0))
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     np.testing.assert_allclose(result.height[5:-1, 1:-4], lower[5:-1, 1:-4] + 5e-4, atol=1e-6)
@@ -71,7 +73,7 @@ def test_a_whole_shift_moves_heights_and_leaves_out_what_was_not_seen(make_face,
 
 
 @pytest.mark.parametrize("angle", [0.7, -3.0])
-def test_a_known_turn_is_found(make_face, rough, angle):
+def test_known_rotation_is_recovered(make_face, rough, angle):
     lower, upper = moved_pair(rough, (0.0, 0.0), angle=angle)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     assert result.rotation == pytest.approx(angle, abs=0.01)
@@ -81,8 +83,8 @@ def test_a_known_turn_is_found(make_face, rough, angle):
     assert still.mismatch > 3 * result.mismatch
 
 
-def test_turning_is_anticlockwise(make_face):
-    # a hump east of the middle of the lower face, north of it on the upper: it must turn clockwise
+def test_rotation_is_anticlockwise(make_face):
+    # a hump east of the middle of the lower face, north of it on the upper: it must rotate clockwise
     y, x = np.indices((61, 61)) - 30.0
     hump = lambda v, u: np.exp(-((y - v) ** 2 + (x - u) ** 2) / 60)  # noqa: E731
     turn = np.radians(4)
@@ -93,7 +95,7 @@ def test_turning_is_anticlockwise(make_face):
     assert result.rotation == pytest.approx(-4, abs=0.02)
 
 
-def test_tilt_is_taken_out(make_face, rough):
+def test_tilt_is_removed(make_face, rough):
     lower, upper = moved_pair(rough, (2.4, 0.0))
     y, x = np.indices(lower.shape) * S
     result = fc.joints.register(make_face(lower, S), make_face(upper + 0.05 * x - 0.02 * y, S))
@@ -126,16 +128,16 @@ def test_missing_heights_and_damage(make_face, rough):
     assert np.isnan(result.height.values[84:93, 13:25]).all()
 
 
-def test_units_of_height_do_not_matter(make_face, rough):
+def test_units_of_height_change_nothing(make_face, rough):
     lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02)
-    one = fc.joints.register(make_face(lower, S), make_face(upper, S))
-    two = fc.joints.register(make_face(lower * 2.0**30, S), make_face(upper * 2.0**30, S))
-    assert two.shift_x == one.shift_x
-    assert two.rotation == one.rotation
-    np.testing.assert_array_equal(two.height, one.height * 2.0**30)
+    result = fc.joints.register(make_face(lower, S), make_face(upper, S))
+    scaled = fc.joints.register(make_face(lower * 2.0**30, S), make_face(upper * 2.0**30, S))
+    assert scaled.shift_x == result.shift_x
+    assert scaled.rotation == result.rotation
+    np.testing.assert_array_equal(scaled.height, result.height * 2.0**30)
 
 
-def test_a_registered_pair_makes_a_crack(make_face, rough):
+def test_registered_pair_makes_a_crack(make_face, rough):
     lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     crack = fc.joints.Crack(make_face(lower, S), result.height, young=60e9, poisson=0.2, block=80 * S)
@@ -143,7 +145,7 @@ def test_a_registered_pair_makes_a_crack(make_face, rough):
     assert np.isfinite(opening.rigid_dilatancy).all()
 
 
-def test_messages(make_face, rough):
+def test_invalid_arguments_are_refused(make_face, rough):
     lower, upper = moved_pair(rough, (0.0, 0.0))
     x = np.indices(lower.shape)[1] * 1.0
     for bad in (np.zeros_like(lower), 0.1 * x, np.sin(0.3 * x)):
@@ -167,14 +169,16 @@ def test_unequal_spacings_without_rotation(make_face, rough):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["white", "patches"])
-def test_standard_errors_are_honest(make_face, rough, kind):
+@pytest.mark.parametrize("noise_type", ["white", "patches"])
+def test_standard_errors_match_the_scatter(make_face, rough, noise_type):
     from scipy.ndimage import gaussian_filter
 
     scores = []
     for seed in range(60):
-        lower, upper = moved_pair(rough, (1.5, -2.0), seed=seed, noise=0.05 * (kind == "white"), size=100)
-        if kind == "patches":
+        lower, upper = moved_pair(
+            rough, (1.5, -2.0), seed=seed, noise=0.05 * (noise_type == "white"), size=100
+        )
+        if noise_type == "patches":
             noise = gaussian_filter(np.random.default_rng(seed).standard_normal(upper.shape), 3.0)
             upper = upper + 2e-4 * noise / noise.std()
         result = fc.joints.register(make_face(lower, S), make_face(upper, S))
@@ -184,12 +188,6 @@ def test_standard_errors_are_honest(make_face, rough, kind):
     # the spread of a score of unit variance over 180 of them is 5 %
     assert 0.8 < np.std(scores) < 1.25
     assert abs(np.mean(scores)) < 0.3
-
-
-# the measured pair
-
-DATA = os.environ.get("FRACTALCONTACT_DATA", "")
-measured = pytest.mark.skipif(not DATA, reason="FRACTALCONTACT_DATA is not set")
 
 
 @pytest.fixture(scope="module")
@@ -213,40 +211,40 @@ def test_gneiss_pair_is_mated(gneiss):
     assert result.mismatch < before
     assert result.correlation > correlation
     assert result.correlation == pytest.approx(0.98, abs=0.005)
-    # one frame already: less than two points and half a degree
+    # the scans share a frame: less than two points and half a degree
     assert max(abs(result.shift_x), abs(result.shift_y)) < 2 * S
     assert abs(result.rotation) < 0.5
     assert np.nanmean(result.aperture) == pytest.approx(0.637e-3, rel=0.03)
 
 
 @measured
-def test_without_the_spikes_of_the_scan_the_gneiss_closes_as_its_authors_saw_it(gneiss):
-    authors = gneiss["aperture"]
-    known = np.sort(authors.values[np.isfinite(authors.values)])
+def test_despiked_gneiss_closes_to_the_published_aperture(gneiss):
+    aperture = gneiss["aperture"]
+    published = np.sort(aperture.values[np.isfinite(aperture.values)])
     closed, removed = {}, []
     for name, clean in (("as scanned", lambda face: face), ("despiked", fc.surfaces.despike)):
         faces = [clean(gneiss[side]) for side in ("side_a", "side_b")]
         removed += [int(face.removed_points) for face in faces if "removed_points" in face.coords]
         lower, upper = (fc.surfaces.fill(face) for face in faces)
-        found = fc.joints.register(lower, upper)
-        crack = fc.joints.Crack(lower, found.height, young=60e9, poisson=0.2, block=0.045)
+        result = fc.joints.register(lower, upper)
+        crack = fc.joints.Crack(lower, result.height, young=60e9, poisson=0.2, block=0.045)
         closing = fc.joints.closure(crack, shear=0.0, normal_force=[1e4])
-        closed[name] = (found, float(closing.interface_closure.item()), float(closing.mean_gap.item()))
-    assert all(0 < count < 0.015 * authors.size for count in removed)
+        closed[name] = (result, float(closing.interface_closure.item()), float(closing.mean_gap.item()))
+    assert all(0 < count < 0.015 * aperture.size for count in removed)
     scanned, clean = closed["as scanned"], closed["despiked"]
     assert float(clean[0].mismatch) < float(scanned[0].mismatch)
-    assert np.nanmean(clean[0].aperture) == pytest.approx(known.mean(), rel=0.03)
-    # one point in two hundred lies lower than this: nearer to the authors' aperture without the spikes
-    low = known[known.size // 200]
-    lowest = [float(np.nanquantile(one[0].aperture, 0.005)) for one in (clean, scanned)]
+    assert np.nanmean(clean[0].aperture) == pytest.approx(published.mean(), rel=0.03)
+    # the 0.5 % quantile is closer to that of the published aperture without the spikes
+    low = published[published.size // 200]
+    lowest = [float(np.nanquantile(case[0].aperture, 0.005)) for case in (clean, scanned)]
     assert abs(lowest[0] - low) < 0.5 * abs(lowest[1] - low)
     # single points held the faces apart by more than their mean aperture
     assert clean[1] < 0.4 * scanned[1]
-    assert clean[2] < 1.2 * known.mean() < scanned[2]
+    assert clean[2] < 1.2 * published.mean() < scanned[2]
 
 
 @measured
-def test_a_cliff_in_both_faces_locks_the_gneiss_pair_towards_the_west(gneiss):
+def test_cliff_locks_the_gneiss_pair_towards_west(gneiss):
     faces = {side: gneiss[f"side_{side}"].values for side in "ab"}
     for heights in faces.values():  # 14 mm long, a few millimetres high, steeper than 70 degrees, as scanned
         falls = -np.diff(heights[50:95, 154:168], axis=1)
@@ -256,8 +254,8 @@ def test_a_cliff_in_both_faces_locks_the_gneiss_pair_towards_the_west(gneiss):
     upper = fc.joints.register(lower, upper).height
     climbs = {}
     for name, part in (("whole", slice(None)), ("west of it", slice(0, 156))):
-        one = (lower.isel(x=part), upper.isel(x=part))
-        crack = fc.joints.Crack(*one, young=60e9, poisson=0.2, block=(0.045, 0.0384))
+        faces = (lower.isel(x=part), upper.isel(x=part))
+        crack = fc.joints.Crack(*faces, young=60e9, poisson=0.2, block=(0.045, 0.0384))
         lifted = fc.joints.dilatancy(crack, shear=6e-4, direction=["E", "W"]).rigid_dilatancy.squeeze()
         climbs[name] = lifted.values
     assert climbs["whole"][1] > 1.5e-3 > 5 * climbs["whole"][0]
@@ -265,7 +263,7 @@ def test_a_cliff_in_both_faces_locks_the_gneiss_pair_towards_the_west(gneiss):
 
 
 @measured
-def test_gneiss_pair_goes_through_the_whole_study(gneiss):
+def test_study_of_the_gneiss_pair(gneiss):
     lower = fc.surfaces.fill(gneiss["side_a"])
     found = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
     crack = fc.joints.Crack(lower, found.height, young=60e9, poisson=0.2, block=0.045)
@@ -285,7 +283,7 @@ def test_gneiss_pair_goes_through_the_whole_study(gneiss):
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13, 14])
-def test_shift_turn_and_tilt_together_with_noise_gaps_and_part_of_the_face(make_face, rough, seed):
+def test_motion_is_recovered_with_noise_and_gaps(make_face, rough, seed):
     rng = np.random.default_rng(seed)
     shift, angle = rng.uniform(-8, 8, 2), float(rng.uniform(-2, 2))
     noise = 0.02
@@ -294,7 +292,7 @@ def test_shift_turn_and_tilt_together_with_noise_gaps_and_part_of_the_face(make_
     y, x = np.indices(upper.shape) * S
     upper = upper - tilt_y * y - tilt_x * x
     lower[20:30, 60:75], upper[80:84, 30:60] = np.nan, np.nan
-    # the upper face was seen over two thirds of the lower one only
+    # the upper face covers two thirds of the lower one
     part = make_face(upper, S).isel(y=slice(0, 100), x=slice(25, 130))
     result = fc.joints.register(make_face(lower, S), part)
     assert result.converged
@@ -304,7 +302,7 @@ def test_shift_turn_and_tilt_together_with_noise_gaps_and_part_of_the_face(make_
     for name, cells in zip(("shift_y", "shift_x"), shift, strict=True):
         allowed = 4 * float(result[f"{name}_error"]) / S + 5e-3
         assert result[name] / S == pytest.approx(cells, abs=allowed), name
-    # what is left is the noise, a little less for being read between the points
+    # the mismatch is the noise, slightly smoothed by the interpolation
     assert 0.6 * noise * 1e-3 < result.mismatch < 1.3 * noise * 1e-3
     assert result.correlation > 0.995
     assert 0.5 < result.common_fraction < 0.75

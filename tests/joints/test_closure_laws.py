@@ -1,0 +1,85 @@
+"""Closure laws against closed forms and the known law of self-affine surfaces."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+
+
+def law(pressure, closure):
+    return xr.Dataset(
+        {"interface_closure": ("step", np.asarray(closure, float))},
+        coords={"step": np.arange(len(pressure)), "nominal_pressure": ("step", np.asarray(pressure, float))},
+    )
+
+
+def test_exponential_joint():
+    p = np.array([1e4, 3e4, 4e4, 2e5, 9e5])
+    result = fc.joints.closure_laws(law(p, 3e-6 * np.log(p / 2e3)))
+    assert result.closure_length == pytest.approx(3e-6, rel=1e-12)
+    assert result.reference_pressure == pytest.approx(2e3, rel=1e-10)
+    assert result.exponential_misfit < 1e-18
+    assert result.hyperbolic_misfit > 1e-7
+    np.testing.assert_allclose(result.stiffness, p / 3e-6, rtol=1e-10)
+
+
+def test_hyperbolic_joint():
+    p = np.geomspace(1e5, 3e7, 12)
+    constants = {"initial_stiffness": 20.35e9, "greatest_closure": 0.136871e-3}
+    result = fc.joints.closure_laws(law(p, fc.joints.bandis_closure(p, **constants)))
+    for name, value in constants.items():
+        assert result[name] == pytest.approx(value, rel=1e-6)
+    assert result.hyperbolic_misfit < 1e-12
+    assert result.exponential_misfit > 1e-6
+
+
+def test_straight_line_has_no_greatest_closure():
+    p = np.linspace(1e5, 1e6, 6)
+    result = fc.joints.closure_laws(law(p, p / 5e10))
+    assert np.isinf(result.greatest_closure)
+    assert result.initial_stiffness == pytest.approx(5e10, rel=1e-5)
+
+
+def test_fit_to_first_loading_and_stiffness_per_branch():
+    p = np.array([0.0, 1e4, 4e4, 2e5, 5e4, 1e4, 1e5])
+    w = 3e-6 * np.log(np.maximum(p, 1.0) / 2e3)
+    w[4:6] = w[3] + 1e-6 * np.log(p[4:6] / p[3])  # unloading is stiffer
+    result = fc.joints.closure_laws(law(p, w))
+    assert result.closure_length == pytest.approx(3e-6, rel=1e-12)
+    assert np.isnan(result.stiffness[0])
+    np.testing.assert_allclose(result.stiffness[1:4], p[1:4] / 3e-6, rtol=1e-10)
+    np.testing.assert_allclose(result.stiffness[4:6], p[4:6] / 1e-6, rtol=1e-10)
+    assert "no force" in result.stiffness.attrs["reason"]
+
+
+def test_mated_faces_have_no_law(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((8, 8)), 1e-4), young=1e9, poisson=0.2)
+    result = fc.joints.closure_laws(fc.joints.closure(crack, shear=0.0, normal_force=[1.0, 2.0, 4.0]))
+    assert np.isnan(result.closure_length).all()
+    assert "does not close" in result.closure_length.attrs["reason"]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_self_affine_faces_close_with_the_known_length(seed):
+    # separation over rms height: 0.38 to 0.52 at reduced pressures of 0.01 to 0.1
+    # the delta-surface of two independent faces has twice the variance of one
+    options = {"hurst": 0.8, "long_cutoff": 64e-6, "short_cutoff": 4e-6}
+    lower, upper = (
+        fc.surfaces.spectral((256, 256), 1e-6, rms_height=1e-7, rng=100 * seed + i, **options) for i in (0, 1)
+    )
+    crack = fc.joints.Crack(lower, upper, young=1e9, poisson=0.0)
+    delta = fc.joints.delta_surface(crack, 0.0)
+    slope = float(fc.surfaces.describe(delta).rms_slope)
+    pressure = crack.contact_modulus * slope * np.geomspace(0.01, 0.1, 6)
+    closing = fc.joints.closure(crack, shear=0.0, nominal_pressure=pressure)
+    result = fc.joints.closure_laws(closing)
+    assert 0.38 < float(result.closure_length[0]) / float(delta.std()) < 0.52
+    assert result.exponential_misfit[0] < 0.1 * float(delta.std())
+
+
+def test_invalid_arguments_are_refused():
+    with pytest.raises(ValueError, match=r"Dataset of fractalcontact.joints.closure, got 'int'"):
+        fc.joints.closure_laws(3)
+    with pytest.raises(ValueError, match="no interface_closure"):
+        fc.joints.closure_laws(xr.Dataset())

@@ -1,0 +1,98 @@
+"""The crack: layout of the block, travel, validation."""
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+
+MATERIAL = {"young": 30e9, "poisson": 0.2}
+E, NU = 30e9, 0.2
+
+
+def test_profiles_are_refused(make_face):
+    profile = xr.DataArray(np.zeros(9), dims="x", coords={"x": np.arange(9.0)}, attrs={"units": "m"})
+    with pytest.raises(ValueError, match=r"lower.dims"):
+        fc.joints.Crack(profile, young=E, poisson=NU)
+
+
+@pytest.mark.parametrize(
+    ("n", "edge", "cells", "start"), [(512, 0.02, 250, 131), (512, 0.02001, 250, 131), (9, 4e-4, 5, 2)]
+)
+def test_block_is_centred_on_whole_cells(make_face, n, edge, cells, start):
+    crack = fc.joints.Crack(make_face(np.zeros((n, n)), 8e-5), block=edge, **MATERIAL)
+    assert crack.layout.cells == (cells, cells)
+    assert crack.layout.start == (start, start)
+    assert crack.block == pytest.approx((cells * 8e-5,) * 2, rel=1e-12)
+    assert crack.nominal_area == pytest.approx((cells * 8e-5) ** 2, rel=1e-12)
+
+
+def test_block_edges_are_y_then_x(make_face):
+    face = make_face(np.zeros((20, 30)), (2.0, 1.0))
+    assert fc.joints.Crack(face, block=(10.0, 20.0), **MATERIAL).layout.cells == (5, 20)
+    assert fc.joints.Crack(face, **MATERIAL).layout.cells == (20, 30)
+
+
+def test_travel_of_the_paper_is_131_cells(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((512, 512)), 8e-5), block=0.02, **MATERIAL)
+    for direction in "ENWS":
+        assert crack.travel(direction) == pytest.approx(131 * 8e-5, rel=1e-12)
+    assert crack.travel("NE") == pytest.approx(131 * 8e-5 * np.sqrt(2), rel=1e-12)
+    assert crack.travel(45) == crack.travel("NE") == crack.travel(405)
+
+
+def test_odd_margin_gives_unequal_travel(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((10, 10))), block=5, **MATERIAL)
+    assert (crack.travel("E"), crack.travel("W")) == (3.0, 2.0)
+
+
+def test_contact_modulus_of_two_equal_bodies(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((4, 4))), young=30e9, poisson=0.2)
+    assert crack.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
+
+
+def test_all_problems_are_reported_together(make_face):
+    face = make_face(np.zeros((8, 8)))
+    with pytest.raises(fc.base.errors.InvalidInput) as caught:
+        fc.joints.Crack(
+            face, make_face(np.zeros((7, 8))), young=-1, poisson=0.5, block=20.0, basic_friction_angle=95
+        )
+    text = str(caught.value)
+    for word in ("young", "poisson", "block", "basic_friction_angle", "upper"):
+        assert word in text
+
+
+def test_missing_heights_refused_inside_the_block_only(make_face):
+    heights = np.zeros((20, 20))
+    heights[0, 0] = np.nan
+    fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    heights[9, 9] = np.nan
+    with pytest.raises(ValueError, match="lower inside the block.*fill"):
+        fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+    with pytest.raises(ValueError, match="upper inside the block.*fill"):
+        fc.joints.Crack(make_face(np.zeros((20, 20))), make_face(heights), block=10, **MATERIAL)
+
+
+def test_infinite_heights_are_refused(make_face):
+    heights = np.zeros((20, 20))
+    heights[0, 0] = -np.inf
+    with pytest.raises(ValueError, match="infinite"):
+        fc.joints.Crack(make_face(heights), block=10, **MATERIAL)
+
+
+def test_upper_must_lie_on_the_same_grid(make_face):
+    face = make_face(np.zeros((9, 9)))
+    with pytest.raises(ValueError, match="upper.x"):
+        fc.joints.Crack(face, make_face(np.zeros((9, 9)), origin=(0.0, 0.4)), **MATERIAL)
+
+
+def test_crack_is_frozen_and_can_be_pickled(make_face, rough):
+    crack = fc.joints.Crack(make_face(rough((16, 16), 0)), block=8, **MATERIAL)
+    with pytest.raises(AttributeError):
+        crack.young = 1.0
+    twin = pickle.loads(pickle.dumps(crack))
+    assert twin.layout == crack.layout
+    assert twin.block == crack.block
+    assert "block of 8 x 8" in repr(crack)

@@ -1,0 +1,55 @@
+"""`validate` of every public function: the checks of a call, without its computation."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+S = 8e-5
+
+INVALID = {
+    "delta_surface": ({"shear": 1.0, "direction": "Q"}, ["direction"]),
+    "closure": (
+        {"shear": 1.0, "normal_force": -1.0, "keep": "gaps", "bulk": "none", "method": "slow"},
+        ["at most 0.00192 m towards E", "normal_force", "keep", "bulk", "method"],
+    ),
+    "dilatancy": (
+        {"shear": S, "normal_force": 1e9, "hardness": 1e9, "normal_stiffness": 0.0},
+        ["normal_force: expected a force of at most hardness times area", "normal_stiffness"],
+    ),
+    "delta_dimension": ({"shear": [S, S], "window": (2.0, 1.0)}, ["shear", "window"]),
+    "decorrelation_length": ({"shear": [S, 2 * S]}, ["ascending from 0"]),
+}
+
+
+@pytest.mark.parametrize("name", INVALID)
+def test_validate_reports_all_problems_of_a_call(crack, name):
+    arguments, problems = INVALID[name]
+    function = getattr(fc.joints, name)
+    with pytest.raises(fc.base.errors.InvalidInput) as caught:
+        function.validate(crack, **arguments)
+    assert caught.value.where == f"fractalcontact.joints.{name}"
+    assert len(caught.value.problems) == len(problems)
+    for problem in problems:
+        assert problem in str(caught.value)
+    with pytest.raises(fc.base.errors.InvalidInput) as called:
+        function(crack, **arguments)
+    assert called.value.problems == caught.value.problems
+
+
+def test_validate_accepts_a_call_and_computes_nothing(crack, make_face, teeth, monkeypatch):
+    monkeypatch.setattr(fc.contact, "press", None)
+    fc.joints.closure.validate(crack, shear=[0.0, S], normal_force=[1.0, 2.0], keep=("gap",), hardness=1e9)
+    fc.joints.dilatancy.validate(crack, shear=S, normal_force=1.0, normal_stiffness=1e9)
+    fc.joints.decorrelation_length.validate(crack)
+    fc.joints.friction.validate(teeth, nominal_pressure=1e6)
+    fc.joints.cyclic_shear.validate(teeth, [0.0, 4e-3, -4e-3])
+    face = make_face(np.zeros((20, 20)), S)
+    fc.joints.register.validate(face, face)
+    fc.joints.transmissivity.validate(face)
+    fc.joints.roughness_coefficient.validate(face, lag=S)
+
+
+def test_validate_refuses_a_dilatancy_that_does_not_cover_the_path(teeth):
+    with pytest.raises(ValueError, match="path: expected positions from 0 to 0.008 m"):
+        fc.joints.cyclic_shear.validate(teeth, [0.0, 9e-3])
