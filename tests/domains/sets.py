@@ -23,26 +23,27 @@ def as_mask(cells, spacing=(1e-3, 1e-3), periodic=(False, False), dims=None):
     return xr.DataArray(cells, dims=dims, coords=plane_coords(cells.shape[-2:], spacing, periodic))
 
 
-def base(name):
+def ratio_of(name):
+    """Return the ratio by which a set of `GENERATORS` repeats itself."""
     return len(GENERATORS[name])
 
 
 def lattice_set(name, level):
-    """Build a self-similar set cell by cell, base^level cells a side."""
+    """Build a self-similar set cell by cell, ratio^level cells a side."""
     cells = np.ones((1, 1), int)
     for _ in range(level):
         cells = np.kron(GENERATORS[name], cells)
     return cells
 
 
-def random_lattice_set(keep, base, level, rng):
-    """Build a random self-similar set: `keep` of the base^2 parts of every part, drawn anew each time."""
+def random_lattice_set(keep, ratio, level, rng):
+    """Build a random self-similar set: `keep` of the ratio^2 parts of every part, drawn anew each time."""
     cells = np.ones((1, 1), bool)
     for _ in range(level):
         n = len(cells)
-        rank = rng.random((n, n, base * base)).argsort(-1).argsort(-1)
-        parts = (rank < keep).reshape(n, n, base, base) & cells[:, :, None, None]
-        cells = parts.transpose(0, 2, 1, 3).reshape(n * base, n * base)
+        rank = rng.random((n, n, ratio * ratio)).argsort(-1).argsort(-1)
+        parts = (rank < keep).reshape(n, n, ratio, ratio) & cells[:, :, None, None]
+        cells = parts.transpose(0, 2, 1, 3).reshape(n * ratio, n * ratio)
     return cells
 
 
@@ -55,8 +56,8 @@ def percolating_cluster(n, rng):
             return cluster
 
 
-def thinned(keep, ratio, levels, rng):
-    """Return fractal percolation, D = 2 + ln(keep)/ln(ratio): every part of every part stays with `keep`."""
+def fractal_percolation(keep, ratio, levels, rng):
+    """Return fractal percolation, D = 2 + ln(keep)/ln(ratio): each part of each part is kept with `keep`."""
     while True:
         cells = np.ones((1, 1), bool)
         for _ in range(levels):
@@ -104,5 +105,11 @@ def level_set(n, hurst, coverage, rng, cutoff=0.25):
     return heights > np.quantile(heights, 1 - coverage)
 
 
-def random_dust(n, cells, rng):
+def random_null(n, cells, rng):
+    """Return complete spatial randomness: so many cells anywhere in an n x n plane."""
     return (rng.permutation(n * n) < cells).reshape(n, n)
+
+
+def row_path(*rows):
+    """Return planes of two equal rows of cells each, from strings; # is a cell of the set."""
+    return np.array([[[letter == "#" for letter in row]] * 2 for row in rows])

@@ -1,4 +1,4 @@
-"""What a mask may be, what its results carry, and what is lean about the room."""
+"""Masks as input of all functions: accepted types, refused values, labels of the results, lean import."""
 
 import json
 import subprocess
@@ -40,12 +40,12 @@ def mask():
     return as_mask(planes, periodic=(True, False)).assign_coords(coords)
 
 
-def test_the_room_offers_what_is_tested_here():
+def test_all_public_functions_are_tested_here():
     assert set(fc.domains.__all__) == {*FUNCTIONS, "area_dimension"}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_flags_and_booleans_say_the_same(name, mask):
+def test_flags_and_booleans_give_the_same(name, mask):
     want = FUNCTIONS[name](mask).drop_vars("run_time")
     yielded = xr.where(mask, 2, 0).astype(np.int8).assign_coords(mask.coords)
     for other in (mask.astype(np.int8), mask.astype(np.uint8), mask.astype(np.int64), yielded):
@@ -84,7 +84,7 @@ def test_results_come_back_from_a_file_and_are_compliant(name, mask, tmp_path, c
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_masks_that_are_none_are_refused_by_name(name, mask):
+def test_invalid_masks_are_refused(name, mask):
     numbers = mask * 1.5
     wrong = [
         (np.ones((4, 4), bool), "mask: expected a boolean DataArray"),
@@ -94,13 +94,13 @@ def test_masks_that_are_none_are_refused_by_name(name, mask):
     ]
     if name != "generalised_dimensions":
         wrong += [(numbers, "compare numbers first"), (numbers.where(False), "compare numbers first")]
-    for bad, words in wrong:
+    for invalid, words in wrong:
         with pytest.raises(ValueError, match=words):
-            FUNCTIONS[name](bad)
+            FUNCTIONS[name](invalid)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_what_was_not_observed_makes_no_difference(name, mask):
+def test_unobserved_cells_make_no_difference(name, mask):
     valid = as_mask(np.random.default_rng(2).random((32, 32)) < 0.9, periodic=(True, False))
     one = FUNCTIONS[name](mask & valid, valid=valid).drop_vars("run_time")
     other = FUNCTIONS[name](mask | ~valid, valid=valid).drop_vars("run_time")
@@ -110,14 +110,23 @@ def test_what_was_not_observed_makes_no_difference(name, mask):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_valid_must_fit_the_mask(name, mask):
-    for bad in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32), bool)):
+def test_valid_must_match_the_mask(name, mask):
+    for invalid in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32), bool)):
         with pytest.raises(ValueError, match="valid: expected"):
-            FUNCTIONS[name](mask, valid=bad)
+            FUNCTIONS[name](mask, valid=invalid)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_the_input_is_left_as_it_was(name, mask):
+def test_validate_checks_and_computes_nothing(name, mask):
+    empty = mask & False
+    assert FUNCTIONS[name].validate(empty) is None
+    assert FUNCTIONS[name].validate(empty, valid=xr.ones_like(mask)) is None
+    with pytest.raises(ValueError, match="valid: expected"):
+        FUNCTIONS[name].validate(empty, valid=mask.isel(step=0, x=slice(3)))
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_input_is_unchanged(name, mask):
     before = mask.copy(deep=True)
     FUNCTIONS[name](mask)
     assert before.identical(mask)
@@ -127,7 +136,7 @@ def test_the_input_is_left_as_it_was(name, mask):
 @pytest.mark.parametrize("shape", [(2, 1, 1), (2, 2, 2), (2, 3, 3), (2, 1, 50), (2, 7, 11)])
 @pytest.mark.parametrize("filling", ["empty", "one", "full"])
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_tiny_empty_and_full_masks_give_their_limits_or_nan(name, shape, filling):
+def test_tiny_empty_and_full_masks_give_no_infinity(name, shape, filling):
     cells = np.full(shape, filling == "full")
     cells[:, 0, 0] |= filling == "one"
     for wraps in (None, True):
@@ -138,19 +147,19 @@ def test_tiny_empty_and_full_masks_give_their_limits_or_nan(name, shape, filling
                 assert not np.isinf(variable.values).any()
 
 
-def test_coordinates_of_one_axis_alone_are_refused():
+def test_coordinates_of_one_axis_are_refused():
     mask = xr.DataArray(np.ones((4, 4), bool), dims=("y", "x"), coords={"x": np.arange(4.0)})
     with pytest.raises(ValueError, match="mask.y: expected a coordinate"):
         fc.domains.islands(mask)
 
 
-def test_leading_dims_must_not_take_the_names_of_results():
+def test_leading_dims_with_names_of_results_are_refused():
     mask = xr.DataArray(np.ones((2, 4, 4), bool), dims=("box_size", "y", "x"))
     with pytest.raises(ValueError, match="mask.dims"):
         fc.domains.box_dimension(mask)
 
 
-def test_importing_the_room_loads_nothing_heavy():
+def test_import_loads_nothing_heavy():
     code = (
         "import sys, fractalcontact.domains;"
         "heavy = {'numba', 'xarray', 'scipy', 'matplotlib', 'skimage', 'dask', 'netCDF4'};"
@@ -163,7 +172,7 @@ def test_importing_the_room_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_what_was_observed_must_lie_where_the_mask_does(name, mask):
+def test_valid_must_have_the_coordinates_of_the_mask(name, mask):
     valid = xr.ones_like(mask.isel(step=0, drop=True))
     FUNCTIONS[name](mask, valid=valid.assign_coords(x=valid.x * (1 + 1e-12)))
     with pytest.raises(ValueError, match=r"valid\.y: expected that of the mask"):
@@ -172,7 +181,7 @@ def test_what_was_observed_must_lie_where_the_mask_does(name, mask):
         FUNCTIONS[name](mask, valid=xr.ones_like(mask).isel(step=[1, 0]))
 
 
-def test_the_coordinate_of_any_leading_dim_is_kept(mask, tmp_path):
+def test_coordinates_of_any_leading_dim_are_kept(mask, tmp_path):
     stack = mask.rename(step="batch").drop_vars("closure").assign_coords(batch=["rough", "ground"])
     result = fc.domains.percolation(stack)
     assert result.batch.values.tolist() == ["rough", "ground"]
@@ -184,7 +193,7 @@ def test_the_coordinate_of_any_leading_dim_is_kept(mask, tmp_path):
     assert fc.open(tmp_path / "hours.nc").coverage.sel(time=2.0) == result.coverage[1]
 
 
-def test_reasons_fit_what_was_asked():
+def test_reasons_of_nan_and_of_refusals():
     strip = as_mask(np.arange(40).reshape(2, 20) % 3 == 0)
     assert "two steps" in fc.domains.boundary_dimension(strip).boundary_dimension.comment
     one = fc.domains.box_dimension(as_mask(np.eye(30, dtype=bool)), scales=4).box_dimension

@@ -1,4 +1,4 @@
-"""Generalised dimensions: cascades and lattice sets, exactly."""
+"""Generalised dimensions: exact values of cascades and lattice sets, large orders, unobserved cells."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ def test_cascade_of_four_weights_is_exact():
     weights = WEIGHTS.ravel()[:, None]
     tau = -np.log2((weights**Q).sum(0))
     assert result.mass_exponent.values == pytest.approx(tau, abs=1e-12)
-    known = {-4: -13.397075518767, 2: 1.736965594166, 4: 4.820106829466}
-    for order, value in known.items():
+    published = {-4: -13.397075518767, 2: 1.736965594166, 4: 4.820106829466}
+    for order, value in published.items():
         assert float(result.mass_exponent.sel(moment_order=order)) == pytest.approx(value, abs=1e-11)
     plain = Q != 1
     want = tau[plain] / (Q[plain] - 1)
@@ -36,7 +36,7 @@ def test_cascade_of_four_weights_is_exact():
     assert (result.ci_high - result.ci_low).values == pytest.approx(np.zeros(Q.size), abs=1e-11)
 
 
-def test_dimensions_fall_with_the_order_and_meet_at_one():
+def test_dimension_falls_with_the_order_and_is_continuous_at_one():
     result = fc.domains.generalised_dimensions(cascade(7), [0, 0.999999, 1, 1.000001, 3])
     values = result.generalised_dimension.values
     assert np.all(np.diff(values) < 0)
@@ -51,7 +51,7 @@ def test_cascade_by_three():
     assert result.mass_exponent.values == pytest.approx(tau, abs=1e-12)
 
 
-def test_sets_have_one_dimension():
+def test_monofractal_sets_have_one_dimension():
     for name, scales in (("gasket", [1, 2, 4, 8, 16]), ("carpet", [1, 3, 9, 27])):
         level = 6 if name == "gasket" else 4
         result = fc.domains.generalised_dimensions(as_mask(lattice_set(name, level)), scales=scales)
@@ -67,10 +67,10 @@ def test_order_zero_is_the_aligned_box_count():
     assert float(result.ci_low[0]) == pytest.approx(float(boxes.ci_low), abs=1e-12)
 
 
-def test_the_unit_of_the_measure_changes_no_bit():
-    one = fc.domains.generalised_dimensions(cascade(6), Q)
-    other = fc.domains.generalised_dimensions(cascade(6) * 2.0**-900, Q)
-    assert one.mass_exponent.identical(other.mass_exponent)
+def test_unit_of_the_measure_changes_no_bit():
+    unit = fc.domains.generalised_dimensions(cascade(6), Q)
+    scaled = fc.domains.generalised_dimensions(cascade(6) * 2.0**-900, Q)
+    assert unit.mass_exponent.identical(scaled.mass_exponent)
 
 
 def test_large_orders_do_not_underflow():
@@ -91,14 +91,14 @@ def test_empty_planes_and_stacks():
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
-def test_measures_must_be_finite_and_not_negative(bad):
+def test_invalid_measures_are_refused(bad):
     values = cascade(3).copy()
     values[2, 3] = bad
     with pytest.raises(ValueError, match="1 of 64 NaN, infinite or negative"):
         fc.domains.generalised_dimensions(values)
 
 
-def test_gaps_leave_full_planes_full_and_the_orders_alike():
+def test_unobserved_cells_keep_a_full_plane_full():
     rng = np.random.default_rng(9)
     valid = rng.random((64, 64)) < 0.8
     result = fc.domains.generalised_dimensions(

@@ -1,21 +1,16 @@
-"""Islands along a path, and the description of a stack."""
+"""Evolution along a path: events by hand, distances against slow maps, hysteresis, completeness."""
 
 import numpy as np
 import pytest
 import xarray as xr
-from domains.sets import as_mask, level_set
+from domains.sets import as_mask, level_set, row_path
 from scipy.ndimage import distance_transform_edt
 
 import fractalcontact as fc
 
 
-def path(*rows):
-    """Make planes of one row of cells each out of strings."""
-    return np.array([[[letter == "#" for letter in row]] * 2 for row in rows])
-
-
-def test_events_of_a_path_by_hand():
-    cells = path(
+def test_events_of_a_small_path():
+    cells = row_path(
         "..........",
         ".#...#..#.",
         ".#..##.##.",
@@ -34,30 +29,30 @@ def test_events_of_a_path_by_hand():
     assert "first plane along step" in result.births.attrs["comment"]
 
 
-def test_events_follow_islands_over_the_edges():
-    cells = path("#.......#", "##.....##")
+def test_events_follow_islands_across_the_edges():
+    cells = row_path("#.......#", "##.....##")
     free = fc.domains.evolution(as_mask(cells))
-    round_ = fc.domains.evolution(as_mask(cells, periodic=(False, True)))
+    wrapped = fc.domains.evolution(as_mask(cells, periodic=(False, True)))
     moved = np.roll(cells, 4, 2)
     other = fc.domains.evolution(as_mask(moved, periodic=(False, True)))
-    assert free.births[1] == round_.births[1] == 0
-    assert float(round_.hausdorff_distance[1]) == float(other.hausdorff_distance[1]) == pytest.approx(1e-3)
+    assert free.births[1] == wrapped.births[1] == 0
+    assert float(wrapped.hausdorff_distance[1]) == float(other.hausdorff_distance[1]) == pytest.approx(1e-3)
 
 
-def slow_hausdorff(one, other, spacing, wraps):
+def slow_hausdorff(first, second, spacing, wraps):
     """Measure by distance maps of a plane laid out three by three."""
     reach = []
-    for start, goal in ((one, other), (other, one)):
+    for start, goal in ((first, second), (second, first)):
         tiles = [3 if wrap else 1 for wrap in wraps]
         distance = distance_transform_edt(~np.tile(goal, tiles), sampling=spacing)
-        ny, nx = one.shape
+        ny, nx = first.shape
         top, left = (ny if wraps[0] else 0), (nx if wraps[1] else 0)
         reach.append(distance[top : top + ny, left : left + nx][start].max())
     return max(reach)
 
 
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
-def test_hausdorff_distance_against_distance_maps(wraps):
+def test_hausdorff_distance_matches_distance_maps(wraps):
     rng = np.random.default_rng(1)
     spacing = (2e-3, 5e-3)
     for _ in range(5):
@@ -68,7 +63,7 @@ def test_hausdorff_distance_against_distance_maps(wraps):
         assert float(result.hausdorff_distance[1]) == pytest.approx(want, rel=1e-14)
 
 
-def test_overlap_of_growing_sets_is_the_ratio_of_their_areas():
+def test_overlap_of_nested_sets_is_their_area_ratio():
     planes = np.array([level_set(64, 0.8, c, np.random.default_rng(2)) for c in (0.1, 0.2, 0.4)])
     result = fc.domains.evolution(as_mask(planes))
     area = planes.sum((1, 2))
@@ -77,7 +72,7 @@ def test_overlap_of_growing_sets_is_the_ratio_of_their_areas():
     assert np.all(result.splits.values[1:] == 0)
 
 
-def test_several_leading_dims_are_paths_of_their_own():
+def test_earlier_leading_dims_are_separate_paths():
     planes = np.array([[level_set(32, 0.8, c, np.random.default_rng(s)) for c in (0.1, 0.3)] for s in (3, 4)])
     result = fc.domains.evolution(as_mask(planes, dims=("direction", "shear", "y", "x")))
     assert result.births.dims == ("direction", "shear")
@@ -87,7 +82,7 @@ def test_several_leading_dims_are_paths_of_their_own():
         assert float(alone.hausdorff_distance[1]) == float(result.hausdorff_distance[k, 1])
 
 
-def test_empty_sets_have_no_distance_and_a_plane_alone_no_path():
+def test_empty_sets_and_missing_path():
     result = fc.domains.evolution(as_mask(np.zeros((2, 5, 5))))
     assert np.isnan(result.overlap[1])
     assert np.isnan(result.hausdorff_distance[1])
@@ -96,51 +91,14 @@ def test_empty_sets_have_no_distance_and_a_plane_alone_no_path():
         fc.domains.evolution(as_mask(np.zeros((5, 5))))
 
 
-def test_no_metres_without_coordinates():
+def test_distance_is_nan_without_coordinates():
     planes = xr.DataArray(np.eye(4, dtype=bool)[None] * np.ones((2, 1, 1), bool), dims=("step", "y", "x"))
     result = fc.domains.evolution(planes)
     assert np.isnan(result.hausdorff_distance).all()
     assert float(result.overlap[1]) == 1
 
 
-def test_description_repeats_what_the_functions_say():
-    planes = np.array(
-        [np.zeros((48, 48)), *(level_set(48, 0.7, c, np.random.default_rng(5)) for c in (0.1, 0.5))]
-    )
-    mask = as_mask(planes, (1e-3, 2e-3), (True, True)).assign_coords(normal_force=("step", [0.0, 1.0, 2.0]))
-    result = fc.domains.describe(mask, connectivity=2)
-    islands = fc.domains.islands(mask, connectivity=2)
-    boxes, edge = fc.domains.box_dimension(mask), fc.domains.boundary_dimension(mask)
-    for name in ("n_islands", "largest_island", "mean_island_area", "euler_number"):
-        assert result[name].identical(islands[name]) or np.array_equal(
-            result[name], islands[name], equal_nan=True
-        )
-    for name in ("box_dimension", "null_dimension", "differs_from_random"):
-        assert np.array_equal(result[name], boxes[name], equal_nan=True)
-    assert np.array_equal(result.boundary_dimension_low, edge.ci_low, equal_nan=True)
-    gaps = fc.domains.lacunarity(mask, [8]).lacunarity[:, 0]
-    assert np.array_equal(result.lacunarity, gaps, equal_nan=True)
-    assert int(result.box_size) == 8
-    perimeter = (
-        islands.perimeter.groupby(islands.island_step).sum() if "island_step" in islands.coords else None
-    )
-    assert perimeter is not None
-    assert result.total_perimeter.values[1:] == pytest.approx(perimeter.values)
-    assert np.array_equal(result.percolates, fc.domains.percolation(mask, connectivity=2).percolates)
-    assert result.normal_force.values.tolist() == [0, 1, 2]
-    assert "empty" in result.box_dimension.attrs["comment"]
-
-
-def test_description_may_call_a_periodic_plane_free():
-    cells = level_set(40, 0.7, 0.4, np.random.default_rng(6))
-    one = fc.domains.describe(as_mask(cells, periodic=(True, True)), periodic=False)
-    other = fc.domains.describe(as_mask(cells))
-    for name in one.data_vars:
-        if name != "run_time":
-            assert np.array_equal(one[name], other[name], equal_nan=True), name
-
-
-def test_evolution_gives_every_scalar_and_curve_of_the_room():
+def test_evolution_repeats_all_scalars_and_curves():
     rng = np.random.default_rng(7)
     planes = np.array(
         [[np.zeros((40, 40)), *(level_set(40, 0.7, c, rng) for c in (0.05, 0.3))] for _ in range(2)]
@@ -186,65 +144,8 @@ def test_only_what_is_wanted_is_measured():
         fc.domains.evolution(as_mask(planes), want=["gaps"])
 
 
-def test_lineage_of_a_path_by_hand():
-    cells = path(
-        ".#...#..#.",
-        ".#..##.##.",
-        ".######.#.",
-        ".##..#....",
-    )
-    result = fc.domains.lineage(as_mask(cells))
-    names = result.event.attrs["flag_meanings"].split()
-    rows = [
-        (int(step), int(before), int(after), int(common), names[event])
-        for step, before, after, common, event in zip(
-            result.link_step,
-            result.island_before,
-            result.island_after,
-            result.common_cells,
-            result.event.values,
-            strict=True,
-        )
-    ]
-    assert rows == [
-        (1, 1, 1, 2, "continuation"),
-        (1, 2, 2, 2, "continuation"),
-        (1, 3, 3, 2, "continuation"),
-        (2, 1, 1, 2, "merge"),
-        (2, 2, 1, 4, "merge"),
-        (2, 3, 2, 2, "continuation"),
-        (3, 1, 1, 4, "split"),
-        (3, 1, 2, 2, "split"),
-        (3, 2, 0, 0, "death"),
-    ]
-    births = fc.domains.lineage(as_mask(np.concatenate([0 * cells[:1], cells[:1]])))
-    assert births.event.values.tolist() == [1, 1, 1]
-    assert births.island_before.values.tolist() == [0, 0, 0]
-    assert fc.domains.lineage(as_mask(cells[:1])).sizes["link"] == 0
-
-
-def test_lineage_and_evolution_count_the_same_events():
-    rng = np.random.default_rng(9)
-    planes = np.array([[level_set(48, 0.4, c, rng) for c in (0.2, 0.25, 0.2)] for _ in range(2)])
-    mask = as_mask(planes, periodic=(True, True), dims=("shear", "step", "y", "x"))
-    mask = mask.assign_coords(shear=[1e-3, 2e-3])
-    counts = fc.domains.evolution(mask, want=["changes", "islands"])
-    table = fc.domains.lineage(mask)
-    for i, shear in enumerate(mask.shear.values):
-        for step in (1, 2):
-            rows = table.isel(link=np.flatnonzero((table.link_shear == shear) & (table.link_step == step)))
-            assert (rows.event == 1).sum() == counts.births[i, step]
-            assert (rows.event == 2).sum() == counts.deaths[i, step]
-            merged = rows.island_after.values[np.isin(rows.event, (3, 5))]
-            parted = rows.island_before.values[np.isin(rows.event, (4, 5))]
-            assert np.unique(merged).size == counts.merges[i, step]
-            assert np.unique(parted).size == counts.splits[i, step]
-            after = rows.island_after.values
-            assert np.unique(after[after > 0]).size == counts.n_islands[i, step]
-
-
 def test_hysteresis_of_a_cycle():
-    cells = path("#.........", "##........", "####......", "###.......", "#.........", "###.......")
+    cells = row_path("#.........", "##........", "####......", "###.......", "#.........", "###.......")
     force = [1.0, 2.0, 3.0, 2.0, 1.0, 2.0]
     mask = as_mask(cells).assign_coords(normal_force=("step", force))
     result = fc.domains.evolution(mask, want=["changes"])
@@ -258,7 +159,7 @@ def test_hysteresis_of_a_cycle():
     assert "hysteresis" not in fc.domains.evolution(as_mask(cells), want=["changes"])
 
 
-def test_elastic_contact_forgets_its_path():
+def test_elastic_contact_has_no_hysteresis():
     face = fc.surfaces.spectral((32, 32), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
     pressure = 1e10 * np.array([0.001, 0.004, 0.01, 0.004, 0.001])
     pressed = fc.contact.press(face, contact_modulus=1e10, nominal_pressure=pressure)
@@ -267,7 +168,7 @@ def test_elastic_contact_forgets_its_path():
     assert result.hysteresis.values[3:].tolist() == [0, 0]
 
 
-def test_empty_planes_say_why_there_is_no_distance():
+def test_empty_planes_have_a_reason():
     planes = np.zeros((4, 9, 9), bool)
     planes[2, 3, 4] = True
     result = fc.domains.evolution(as_mask(planes), want=["changes"])

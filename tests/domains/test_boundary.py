@@ -1,4 +1,4 @@
-"""Dimension of the boundary: level sets of exact Brownian surfaces, smooth edges, gaps, the limits."""
+"""Boundary dimension: level sets of exact Brownian surfaces, smooth edges, unobserved cells, limits."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import xarray as xr
 from domains.sets import as_mask, level_set
 
 import fractalcontact as fc
-from fractalcontact.domains import _boundary as _edges
 
 
 def brownian_level_set(n, hurst, rng, coverage=0.5):
@@ -14,26 +13,45 @@ def brownian_level_set(n, hurst, rng, coverage=0.5):
     return heights > np.quantile(heights, 1 - coverage)
 
 
+OFFSETS = [(0, 1), (1, 0), (1, 1), (1, -1)]
+
+
+def differing_share(cells, valid, wraps, down, right):
+    """Compare a plane with itself, shifted: the share of the observed pairs that differ."""
+    ny, nx = cells.shape
+    other, other_valid = (np.roll(plane, (-down, -right), (0, 1)) for plane in (cells, valid))
+    pairs = valid & other_valid
+    y, x = np.indices(cells.shape)
+    pairs &= wraps[0] | (y + down < ny)
+    pairs &= wraps[1] | ((x + right < nx) & (x + right >= 0))
+    return (pairs & (other != cells)).sum() / pairs.sum()
+
+
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
-def test_pairs_against_shifted_planes(wraps):
+def test_dimension_and_sides_match_shifted_planes(wraps):
     rng = np.random.default_rng(1)
-    cells, valid = rng.random((13, 17)) < 0.4, rng.random((13, 17)) < 0.9
-    from fractalcontact.base.grid import Grid
+    for shape in ((13, 17), (16, 9), (30, 31)):
+        valid = rng.random(shape) < 0.9
+        cells = (rng.random(shape) < 0.4) & valid
+        single, double = (
+            np.array(
+                [differing_share(cells, valid, wraps, lag * down, lag * right) for down, right in OFFSETS]
+            )
+            for lag in (1, 2)
+        )
+        weights = single**-3.0
+        slope = (weights * np.log2(double / single)).sum() / weights.sum()
+        mask, observed = as_mask(cells, periodic=wraps), as_mask(valid, periodic=wraps)
+        result = fc.domains.boundary_dimension(mask, valid=observed)
+        assert float(result.boundary_dimension) == pytest.approx(2 - slope, rel=1e-12)
+        down, right = (np.roll(cells, -1, axis) != cells for axis in (0, 1))
+        both_down, both_right = (np.roll(valid, -1, axis) & valid for axis in (0, 1))
+        rows, columns = slice(None if wraps[0] else -1), slice(None if wraps[1] else -1)
+        sides = (down & both_down)[rows].sum() + (right & both_right)[:, columns].sum()
+        assert int(result.boundary_sides) == sides
 
-    grid = Grid((13, 17), (1.0, 1.0), wraps)
-    seen = (cells & valid).astype(np.uint8)
-    pairs, differing = _edges.count_pairs(seen, valid.astype(np.uint8), grid)
-    for place, (down, right) in enumerate(_edges.OFFSETS):
-        other, known = (np.roll(a, (-down, -right), (0, 1)) for a in (cells & valid, valid))
-        both = valid & known
-        y, x = np.indices(cells.shape)
-        both &= wraps[0] | (y + down < 13)
-        both &= wraps[1] | ((x + right < 17) & (x + right >= 0))
-        assert pairs[:, place].sum() == both.sum()
-        assert differing[:, place].sum() == (both & (other != (cells & valid))).sum()
 
-
-def test_sides_are_those_of_the_islands():
+def test_boundary_sides_match_the_perimeter_of_islands():
     cells = level_set(50, 0.5, 0.3, np.random.default_rng(2))
     for wraps in ((False, False), (True, True)):
         mask = as_mask(cells, (1.0, 1.0), wraps)
@@ -56,7 +74,7 @@ def test_periodic_stripes_are_exact():
     )
 
 
-def test_complement_and_mirror_have_the_same_boundary():
+def test_complement_and_mirror_have_the_same_dimension():
     cells = level_set(64, 0.5, 0.3, np.random.default_rng(3))
     values = [
         float(fc.domains.boundary_dimension(as_mask(c)).boundary_dimension)
@@ -66,7 +84,7 @@ def test_complement_and_mirror_have_the_same_boundary():
 
 
 @pytest.mark.parametrize(("hurst", "allowed"), [(0.3, 0.012), (0.5, 0.02), (0.8, 0.06)])
-def test_level_sets_of_brownian_surfaces(hurst, allowed):
+def test_dimension_of_brownian_level_sets(hurst, allowed):
     rng = np.random.default_rng(4)
     for _ in range(3):
         result = fc.domains.boundary_dimension(as_mask(brownian_level_set(512, hurst, rng)))
@@ -76,7 +94,7 @@ def test_level_sets_of_brownian_surfaces(hurst, allowed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("hurst", "allowed"), [(0.3, 0.0075), (0.4, 0.009), (0.5, 0.0115), (0.8, 0.033)])
-def test_error_on_level_sets_of_brownian_surfaces(hurst, allowed):
+def test_rms_error_on_brownian_level_sets(hurst, allowed):
     rng = np.random.default_rng(5)
     planes = np.array([brownian_level_set(512, hurst, rng) for _ in range(200)])
     error = fc.domains.boundary_dimension(as_mask(planes)).boundary_dimension.values - (2 - hurst)
@@ -86,26 +104,26 @@ def test_error_on_level_sets_of_brownian_surfaces(hurst, allowed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hurst", [0.1, 0.3, 0.5, 0.7, 0.8, 0.9])
-def test_intervals_cover_the_truth(hurst):
+def test_interval_coverage_on_brownian_level_sets(hurst):
     rng = np.random.default_rng(6)
     planes = np.array([brownian_level_set(192, hurst, rng, c) for c in (0.5, 0.2) for _ in range(150)])
     result = fc.domains.boundary_dimension(as_mask(planes))
-    known = np.isfinite(result.ci_low.values)
+    has_interval = np.isfinite(result.ci_low.values)
     inside = (result.ci_low <= 2 - hurst) & (result.ci_high >= 2 - hurst)
-    assert known.mean() > 0.9
-    assert 0.92 <= inside.values[known].mean() <= 0.995
+    assert has_interval.mean() > 0.9
+    assert 0.92 <= inside.values[has_interval].mean() <= 0.995
 
 
-def test_gaps_leave_the_dimension_where_it_was():
+def test_unobserved_cells_change_the_dimension_little():
     rng = np.random.default_rng(7)
     cells = brownian_level_set(256, 0.5, rng)
-    whole = fc.domains.boundary_dimension(as_mask(cells))
+    complete = fc.domains.boundary_dimension(as_mask(cells))
     valid = rng.random((256, 256)) < 0.9
     gappy = fc.domains.boundary_dimension(as_mask(cells ^ ~valid), valid=as_mask(valid))
-    assert float(gappy.boundary_dimension) == pytest.approx(float(whole.boundary_dimension), abs=0.03)
+    assert float(gappy.boundary_dimension) == pytest.approx(float(complete.boundary_dimension), abs=0.03)
 
 
-def test_without_a_boundary_or_with_little_of_it():
+def test_missing_or_short_boundary_is_nan_with_a_reason():
     planes = np.zeros((3, 30, 30), bool)
     planes[1] = planes[2, 10:20, 10:20] = True
     result = fc.domains.boundary_dimension(as_mask(planes))
@@ -116,7 +134,7 @@ def test_without_a_boundary_or_with_little_of_it():
     assert "fewer than 200" in result.ci_low.attrs["comment"]
 
 
-def test_unequal_spacings_are_no_trouble():
+def test_unequal_spacings():
     heights = fc.surfaces.fbm((256, 256), (1.0, 2.0), hurst=0.5, rms_increment=1.0, rng=8)
     mask = heights > float(heights.median())
     assert isinstance(mask, xr.DataArray)

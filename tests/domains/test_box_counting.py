@@ -1,4 +1,4 @@
-"""Box counts and the box dimension: sets of known dimension, slow counts, the null, the limits."""
+"""Box counts and the box dimension: sets of known dimension, slow counts, limits, intervals."""
 
 import numpy as np
 import pytest
@@ -7,21 +7,18 @@ from domains.sets import (
     DIMENSION,
     GENERATORS,
     as_mask,
-    base,
+    fractal_percolation,
     koch_raster,
     lattice_set,
     level_set,
     percolating_cluster,
     placed,
-    random_dust,
     random_lattice_set,
-    thinned,
+    random_null,
+    ratio_of,
 )
-from scipy import ndimage
 
 import fractalcontact as fc
-from fractalcontact.domains import _random_null
-from fractalcontact.domains._scaling_fit import default_sizes
 
 SIDE = {"carpet": 5, "cantor_dust": 5, "vicsek": 5, "gasket": 8}
 
@@ -29,14 +26,14 @@ SIDE = {"carpet": 5, "cantor_dust": 5, "vicsek": 5, "gasket": 8}
 def parts_of_axis(n, size, offset, wraps):
     """Cut an axis into boxes (start, stop) by the grid of one offset."""
     if wraps:
-        whole = [(offset + k * size, offset + (k + 1) * size) for k in range(n // size)]
-        return whole + ([(offset + n // size * size, offset + n)] if n % size else [])
+        full = [(offset + k * size, offset + (k + 1) * size) for k in range(n // size)]
+        return full + ([(offset + n // size * size, offset + n)] if n % size else [])
     starts = range(offset - size, n, size)
     return [(max(s, 0), min(s + size, n)) for s in starts if min(s + size, n) > max(s, 0)]
 
 
 def slow_minimum(cells, size, wraps):
-    """Count boxes offset by offset: the fewest whole boxes, and the smallest measure."""
+    """Count boxes offset by offset: the fewest full boxes, and the smallest measure."""
     ny, nx = cells.shape
 
     def met(box_y, box_x):
@@ -69,7 +66,7 @@ def slow_minimum(cells, size, wraps):
 
 
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
-def test_fewest_boxes_against_every_offset_one_by_one(wraps):
+def test_minimum_cover_matches_slow_count(wraps):
     rng = np.random.default_rng(1)
     for shape in ((7, 9), (12, 12), (5, 13)):
         cells = rng.random(shape) < rng.random()
@@ -80,7 +77,7 @@ def test_fewest_boxes_against_every_offset_one_by_one(wraps):
         assert result.box_measure.values == pytest.approx(slow[:, 1], rel=1e-15)
 
 
-def test_mean_boxes_against_every_offset_one_by_one():
+def test_mean_cover_matches_slow_count():
     rng = np.random.default_rng(2)
     for shape in ((11, 9), (8, 14)):
         cells = rng.random(shape) < 0.2
@@ -89,7 +86,7 @@ def test_mean_boxes_against_every_offset_one_by_one():
         assert result.box_count.values == pytest.approx(slow, rel=1e-14)
 
 
-def test_mean_boxes_go_round_a_periodic_plane():
+def test_mean_cover_wraps_around_a_periodic_plane():
     rng = np.random.default_rng(3)
     cells = rng.random((12, 12)) < 0.1
     sizes = [1, 2, 3, 4, 6]
@@ -100,7 +97,7 @@ def test_mean_boxes_go_round_a_periodic_plane():
     assert np.array_equal(moved.box_measure, result.box_measure)
 
 
-def test_aligned_boxes_are_blocks_of_the_first_grid():
+def test_aligned_cover_counts_blocks():
     cells = np.random.default_rng(4).random((21, 34)) < 0.05
     sizes = [1, 2, 3, 4, 6, 8, 16, 32]
     result = fc.domains.box_counts(as_mask(cells), sizes, cover="aligned")
@@ -112,8 +109,8 @@ def test_aligned_boxes_are_blocks_of_the_first_grid():
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_lattice_sets_on_their_own_grid_are_exact(name):
-    level, ratio = SIDE[name], base(name)
+def test_lattice_sets_are_exact_on_their_grid(name):
+    level, ratio = SIDE[name], ratio_of(name)
     scales = [ratio**k for k in range(level + 1)]
     for cover in ("minimum", "aligned"):
         result = fc.domains.box_dimension(as_mask(lattice_set(name, level)), scales=scales, cover=cover)
@@ -123,8 +120,8 @@ def test_lattice_sets_on_their_own_grid_are_exact(name):
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_lattice_sets_placed_anywhere_are_exact_on_their_own_ladder(name):
-    level, ratio = SIDE[name], base(name)
+def test_lattice_sets_are_exact_anywhere_at_their_own_scales(name):
+    level, ratio = SIDE[name], ratio_of(name)
     plane = placed(lattice_set(name, level), 1024, np.random.default_rng(5))
     result = fc.domains.box_dimension(as_mask(plane), scales=[ratio**k for k in range(level + 1)])
     assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-10)
@@ -134,7 +131,7 @@ def test_lattice_sets_placed_anywhere_are_exact_on_their_own_ladder(name):
     ("name", "allowed"),
     [("carpet", 0.08), ("cantor_dust", 0.12), ("vicsek", 0.08), ("gasket", 0.08), ("koch", 0.03)],
 )
-def test_default_call_finds_the_dimension_and_its_interval_holds_it(name, allowed):
+def test_default_dimension_and_interval_of_known_sets(name, allowed):
     rng = np.random.default_rng(6)
     for _ in range(2):
         plane = koch_raster(1024, rng) if name == "koch" else placed(lattice_set(name, SIDE[name]), 1024, rng)
@@ -146,7 +143,7 @@ def test_default_call_finds_the_dimension_and_its_interval_holds_it(name, allowe
 @pytest.mark.slow
 @pytest.mark.parametrize("cover", ["minimum", "mean"])
 @pytest.mark.parametrize("n", [250, 512, 729, 1024])
-def test_interval_holds_the_dimension_of_fractals_placed_anywhere(n, cover):
+def test_interval_covers_fractals_placed_anywhere(n, cover):
     rng = np.random.default_rng(n)
     inside = []
     for _ in range(10):
@@ -168,7 +165,7 @@ def test_interval_holds_the_dimension_of_fractals_placed_anywhere(n, cover):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cover", ["minimum", "mean"])
-def test_interval_holds_the_dimension_of_sets_of_every_kind(cover):
+def test_interval_covers_many_families_of_sets(cover):
     rng = np.random.default_rng(77)
     inside = []
     for n in (100, 250, 512):
@@ -184,7 +181,7 @@ def test_interval_holds_the_dimension_of_sets_of_every_kind(cover):
                 turned = (np.rot90(cells, rng.integers(4)) for cells in (fixed, drawn))
                 sets += [(np.log(keep) / np.log(ratio), placed(cells, n, rng)) for cells in turned]
         for ratio, keep in ((2, 0.7), (2, 0.85), (3, 0.6)):
-            cells = thinned(keep, ratio, int(np.log(n) / np.log(ratio) + 1e-9), rng)
+            cells = fractal_percolation(keep, ratio, int(np.log(n) / np.log(ratio) + 1e-9), rng)
             sets.append((2 + np.log(keep) / np.log(ratio), placed(cells, n, rng)))
         for dimension, cells in sets:
             result = fc.domains.box_dimension(as_mask(cells), cover=cover)
@@ -196,7 +193,7 @@ def test_interval_holds_the_dimension_of_sets_of_every_kind(cover):
     "shape", [(3, 3), (4, 4), (9, 9), (27, 27), (100, 37), (250, 250), (509, 509), (64, 128)]
 )
 @pytest.mark.parametrize("wraps", [False, True])
-def test_cell_row_column_and_full_mask_are_exact_wherever_they_lie(shape, wraps):
+def test_cell_row_column_and_full_mask_are_exact(shape, wraps):
     ny, nx = shape
     for y, x in ((0, 0), (ny // 2, nx // 3), (ny - 1, nx - 1)):
         planes = np.zeros((4, ny, nx), bool)
@@ -209,20 +206,20 @@ def test_cell_row_column_and_full_mask_are_exact_wherever_they_lie(shape, wraps)
             assert np.isnan(result.ci_low).all()
 
 
-def test_mean_cover_is_exact_in_the_same_limits():
+def test_mean_cover_of_cell_row_column_and_full_mask():
     planes = np.zeros((4, 100, 37), bool)
     planes[0, 99, 0] = planes[1, 0] = planes[2, :, 5] = planes[3] = True
     result = fc.domains.box_dimension(as_mask(planes), cover="mean")
     assert result.box_dimension.values == pytest.approx([0, 1, 1, 2], abs=1e-14)
 
 
-def test_two_cells_far_apart_are_two_points():
+def test_two_distant_cells_have_dimension_zero():
     cells = np.zeros((64, 64), bool)
     cells[0, 3] = cells[63, 60] = True
     assert float(fc.domains.box_dimension(as_mask(cells)).box_dimension) == pytest.approx(0, abs=1e-12)
 
 
-def test_empty_planes_are_nan_with_the_reason_and_leave_the_others_alone():
+def test_empty_planes_are_nan_with_a_reason():
     planes = np.zeros((3, 20, 20), bool)
     planes[1] = True
     result = fc.domains.box_dimension(as_mask(planes))
@@ -233,7 +230,7 @@ def test_empty_planes_are_nan_with_the_reason_and_leave_the_others_alone():
     assert not result.differs_from_random.values.any()
 
 
-def test_mask_of_one_or_two_cells_says_why_it_has_no_dimension():
+def test_narrow_masks_are_nan_with_a_reason():
     for shape in ((1, 1), (1, 40)):
         mask = xr.DataArray(np.ones(shape, bool), dims=("y", "x"))
         result = fc.domains.box_dimension(mask)
@@ -252,14 +249,14 @@ def test_stack_equals_its_planes():
             assert np.array_equal(stack[name].values[0, k], alone[name].values)
 
 
-def test_transposing_and_mirroring_change_nothing():
+def test_transposed_and_mirrored_masks_have_the_same_counts():
     cells = level_set(60, 0.5, 0.2, np.random.default_rng(8))
     want = fc.domains.box_dimension(as_mask(cells)).box_measure.values
     for other in (cells.T, cells[::-1], cells[:, ::-1]):
         assert np.array_equal(fc.domains.box_dimension(as_mask(other)).box_measure.values, want)
 
 
-def test_unit_of_length_changes_only_the_length_of_the_boxes():
+def test_unit_of_length_changes_only_box_length():
     cells = level_set(48, 0.5, 0.2, np.random.default_rng(9))
     one, other = (fc.domains.box_dimension(as_mask(cells, (s, 4 * s))) for s in (1.0, 2.0**-30))
     assert np.array_equal(one.box_dimension, other.box_dimension)
@@ -267,7 +264,7 @@ def test_unit_of_length_changes_only_the_length_of_the_boxes():
     assert float(one.box_length[0]) == 2.0  # the side of a square as large as a cell of 1 m x 4 m
 
 
-def test_counts_do_not_depend_on_the_number_of_threads():
+def test_result_is_independent_of_the_number_of_threads():
     from fractalcontact.base.threads import limit
 
     planes = np.array([level_set(64, 0.5, c, np.random.default_rng(10)) for c in (0.1, 0.4)])
@@ -278,58 +275,7 @@ def test_counts_do_not_depend_on_the_number_of_threads():
     assert results[0].identical(results[1].assign_attrs(results[0].attrs))
 
 
-def test_dust_probability_against_exact_fractions():
-    from fractions import Fraction
-    from math import comb
-
-    rng = np.random.default_rng(11)
-    for _ in range(300):
-        observed = int(rng.integers(2, 4000))
-        cells, region = (int(rng.integers(0, min(observed, top) + 1)) for top in (observed, 60))
-        exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
-        probability = _random_null.miss_probability(cells, observed, np.array(region))
-        assert probability == pytest.approx(exact, rel=1e-11, abs=1e-14)
-
-
-def test_dust_counts_and_their_spread_against_dusts():
-    rng = np.random.default_rng(12)
-    planes = np.array([random_dust(64, 200, rng) for _ in range(400)])
-    scales = [1, 2, 4, 8, 16]
-    result = fc.domains.box_dimension(as_mask(planes), scales=scales, cover="aligned")
-    measured = result.box_count.values
-    error = measured.std(0) / 20
-    assert np.all(np.abs(measured.mean(0) - result.null_count.values[0]) <= 4 * error + 1e-4)
-    assert float(result.null_spread[0]) == pytest.approx(result.box_dimension.values.std(), rel=0.15)
-    assert float(result.null_dimension[0]) == pytest.approx(
-        result.box_dimension.values.mean(), abs=4 * float(result.null_spread[0]) / 20
-    )
-
-
-def test_dust_of_one_cell_and_of_all_cells():
-    planes = np.zeros((2, 50, 50), bool)
-    planes[0, 7, 7] = planes[1] = True
-    result = fc.domains.box_dimension(as_mask(planes))
-    assert result.null_dimension.values == pytest.approx([0, 2], abs=1e-12)
-
-
-@pytest.mark.parametrize("coverage", [0.003, 0.02, 0.06, 0.2, 0.4])
-def test_islands_tell_themselves_from_a_dust(coverage):
-    rng = np.random.default_rng(13)
-    for hurst in (0.3, 0.8):
-        result = fc.domains.box_dimension(as_mask(level_set(256, hurst, coverage, rng)))
-        assert bool(result.differs_from_random)
-        if coverage < 0.1:
-            assert float(result.box_dimension) > float(result.null_dimension) + 5 * float(result.null_spread)
-
-
-def test_dusts_are_hardly_ever_taken_for_more():
-    rng = np.random.default_rng(14)
-    for cells in (2, 5, 20, 100, 800, 2000, 3900):
-        planes = np.array([random_dust(64, cells, rng) for _ in range(100)])
-        assert fc.domains.box_dimension(as_mask(planes)).differs_from_random.values.mean() <= 0.02
-
-
-def test_unobserved_cells_are_in_no_set_and_leave_full_planes_full():
+def test_unobserved_cells_keep_a_full_plane_full():
     rng = np.random.default_rng(15)
     valid = rng.random((60, 60)) < 0.8
     valid[20:35, 30:50] = False
@@ -345,26 +291,31 @@ def test_unobserved_cells_are_in_no_set_and_leave_full_planes_full():
     assert one.box_measure.identical(other.box_measure)
 
 
-def test_gaps_shift_the_dimension_little():
+def test_unobserved_cells_change_the_dimension_little():
     rng = np.random.default_rng(16)
     cells = level_set(256, 0.5, 0.3, rng)
-    whole = fc.domains.box_dimension(as_mask(cells))
+    complete = fc.domains.box_dimension(as_mask(cells))
     gappy = fc.domains.box_dimension(as_mask(cells), valid=as_mask(rng.random((256, 256)) < 0.9))
-    assert float(gappy.box_dimension) == pytest.approx(float(whole.box_dimension), abs=0.06)
+    assert float(gappy.box_dimension) == pytest.approx(float(complete.box_dimension), abs=0.06)
     assert bool(gappy.differs_from_random)
-    dust = fc.domains.box_dimension(
-        as_mask(random_dust(256, 3000, rng)), valid=as_mask(rng.random((256, 256)) < 0.9)
+    null = fc.domains.box_dimension(
+        as_mask(random_null(256, 3000, rng)), valid=as_mask(rng.random((256, 256)) < 0.9)
     )
-    assert not bool(dust.differs_from_random)
+    assert not bool(null.differs_from_random)
 
 
-def test_default_sizes_follow_their_rule():
-    assert default_sizes((1024, 1024)).tolist() == [1, 2, 3, 4, 6, 8, 9, 12, 16, 18, 24, 27, 32]
-    assert default_sizes((250, 250)).tolist() == [1, 2, 3, 4, 6, 8, 9, 12]
-    assert default_sizes((3, 100)).tolist() == [1, 2, 3]
+def test_default_sizes_are_products_of_two_and_three():
+    for shape, sizes in (
+        ((1024, 1024), [1, 2, 3, 4, 6, 8, 9, 12, 16, 18, 24, 27, 32]),
+        ((250, 250), [1, 2, 3, 4, 6, 8, 9, 12]),
+        ((3, 100), [1, 2, 3]),
+    ):
+        mask = as_mask(np.zeros(shape))
+        assert fc.domains.box_dimension(mask).box_size.values.tolist() == sizes
+        assert fc.domains.correlation_dimension(mask).box_size.values.tolist() == sizes
 
 
-def test_windows_and_labels():
+def test_chosen_scales_and_labels():
     result = fc.domains.box_dimension(as_mask(lattice_set("carpet", 3)), scales=[9, 1, 3, 3])
     assert result.box_size.values.tolist() == [1, 3, 9]
     assert (float(result.scale_min), float(result.scale_max)) == (1, 9)
@@ -374,34 +325,10 @@ def test_windows_and_labels():
     assert "standard deviations" in result.ci_low.attrs["long_name"]
 
 
-def test_wrong_calls_list_everything():
+def test_all_invalid_arguments_are_reported():
     mask = as_mask(np.ones((8, 8)))
     with pytest.raises(fc.base.errors.InvalidInput) as caught:
         fc.domains.box_dimension(mask, scales=[0, 2.5, 99], cover="most", periodic=True)
     text = str(caught.value)
     for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "expected integers"):
         assert word in text
-
-
-@pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
-@pytest.mark.parametrize("coverage", [0.02, 0.3, 0.7])
-def test_a_dust_seen_through_gaps_is_a_dust(wraps, coverage):
-    rng = np.random.default_rng(12)
-    n, sizes = 60, [1, 2, 3, 4, 6]
-    valid = ndimage.gaussian_filter(rng.random((n, n)), 2, mode="wrap") > 0.49
-    places = np.flatnonzero(valid)
-    planes = np.zeros((150, n * n), bool)
-    for plane in planes:
-        plane[rng.choice(places, int(coverage * places.size), replace=False)] = True
-    masks = as_mask(planes.reshape(-1, n, n), periodic=wraps)
-    seen = as_mask(valid, periodic=wraps)
-    result = fc.domains.box_dimension(masks, scales=sizes, cover="mean", valid=seen)
-    counts, null = result.box_measure.values, result.null_count.values[0]
-    error = counts.std(0, ddof=1) / np.sqrt(len(counts))
-    assert np.all(np.abs(counts.mean(0) - null) <= 4 * error + 1e-9)
-    assert result.differs_from_random.values.mean() <= 0.01
-    deviation = result.box_dimension.values.std(ddof=1)
-    assert 0.8 * deviation <= float(result.null_spread[0]) <= 4 * deviation
-    clustered = ndimage.gaussian_filter(rng.random((n, n)), 1, mode="wrap")
-    clusters = as_mask(clustered > np.quantile(clustered[valid], 1 - coverage), periodic=wraps)
-    assert fc.domains.box_dimension(clusters, valid=seen).differs_from_random

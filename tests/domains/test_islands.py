@@ -1,4 +1,4 @@
-"""Islands and percolation: hand-made planes, other libraries, slow graphs, what rolling must not change."""
+"""Islands: hand-made planes, another library, slow graphs, invariance under periodic shifts."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def slow_labels(cells, connectivity, wraps):
 
 
 @pytest.mark.parametrize("connectivity", [1, 2])
-def test_free_planes_against_another_library(connectivity):
+def test_free_planes_match_scikit_image(connectivity):
     rng = np.random.default_rng(1)
     for _ in range(6):
         cells = rng.random((20, 17)) < rng.random()
@@ -52,7 +52,7 @@ def test_free_planes_against_another_library(connectivity):
 
 @pytest.mark.parametrize("connectivity", [1, 2])
 @pytest.mark.parametrize("wraps", [(True, True), (True, False), (False, True)])
-def test_periodic_planes_against_a_graph_and_against_their_own_shift(connectivity, wraps):
+def test_periodic_planes_match_a_graph_and_their_shift(connectivity, wraps):
     rng = np.random.default_rng(2)
     for _ in range(5):
         cells = rng.random((20, 17)) < rng.uniform(0.2, 0.7)
@@ -66,10 +66,10 @@ def test_periodic_planes_against_a_graph_and_against_their_own_shift(connectivit
         assert int(moved.euler_number) == int(result.euler_number)
         for name in ("area", "perimeter"):
             assert np.array_equal(np.sort(result[name]), np.sort(moved[name]))
-        one, other = (
+        own, shifted = (
             sorted(zip(*columns(r, where), strict=True)) for r, where in ((result, shift), (moved, (0, 0)))
         )
-        assert np.array(one) == pytest.approx(np.array(other), nan_ok=True)
+        assert np.array(own) == pytest.approx(np.array(shifted), nan_ok=True)
 
 
 def columns(result, shift):
@@ -82,16 +82,16 @@ def columns(result, shift):
 
 @pytest.mark.parametrize("connectivity", [1, 2])
 @pytest.mark.parametrize("wraps", [(False, False), (True, True), (False, True)])
-def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, monkeypatch):
-    from fractalcontact.domains import _connected_components as _labels
+def test_bands_give_the_same_table(connectivity, wraps, monkeypatch):
+    from fractalcontact.domains import _connected_components
 
     rng = np.random.default_rng(6)
     for density in (0.2, 0.5, 0.7):
         mask = as_mask(rng.random((2, 23, 17)) < density, (1.0, 2.0), wraps)
-        whole = fc.domains.islands(mask, connectivity=connectivity)
+        complete = fc.domains.islands(mask, connectivity=connectivity)
         crossed = fc.domains.percolation(mask, connectivity=connectivity)
         with monkeypatch.context() as patch:
-            patch.setattr(_labels, "BAND_CELLS", 3 * 17)
+            patch.setattr(_connected_components, "BAND_CELLS", 3 * 17)
             bands = fc.domains.islands(mask, connectivity=connectivity, keep=())
             assert crossed.percolates.identical(
                 fc.domains.percolation(mask, connectivity=connectivity).percolates
@@ -99,37 +99,37 @@ def test_planes_gone_through_in_bands_give_the_same_table(connectivity, wraps, m
         assert "label" not in bands
         for name in bands.data_vars:
             if name != "run_time":
-                assert np.array_equal(bands[name], whole[name], equal_nan=True), name
+                assert np.array_equal(bands[name], complete[name], equal_nan=True), name
 
 
 TABLE = ["cells", "area", "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max"]
 
 
-def test_only_the_wanted_columns_are_measured(monkeypatch):
-    from fractalcontact.domains import _connected_components as _labels
+def test_table_has_the_wanted_columns(monkeypatch):
+    from fractalcontact.domains import _connected_components
 
     mask = as_mask(np.random.default_rng(9).random((2, 30, 20)) < 0.4, periodic=(True, False))
-    whole = fc.domains.islands(mask, keep=()).drop_vars("run_time")
+    complete = fc.domains.islands(mask, keep=()).drop_vars("run_time")
     none = fc.domains.islands(mask, keep=(), table=()).drop_vars("run_time")
-    assert none.identical(whole.drop_dims("island").assign_attrs(none.attrs))
+    assert none.identical(complete.drop_dims("island").assign_attrs(none.attrs))
     for columns in (["area"], ["y_max", "cells"], ["perimeter"]):
         some = fc.domains.islands(mask, keep=(), table=columns).drop_vars("run_time")
-        assert some.identical(whole.drop_vars(set(TABLE) - set(columns)).assign_attrs(some.attrs))
+        assert some.identical(complete.drop_vars(set(TABLE) - set(columns)).assign_attrs(some.attrs))
     with pytest.raises(ValueError, match="table: expected words out of 'cells', 'area'"):
         fc.domains.islands(mask, table=["hue"])
-    most = int(whole.n_islands.max())
+    most = int(complete.n_islands.max())
     with monkeypatch.context() as patch:
-        patch.setattr(_labels, "BAND_CELLS", 3 * 20)
-        patch.setattr(_labels, "MANY_ISLANDS", most - 1)
+        patch.setattr(_connected_components, "BAND_CELLS", 3 * 20)
+        patch.setattr(_connected_components, "MANY_ISLANDS", most - 1)
         few = fc.domains.islands(mask, keep=()).drop_vars("run_time")
         assert "name the columns" in few.n_islands.comment
         del few.n_islands.attrs["comment"]
-        assert few.identical(whole.drop_vars(TABLE[2:]).assign_attrs(few.attrs))
+        assert few.identical(complete.drop_vars(TABLE[2:]).assign_attrs(few.attrs))
         all_of_them = fc.domains.islands(mask, keep=(), table=TABLE).drop_vars("run_time")
-        assert all_of_them.identical(whole.assign_attrs(all_of_them.attrs))
+        assert all_of_them.identical(complete.assign_attrs(all_of_them.attrs))
 
 
-def test_chunked_masks_give_what_whole_ones_give():
+def test_chunked_masks_give_the_same_results():
     pytest.importorskip("dask")
     mask = as_mask(np.random.default_rng(7).random((2, 30, 20)) < 0.4)
     valid = as_mask(np.random.default_rng(8).random((30, 20)) < 0.9)
@@ -139,7 +139,7 @@ def test_chunked_masks_give_what_whole_ones_give():
         assert one.identical(other.assign_attrs(one.attrs))
 
 
-def test_island_over_the_edges_keeps_its_centroid_and_box():
+def test_centroid_and_box_of_an_island_across_the_edges():
     cells = np.zeros((8, 10), bool)
     cells[np.ix_([7, 0], [9, 0, 1])] = True
     result = fc.domains.islands(as_mask(cells, (1.0, 2.0), (True, True))).isel(island=0)
@@ -148,7 +148,7 @@ def test_island_over_the_edges_keeps_its_centroid_and_box():
     assert float(result.perimeter) == 2 * (2 * 1 + 3 * 2)
 
 
-def test_island_round_the_period_spans_it_and_has_no_centroid_there():
+def test_island_that_wraps_around_has_no_centroid():
     cells = np.zeros((9, 6), bool)
     cells[4] = True
     result = fc.domains.islands(as_mask(cells, (1.0, 1.0), (True, True))).isel(island=0)
@@ -157,7 +157,7 @@ def test_island_round_the_period_spans_it_and_has_no_centroid_there():
     assert (float(result.x_min), float(result.x_max), float(result.perimeter)) == (0, 6, 12)
 
 
-def test_table_of_a_stack_says_where_every_island_is():
+def test_table_of_a_stack_has_coordinates_of_the_plane():
     planes = np.zeros((2, 3, 6, 6), bool)
     planes[0, 1, 2, 2] = planes[1, 2, 0, 0] = planes[1, 2, 4, 4:6] = True
     mask = as_mask(planes, dims=("seed", "step", "y", "x")).assign_coords(
@@ -176,7 +176,7 @@ def test_table_of_a_stack_says_where_every_island_is():
         assert result[name].attrs["long_name"]
 
 
-def test_masks_without_coordinates_have_cells_and_no_metres():
+def test_lengths_are_nan_without_coordinates():
     mask = xr.DataArray(np.eye(5, dtype=bool), dims=("y", "x"))
     result = fc.domains.islands(mask, connectivity=2)
     assert result.cells.values.tolist() == [5]
@@ -189,7 +189,7 @@ def test_masks_without_coordinates_have_cells_and_no_metres():
     )
 
 
-def test_unobserved_cells_are_in_no_island():
+def test_unobserved_cells_separate_islands():
     valid = np.ones((5, 5), bool)
     valid[2] = False
     assert int(fc.domains.islands(as_mask(np.ones((5, 5))), valid=as_mask(valid)).n_islands) == 2
@@ -204,95 +204,13 @@ def test_euler_number_counts_holes_and_handles():
     assert int(fc.domains.islands(as_mask(full, periodic=(True, True))).euler_number) == 0  # a torus
 
 
-def test_percolation_of_plain_shapes():
-    row, gap = np.zeros((9, 9), bool), np.zeros((9, 9), bool)
-    row[4] = gap[4] = True
-    gap[4, 4] = False
-    for wraps in ((False, False), (True, True)):
-        result = fc.domains.percolation(as_mask(np.array([row, row.T, gap, row & False]), periodic=wraps))
-        assert result.percolates.values.tolist() == [
-            [True, False],
-            [False, True],
-            [False, False],
-            [False, False],
-        ]
-    assert result.axis.values.tolist() == ["x", "y"]
-    assert result.largest_share.values[:3].tolist() == [1, 1, 1]
-    assert np.isnan(result.largest_share[3])
-
-
-def test_percolation_names_and_minds_the_neighbours():
-    diagonal = as_mask(np.eye(7))
-    assert not fc.domains.percolation(diagonal).percolates.any()
-    result = fc.domains.percolation(diagonal, connectivity=2)
-    assert result.percolates.all()
-    assert "8 neighbours" in result.percolates.attrs["long_name"]
-
-
-def test_touching_both_ends_is_not_going_round():
-    cells = np.zeros((9, 9), bool)
-    cells[0:4, 2] = cells[6:, 2] = True
-    assert not fc.domains.percolation(as_mask(cells, periodic=(True, True))).percolates.any()
-
-
-@pytest.mark.parametrize(("turns_y", "turns_x"), [(1, 2), (2, 1), (3, 2), (1, 6)])
-def test_spirals_go_round_both_ways(turns_y, turns_x):
-    n = 60
-    cells = np.zeros((n, n), bool)
-    along = np.arange(n * max(turns_y, turns_x) * 4)
-    y, x = (np.floor(along * turns / along.size * n).astype(int) for turns in (turns_y, turns_x))
-    cells[y % n, x % n] = True
-    result = fc.domains.percolation(as_mask(cells, periodic=(True, True)), connectivity=2)
-    assert result.percolates.all()
-    assert int(fc.domains.islands(as_mask(cells, periodic=(True, True)), connectivity=2).n_islands) == 1
-
-
-def test_crossing_with_four_neighbours_shuts_off_the_complement_with_eight():
-    rng = np.random.default_rng(3)
-    for _ in range(30):
-        cells = rng.random((12, 12)) < 0.55
-        across = fc.domains.percolation(as_mask(cells)).percolates.values[0]
-        shut = not fc.domains.percolation(as_mask(~cells), connectivity=2).percolates.values[1]
-        assert across == shut
-
-
-def test_site_percolation_sets_in_at_its_threshold():
-    rng = np.random.default_rng(4)
-    shares = [
-        np.mean(
-            [fc.domains.percolation(as_mask(rng.random((128, 128)) < p)).percolates[0] for _ in range(10)]
-        )
-        for p in (0.55, 0.64)
-    ]
-    assert shares == [0, 1]
-
-
-def test_published_numbers_of_site_percolation_on_the_torus():
-    # wrapping: Newman and Ziff, Phys. Rev. Lett. 85:4104 (2000), from Pinson (1994); number of clusters:
-    # Ziff, Finch and Adamchik, Phys. Rev. Lett. 79:3447 (1997)
-    rng = np.random.default_rng(5)
-    n, planes = 32, 400
-    mask = as_mask(rng.random((planes, n, n)) < 0.59274605, periodic=(True, True))
-    along = fc.domains.percolation(mask).percolates.values
-    for share, published in (
-        (along[:, 0].mean(), 0.521058290),
-        (along[:, 1].mean(), 0.521058290),
-        (along.any(-1).mean(), 0.690473725),
-        (along.all(-1).mean(), 0.351642855),
-    ):
-        assert share == pytest.approx(published, abs=4 * np.sqrt(published * (1 - published) / planes))
-    found = fc.domains.islands(mask, keep=()).n_islands.values
-    published = 0.0275981 * n**2 + 0.8835
-    assert found.mean() == pytest.approx(published, abs=4 * found.std() / np.sqrt(planes))
-
-
 def test_largest_island_grows_with_load():
     planes = np.array([level_set(64, 0.8, c, np.random.default_rng(5)) for c in (0.05, 0.2, 0.6)])
     result = fc.domains.islands(as_mask(planes, periodic=(True, True)))
     assert np.all(np.diff(result.largest_cells.values) > 0)
 
 
-def test_wrong_calls_list_everything():
+def test_all_invalid_arguments_are_reported():
     with pytest.raises(ValueError) as caught:
         fc.domains.islands(as_mask(np.ones((5, 5))).astype(float), connectivity=3)
     assert "connectivity" in str(caught.value)

@@ -1,0 +1,86 @@
+"""The random null beside the box dimension: exact probabilities, realisations, its power against islands."""
+
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import pytest
+from domains.sets import as_mask, level_set, random_null
+from scipy import ndimage
+
+import fractalcontact as fc
+
+
+def test_null_counts_match_exact_fractions():
+    rng = np.random.default_rng(11)
+    for _ in range(300):
+        ny, nx = (int(n) for n in rng.integers(2, 64, 2))
+        observed, size = ny * nx, int(rng.integers(1, min(ny, nx, 8) + 1))
+        cells, region = int(rng.integers(0, observed + 1)), size**2
+        mask = as_mask((rng.permutation(observed) < cells).reshape(ny, nx))
+        result = fc.domains.box_dimension(mask, scales=[size], cover="aligned")
+        missed = 1.0 - float(result.null_count[0]) * region / observed
+        exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
+        assert missed == pytest.approx(exact, rel=1e-11, abs=1e-14)
+
+
+def test_null_counts_and_spread_match_realisations():
+    rng = np.random.default_rng(12)
+    planes = np.array([random_null(64, 200, rng) for _ in range(400)])
+    scales = [1, 2, 4, 8, 16]
+    result = fc.domains.box_dimension(as_mask(planes), scales=scales, cover="aligned")
+    measured = result.box_count.values
+    error = measured.std(0) / 20
+    assert np.all(np.abs(measured.mean(0) - result.null_count.values[0]) <= 4 * error + 1e-4)
+    assert float(result.null_spread[0]) == pytest.approx(result.box_dimension.values.std(), rel=0.15)
+    assert float(result.null_dimension[0]) == pytest.approx(
+        result.box_dimension.values.mean(), abs=4 * float(result.null_spread[0]) / 20
+    )
+
+
+def test_null_of_one_cell_and_of_all_cells():
+    planes = np.zeros((2, 50, 50), bool)
+    planes[0, 7, 7] = planes[1] = True
+    result = fc.domains.box_dimension(as_mask(planes))
+    assert result.null_dimension.values == pytest.approx([0, 2], abs=1e-12)
+
+
+@pytest.mark.parametrize("coverage", [0.003, 0.02, 0.06, 0.2, 0.4])
+def test_level_sets_differ_from_the_null(coverage):
+    rng = np.random.default_rng(13)
+    for hurst in (0.3, 0.8):
+        result = fc.domains.box_dimension(as_mask(level_set(256, hurst, coverage, rng)))
+        assert bool(result.differs_from_random)
+        if coverage < 0.1:
+            assert float(result.box_dimension) > float(result.null_dimension) + 5 * float(result.null_spread)
+
+
+def test_realisations_of_the_null_rarely_differ_from_it():
+    rng = np.random.default_rng(14)
+    for cells in (2, 5, 20, 100, 800, 2000, 3900):
+        planes = np.array([random_null(64, cells, rng) for _ in range(100)])
+        assert fc.domains.box_dimension(as_mask(planes)).differs_from_random.values.mean() <= 0.02
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize("coverage", [0.02, 0.3, 0.7])
+def test_null_with_unobserved_cells_matches_realisations(wraps, coverage):
+    rng = np.random.default_rng(12)
+    n, sizes = 60, [1, 2, 3, 4, 6]
+    valid = ndimage.gaussian_filter(rng.random((n, n)), 2, mode="wrap") > 0.49
+    places = np.flatnonzero(valid)
+    planes = np.zeros((150, n * n), bool)
+    for plane in planes:
+        plane[rng.choice(places, int(coverage * places.size), replace=False)] = True
+    masks = as_mask(planes.reshape(-1, n, n), periodic=wraps)
+    seen = as_mask(valid, periodic=wraps)
+    result = fc.domains.box_dimension(masks, scales=sizes, cover="mean", valid=seen)
+    counts, null = result.box_measure.values, result.null_count.values[0]
+    error = counts.std(0, ddof=1) / np.sqrt(len(counts))
+    assert np.all(np.abs(counts.mean(0) - null) <= 4 * error + 1e-9)
+    assert result.differs_from_random.values.mean() <= 0.01
+    deviation = result.box_dimension.values.std(ddof=1)
+    assert 0.8 * deviation <= float(result.null_spread[0]) <= 4 * deviation
+    clustered = ndimage.gaussian_filter(rng.random((n, n)), 1, mode="wrap")
+    clusters = as_mask(clustered > np.quantile(clustered[valid], 1 - coverage), periodic=wraps)
+    assert fc.domains.box_dimension(clusters, valid=seen).differs_from_random
