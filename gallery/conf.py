@@ -46,7 +46,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"[\\/]plot_",
     "ignore_pattern": r"(conf|site_parts|shared_study|__init__)\.py$",
-    "within_subsection_order": "FileNameSortKey",
+    "within_subsection_order": "ExampleTitleSortKey",
     "nested_sections": False,
     "image_scrapers": ("site_parts",),
     "reset_modules": (),

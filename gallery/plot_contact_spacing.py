@@ -21,6 +21,7 @@ FREE = {
     "square": {"influence": "square"},
 }
 RADII = np.array([5, 10, 20, 40])  # of the contact, in spacings
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")  # distinguishable with any colour vision
 POSITIONS = 6  # random positions of the centre between the grid points
 
 
@@ -122,7 +123,7 @@ for ax, name in zip(axes.flat, error, strict=True):
     for number, influence in enumerate([*FREE, "spectral"]):
         if influence in error["influence"] and error[name].sel(influence=influence).notnull().all():
             ax.loglog(
-                RADII, error[name].sel(influence=influence), "o-", ms=3, c=f"C{number}", label=influence
+                RADII, error[name].sel(influence=influence), "o-", ms=3, c=COLOURS[number], label=influence
             )
     largest = float(error[name].max())
     for slope, style in ((1, ":"), (2, "--")):
@@ -130,9 +131,9 @@ for ax, name in zip(axes.flat, error, strict=True):
     ax.set_title(name, fontsize="medium")
     ax.spines[["top", "right"]].set_visible(False)
 for ax in axes[-1]:
-    ax.set_xlabel("radius or half wavelength / spacing")
     ax.set_xticks(RADII, [str(radius) for radius in RADII])
     ax.minorticks_off()
+figure.supxlabel("radius or half wavelength / spacing", fontsize="medium")
 for ax in axes[:, 0]:
     ax.set_ylabel("error")
 handles = {

@@ -50,6 +50,7 @@ print(errors)
 figure = Figure(figsize=(8.4, 3.2), layout="constrained")
 axes = figure.subplots(1, 3, sharex=True)
 for ax, name in zip(axes, names[1:], strict=True):
+    ax.set_prop_cycle(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])  # for any colour vision
     for case in cases:
         curve = errors.sel(case=case)
         ax.loglog(curve["residual"], curve[name].where(curve[name] > 0), "o-", ms=3, label=case)

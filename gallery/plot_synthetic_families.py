@@ -45,6 +45,8 @@ for family in SIZE:
 
 variograms = Figure(figsize=(9.2, 3.6), layout="constrained")
 left, right = variograms.subplots(1, 2)
+for ax in (left, right):
+    ax.set_prop_cycle(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])  # for any colour vision
 for family, mean in means.items():
     lag = mean.lag * 1e6
     compensated = mean / mean.lag ** (2 * HURST)
