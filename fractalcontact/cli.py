@@ -72,29 +72,34 @@ def _parser() -> argparse.ArgumentParser:
 
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
     accuracy.add_argument(
-        "parts",
+        "names",
         nargs="*",
-        help="surfaces, dimensions, contact, domains, joints; all if none is named; or estimators alone: "
-        "bias, error over the least possible one and coverage of every estimator of roughness",
+        metavar="NAME",
+        help="surfaces, dimensions, contact, domains, joints: error against run time of their methods "
+        "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
+        "of roughness; with --extreme, names of cases",
     )
     accuracy.add_argument(
         "-o",
         "--out",
-        help="folder for the results (NetCDF) and their figures; "
-        "estimators are kept case by case, and the same command goes on after a stop",
+        help="folder for the results (NetCDF) and figures; after a stop of `estimators` the same command "
+        "continues",
     )
     accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
-    accuracy.add_argument("--extreme", action="store_true", help="run the catalogue of extreme cases instead")
     accuracy.add_argument(
-        "--large", action="store_true", help="with --extreme: those of minutes and gigabytes too"
+        "--extreme",
+        action="store_true",
+        help="run the catalogue of extreme cases instead, or the cases named",
     )
-    accuracy.add_argument("--curves", metavar="FILE", help="write the curves that scenes choose from")
-    bench = accuracy.add_argument_group("of estimators")
+    accuracy.add_argument(
+        "--large", action="store_true", help="with --extreme: also the cases of minutes and gigabytes"
+    )
+    bench = accuracy.add_argument_group("estimators")
     bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
     bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (64 256 1024)")
-    bench.add_argument("--families", nargs="+", help="fbm, spectral; both if none is named")
-    bench.add_argument("--methods", nargs="+", help="names out of `fractalcontact methods`; all of them")
-    bench.add_argument("--members", type=int, nargs="+", help="surfaces of each case (25600 over the size)")
+    bench.add_argument("--families", nargs="+", help="fbm, spectral (default: both)")
+    bench.add_argument("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
+    bench.add_argument("--members", type=int, nargs="+", help="surfaces for each case (25600 over the size)")
     bench.add_argument("--seed", type=int, help="of the random stream")
     accuracy.set_defaults(action=_accuracy)
 
@@ -169,38 +174,38 @@ def _told(line: str, problems: Sequence[str]) -> bool:
 
 
 def _accuracy(options: argparse.Namespace) -> int:
-    from fractalcontact import accuracy
-    from fractalcontact.accuracy.reporting import curves_table
-
-    _check_accuracy(options)
+    if options.large and not options.extreme:
+        raise InvalidInput("fractalcontact accuracy", ["--large: expected only with --extreme"])
     if options.out is not None:
         from fractalcontact.scenes.running import writable
 
-        writable(options.out)  # before the measuring, not after it
+        writable(options.out)  # before the measurement, not after it
     if options.extreme:
         return _extremes(options)
-    if options.parts == ["estimators"]:
+    if options.names == ["estimators"]:
         return _estimators(options)
-    with noted() as stop:
-        result = accuracy.measure(options.parts or None, budget=options.budget, progress=True, stop=stop)
-    print(curves_table(result))
-    if options.curves is not None and not stop:
-        from fractalcontact.accuracy.curves import write
+    return _error_against_time(options)
 
-        write(result, options.curves)
+
+def _error_against_time(options: argparse.Namespace) -> int:
+    from fractalcontact import accuracy
+
+    with noted() as stop:
+        result = accuracy.measure(options.names or None, budget=options.budget, progress=True, stop=stop)
+    print(accuracy.summary(result))
     if options.out is not None:
-        written = [_kept(result, Path(options.out) / "accuracy.nc", stop)]
+        written = [_save_accuracy(result, Path(options.out) / "accuracy.nc", stop)]
         for name, part in () if stop else result.children.items():
             from fractalcontact.plotting import error_against_time
 
             written.append(f"{name}.png")
             error_against_time(part.to_dataset()).savefig(Path(options.out) / written[-1], dpi=150)
         print(f"\nwritten to {options.out}: {', '.join(written)}")
-    return _ended(stop)
+    return _accuracy_exit_code(stop)
 
 
-def _kept(result: Any, target: Path, stop: Stop) -> str:
-    """Write a result and return the name of the file: another one where it is not whole."""
+def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
+    """Save a result and return the name of the file, which is another one where the run was stopped."""
     from fractalcontact.base.netcdf import save
     from fractalcontact.scenes.running import UNFINISHED
 
@@ -210,52 +215,33 @@ def _kept(result: Any, target: Path, stop: Stop) -> str:
     return save(result, target).name
 
 
-def _ended(stop: Stop) -> int:
-    """Return the exit code; raise if the work was cut short."""
+def _accuracy_exit_code(stop: Stop) -> int:
+    """Return 0; raise if the run was stopped."""
     if stop:
-        raise Stopped(stop.number, "what was measured by then is told")
+        raise Stopped(stop.number, "the results so far are printed above")
     return 0
 
 
 def _extremes(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
-    from fractalcontact.accuracy.reporting import cases_dataset, cases_table
-    from fractalcontact.accuracy.watching import examine_apart
 
-    names = [name for name, case in accuracy.cases.items() if options.large or not case.large]
     with noted() as stop:
-        findings = examine_apart(names, progress=True, stop=stop)
-    print(cases_table(findings))
-    if findings and options.out is not None:
-        result = cases_dataset(findings)
-        if stop:
-            missing = "; ".join(name for name in names if name not in findings)
-            result.attrs["completeness"] = f"partial: the run was stopped; missing: {missing}"
-        print(f"\nwritten to {options.out}: {_kept(result, Path(options.out) / 'extremes.nc', stop)}")
-    return _ended(stop) or int(not all(one.ok for found in findings.values() for one in found))
-
-
-def _check_accuracy(options: argparse.Namespace) -> None:
-    """Raise if words were given that would not be heard."""
-    from fractalcontact.base.checks import Problems
-
-    with Problems("fractalcontact accuracy") as problems:
-        if options.extreme:
-            problems.require(not options.parts, "parts", "none with --extreme", " ".join(options.parts))
-            problems.require(options.curves is None, "--curves", "nothing with --extreme", options.curves)
-        else:
-            problems.require(not options.large, "--large", "nothing without --extreme", "--large")
+        result = accuracy.extremes(options.names or None, large=options.large, progress=True, stop=stop)
+    print(accuracy.summary(result))
+    if result.sizes["result"] and options.out is not None:
+        name = _save_accuracy(result, Path(options.out) / "extremes.nc", stop)
+        print(f"\nwritten to {options.out}: {name}")
+    return _accuracy_exit_code(stop) or int(not result["passed"].all())
 
 
 def _estimators(options: argparse.Namespace) -> int:
     from fractalcontact import accuracy
-    from fractalcontact.accuracy.reporting import estimators_table
 
-    asked = {name: getattr(options, name) for name in ("hurst", "sizes", "families", "methods", "members")}
-    given = {name: values for name, values in asked.items() if values is not None}
+    names = ("hurst", "sizes", "families", "methods", "members")
+    arguments = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     file = None if options.out is None else Path(options.out) / "estimators.nc"
-    result = accuracy.estimators(**given, rng=options.seed, keep=file, progress=True)
-    print(estimators_table(result))
+    result = accuracy.estimators(**arguments, rng=options.seed, keep=file, progress=True)
+    print(accuracy.summary(result))
     if file is not None:
         from fractalcontact.plotting import estimator_errors
 

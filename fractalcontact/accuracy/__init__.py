@@ -1,8 +1,11 @@
-"""How right, how fast, and what happens at the edges.
+"""Accuracy: error against run time of every method, and the behaviour in extreme cases.
 
-cases      the catalogue of extreme surfaces and masks, with what is expected of each
-examine    every room's functions run on one case, held against what is expected
-measure    true error against run time of the methods, over their own knobs
+measure     true error against run time and memory of the methods of each subpackage
+estimators  bias, error over the Cramer-Rao bound and coverage of the estimators of the Hurst exponent
+cases       the catalogue of extreme surfaces, masks and calls, with what is expected of each
+examine     all functions run on one case and compared with what is expected
+extremes    the same for all cases, each in a child process with a time limit
+summary     any of these results as a text table
 """
 
 import lazy_loader

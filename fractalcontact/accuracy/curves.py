@@ -1,6 +1,6 @@
 """The measured curves that scenes choose from: error and seconds of methods over their knobs, in one file.
 
-The file is made by ``fractalcontact accuracy contact dimensions domains --budget 110 --curves FILE``.
+The file is made by ``python tests/benchmarks/autotune_curves.py FILE``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FILE = Path(__file__).with_name("curves.json")
 
@@ -55,19 +51,3 @@ def shipped() -> Mapping[str, Mapping[str, Curve]]:
         }
         for contest, found in whole.items()
     }
-
-
-def write(measured: xr.DataTree, path: str | Path) -> None:
-    """Write the curves of `fractalcontact.accuracy.measure` as the file that scenes choose from."""
-    whole: dict[str, dict[str, dict[str, list[float]]]] = {}
-    for node in measured.children.values():
-        data = node.to_dataset()
-        for method in data["method"].values:
-            one = data.sel({"method": method})
-            known = np.isfinite(one["error"].values) & (one["error"].values > 0)
-            if known.any():
-                whole.setdefault(str(one["contest"].values), {})[str(method)] = {
-                    key: [float(f"{value:.3g}") for value in one[name].values[known]]
-                    for key, name in (("knob", "knob"), ("error", "error"), ("seconds", "run_time"))
-                }
-    Path(path).write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")

@@ -10,8 +10,9 @@
 
 The function returns plain variables and coordinates with names of `base.schema`. Attributes `comment`,
 `reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
-entries of its provenance, except `title` and `references`, which replace those of the decorator, and
-`parameters`, a dict that replaces recorded arguments: a default that depends on others, a path to shorten.
+entries of its provenance, except `title` and `references`, which replace those of the decorator,
+`parameters`, a dict that replaces recorded arguments (a default that depends on others, a path to shorten), and
+`completeness`, which stays an attribute: it says what is missing of a result that was stopped.
 """
 
 from __future__ import annotations
@@ -91,8 +92,9 @@ def public_result(
             start = time.perf_counter()
             parameters = checked(*arguments, **options)
             result = function(*arguments, **options)
+            completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
-            result.attrs = {}
+            result.attrs = {} if completeness is None else {"completeness": completeness}
             parameters = parameters | entries.pop("parameters", {})
             if achieved_error is not None:
                 entries.setdefault("achieved_error", achieved_error)

@@ -1,0 +1,142 @@
+"""Solvers against Hertz (sphere), Westergaard (wave) and, on rough surfaces, a solution to rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact import contact, surfaces
+from fractalcontact.accuracy._benchmarks._benchmark import TOLERANCE, Array, Benchmark, Method
+
+MODULUS, RADIUS, APPROACH = 1e9, 1.0, 1e-4  # the sphere of Hertz: Pa, m, m
+SIZES = (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
+TOLERANCES = tuple(10.0**-k for k in range(2, 11))
+ROUGH_SIZE, PRESSURE, CLOSURE, HARDNESS, TIGHT = 128, 2e7, 1e-5, 1.5e8, 1e-13
+
+
+def benchmarks() -> tuple[Benchmark, ...]:
+    """Return the benchmarks of the contact solvers."""
+    return (_sphere_benchmark(), _wave_benchmark(), *_rough_benchmarks())
+
+
+def _sphere_benchmark() -> Benchmark:
+    solvers: dict[str, tuple[tuple[int, ...], dict[str, Any]]] = {
+        "elimination, disc": (SIZES[:6], {"method": "elimination", "influence": "disc"}),
+        "elimination, square": (SIZES[:6], {"method": "elimination", "influence": "square"}),
+        "fast, disc": (SIZES, {"influence": "disc"}),
+        "fast, inscribed disc": (SIZES, {"influence": "disc", "disc_radius": "inscribed"}),
+        "fast, disc of equal area": (SIZES, {"influence": "disc", "disc_radius": "equal_area"}),
+        "fast, square": (SIZES, {"influence": "square"}),
+    }
+    methods = tuple(
+        Method(name, sizes, _sphere, partial(_press_sphere, options), _hertz_error)
+        for name, (sizes, options) in solvers.items()
+    )
+    return Benchmark("sphere", "relative error of the force", "Hertz: 4/3 E* sqrt(R) d^1.5", methods)
+
+
+def _sphere(n: float) -> xr.DataArray:
+    contact_radius = np.sqrt(RADIUS * APPROACH)
+    x = (np.arange(int(n)) + 0.5) / n * 4.0 * contact_radius - 2.0 * contact_radius
+    # the approach is measured from the highest node, so the apex must be a node
+    x = x - x[int(n) // 2]
+    return surfaces.from_array(-(x**2 + x[:, None] ** 2) / (2.0 * RADIUS), 4.0 * contact_radius / n)
+
+
+def _press_sphere(options: dict[str, Any], surface: xr.DataArray) -> float:
+    pressed = contact.press(surface, contact_modulus=MODULUS, closure=APPROACH, keep=(), **options)
+    return float(pressed["normal_force"][0])
+
+
+def _hertz_error(force: float, _: float) -> float:
+    return float(abs(force / (4.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5) - 1.0))
+
+
+def _wave_benchmark() -> Benchmark:
+    return Benchmark(
+        "wave",
+        "error of the mean gap over the amplitude",
+        "Westergaard: the mean gap of a sinusoidal surface",
+        (Method("fast, spectral", SIZES, _wave, _press_wave, _westergaard_error),),
+    )
+
+
+def _wave(n: float) -> xr.DataArray:
+    x = np.arange(int(n)) / n
+    heights = np.broadcast_to(np.cos(2.0 * np.pi * x), (int(n), int(n)))
+    return surfaces.from_array(heights, 1.0 / n, periodic=True)
+
+
+def _press_wave(surface: xr.DataArray) -> float:
+    pressure = 0.5 * np.pi * MODULUS  # half of that of full contact, for amplitude and wavelength 1
+    pressed = contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure, keep=())
+    return float(pressed["mean_gap"][0])
+
+
+def _westergaard_error(gap: float, _: float) -> float:
+    angle = np.arcsin(np.sqrt(0.5))
+    exact = 2.0 * (0.5 * np.cos(angle) ** 2 + np.sin(angle) ** 2 * np.log(np.sin(angle)))
+    return float(abs(gap - exact))
+
+
+def _rough_benchmarks() -> tuple[Benchmark, ...]:
+    solvers: dict[str, dict[str, Any]] = {
+        "free body": {"influence": "disc", "boundary": "free"},
+        "periodic body": {"boundary": "periodic"},
+        "free body with a hardness": {"influence": "disc", "boundary": "free", "hardness": HARDNESS},
+        "free body, closure imposed": {"influence": "disc", "boundary": "free", "closure": CLOSURE},
+        "periodic body, closure imposed": {"boundary": "periodic", "closure": CLOSURE},
+        "periodic body with a hardness": {"boundary": "periodic", "hardness": HARDNESS},
+    }
+    return tuple(
+        Benchmark(
+            f"rough, {name}",
+            "rms error of the pressures over their rms",
+            f"the same surface solved to a tolerance of {TIGHT:g}",
+            (
+                Method(
+                    f"fast, {name}",
+                    TOLERANCES,
+                    _rough_at_tolerance,
+                    partial(_press_rough, options),
+                    _pressure_error(options),
+                    TOLERANCE,
+                ),
+            ),
+        )
+        for name, options in solvers.items()
+    )
+
+
+@lru_cache(maxsize=1)
+def _rough() -> xr.DataArray:
+    shape = (ROUGH_SIZE, ROUGH_SIZE)
+    return surfaces.spectral(shape, 1e-5, hurst=0.8, rms_slope=0.1, rolloff=64e-5, short_cutoff=4e-5, rng=3)
+
+
+def _rough_at_tolerance(tolerance: float) -> tuple[float, xr.DataArray]:
+    return float(tolerance), _rough()
+
+
+def _press_rough(options: dict[str, Any], problem: tuple[float, xr.DataArray]) -> Array:
+    tolerance, surface = problem
+    load: dict[str, Any] = {} if "closure" in options else {"nominal_pressure": PRESSURE}
+    pressed = contact.press(
+        surface, contact_modulus=MODULUS, tolerance=tolerance, keep=("pressure",), **load | options
+    )
+    return pressed["pressure"].values[0]  # type: ignore[no-any-return]
+
+
+def _pressure_error(options: dict[str, Any]) -> Callable[[Any, float], float]:
+    @lru_cache(maxsize=1)
+    def exact() -> Array:
+        return _press_rough(options, (TIGHT, _rough()))
+
+    def error(pressure: Array, _: float) -> float:
+        return float(np.sqrt(np.mean((pressure - exact()) ** 2) / np.mean(exact() ** 2)))
+
+    return error

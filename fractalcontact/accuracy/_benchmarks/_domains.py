@@ -1,0 +1,227 @@
+"""Measures of sets whose dimension, lacunarity or moments are known in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact import domains, surfaces
+from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method
+
+SIZES = (64, 128, 256, 512, 1024)
+HURST, COVERAGE, BOX = 0.5, 0.1, 4
+WEIGHTS = np.array([[0.4, 0.3], [0.2, 0.1]])
+ORDERS = (0.0, 2.0, 3.0)
+# site percolation on the square lattice: coverage, islands per cell, and the excess of a periodic mask
+CRITICAL, PER_CELL, EXCESS = 0.59274605, 0.0275981, 0.8835
+CROSSINGS = 64
+REPLICATES = 8  # random masks of the error; the first is timed
+CARPET_DIMENSION = np.log(8) / np.log(3)
+
+CARPET = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
+
+
+def benchmarks() -> tuple[Benchmark, ...]:
+    """Return the benchmarks of the domain measures."""
+    return (
+        _carpet_benchmark(),
+        _boundary_benchmark(),
+        _lacunarity_benchmark(),
+        Benchmark(
+            "multiplicative cascade",
+            "largest error of D_q at q = 0, 2, 3",
+            "log2 of the sum of the four weights to the power q, over 1 - q",
+            (Method("generalised dimensions", SIZES, _cascade, _moments, _moments_error),),
+        ),
+        Benchmark(
+            "carpet of Sierpinski at three resolutions",
+            "error of the dimension",
+            "log 8 / log 3",
+            (Method("area dimension", (27, 81, 243, 729), _resolutions, _area_dimension, _carpet_error),),
+        ),
+        Benchmark(
+            "number of islands at the critical coverage",
+            "relative error of the islands for each cell, one periodic mask",
+            f"{PER_CELL} + {EXCESS}/n^2 (Ziff, Finch and Adamchik 1997); the random scatter is about 1/n",
+            (Method("islands", SIZES, _critical, _island_density, _islands_error),),
+            equal_parameters=True,
+        ),
+        Benchmark(
+            "crossing at the critical coverage",
+            f"error of the share of {CROSSINGS} masks that are crossed along x",
+            "1/2 for large masks, by symmetry and universality (Cardy 1992); the random scatter is .06",
+            (Method("percolation", SIZES[:3], _critical, _crosses, _crossing_error),),
+            equal_parameters=True,
+        ),
+    )
+
+
+def _mask(values: Any) -> xr.DataArray:
+    return xr.DataArray(np.asarray(values, bool), dims=("y", "x"))
+
+
+def _number(function: str, options: dict[str, Any], mask: xr.DataArray) -> float:
+    """Return the result of a function whose main variable has its name."""
+    return float(getattr(domains, function)(mask, **options)[function].squeeze())
+
+
+def _replicates(
+    make: Callable[[float, int], xr.DataArray],
+    solve: Callable[[xr.DataArray], float],
+    truth: float,
+    scale: float = 1.0,
+) -> Callable[[Any, float], Array]:
+    """Return a function for the errors of a measure, over `scale`, on independent masks of one size."""
+
+    def errors(_: Any, n: float) -> Array:
+        return np.array([solve(make(n, seed)) for seed in range(REPLICATES)]) / scale - truth / scale
+
+    return errors
+
+
+def _carpet_benchmark() -> Benchmark:
+    measures: dict[str, tuple[str, dict[str, Any]]] = {
+        "box dimension, minimum cover": ("box_dimension", {"cover": "minimum"}),
+        "box dimension, mean cover": ("box_dimension", {"cover": "mean"}),
+        "correlation dimension": ("correlation_dimension", {}),
+        "Minkowski dimension": ("minkowski_dimension", {}),
+    }
+    methods = tuple(
+        Method(name, SIZES, _carpet, partial(_number, function, options), _carpet_error)
+        for name, (function, options) in measures.items()
+    )
+    truth = "log 8 / log 3; the cut fits no grid of boxes"
+    return Benchmark("carpet of Sierpinski, cut", "error of the dimension", truth, methods, True)
+
+
+@lru_cache(maxsize=8)
+def _carpet(n: float) -> xr.DataArray:
+    mask = np.ones((1, 1), bool)
+    while mask.shape[0] < n:
+        mask = np.kron(mask, CARPET).astype(bool)
+    return _mask(mask[: int(n), : int(n)])
+
+
+def _carpet_error(dimension: float, _: float) -> float:
+    return float(abs(dimension - CARPET_DIMENSION))
+
+
+def _boundary_benchmark() -> Benchmark:
+    boundary = partial(_number, "boundary_dimension", {})
+    boxes = partial(_number, "box_dimension", {})
+    dimension = 2.0 - HURST
+    return Benchmark(
+        "boundary of a level set",
+        f"root mean square error of the dimension over {REPLICATES} surfaces",
+        f"2 - H for an exact fractional Brownian surface, H = {HURST}",
+        (
+            Method(
+                "boundary dimension",
+                SIZES,
+                _level_set,
+                boundary,
+                _replicates(_level_set, boundary, dimension),
+            ),
+            Method(
+                "box dimension of the boundary cells",
+                SIZES,
+                _boundary_cells,
+                boxes,
+                _replicates(_boundary_cells, boxes, dimension),
+            ),
+        ),
+        True,
+    )
+
+
+@lru_cache(maxsize=2 * REPLICATES)
+def _level_set(n: float, seed: int = 0) -> xr.DataArray:
+    rng = int(n) if seed == 0 else (int(n), seed)
+    stream = np.random.default_rng(rng)
+    heights = surfaces.fbm((int(n), int(n)), 1.0, hurst=HURST, rms_increment=1.0, rng=stream).values
+    return _mask(heights > np.median(heights))
+
+
+def _boundary_cells(n: float, seed: int = 0) -> xr.DataArray:
+    inside = _level_set(n, seed).values
+    edge = np.zeros_like(inside)
+    edge[:, :-1] |= inside[:, 1:] != inside[:, :-1]
+    edge[:-1] |= inside[1:] != inside[:-1]
+    return _mask(edge)
+
+
+def _lacunarity_benchmark() -> Benchmark:
+    exact = 1.0 + (1.0 - COVERAGE) / (COVERAGE * BOX**2)
+    methods = []
+    for boxes in ("gliding", "fixed"):
+        solve = partial(_lacunarity, boxes)
+        errors = _replicates(_independent_cells, solve, exact, exact - 1.0)
+        methods.append(Method(f"lacunarity, {boxes} boxes", SIZES, _independent_cells, solve, errors))
+    return Benchmark(
+        "independent cells",
+        f"root mean square relative error of the lacunarity less one, over {REPLICATES} masks",
+        f"(1 - p)/(p r^2) for independent cells, p = {COVERAGE}, boxes of {BOX}",
+        tuple(methods),
+        True,
+    )
+
+
+def _independent_cells(n: float, seed: int = 0) -> xr.DataArray:
+    stream = np.random.default_rng(int(n) if seed == 0 else (int(n), seed))
+    return _mask(stream.random((int(n), int(n))) < COVERAGE)
+
+
+def _lacunarity(boxes: str, mask: xr.DataArray) -> float:
+    return float(domains.lacunarity(mask, [BOX], boxes=boxes, periodic=False)["lacunarity"].squeeze())
+
+
+def _resolutions(n: float) -> list[xr.DataArray]:
+    masks = []
+    for size in (int(n) // 9, int(n) // 3, int(n)):
+        places = (np.arange(size) + 0.5) / size
+        masks.append(_carpet(size).assign_coords(y=places, x=places))
+    return masks
+
+
+def _area_dimension(masks: list[xr.DataArray]) -> float:
+    return float(domains.area_dimension(masks)["area_dimension"])
+
+
+def _critical(n: float, seed: int = 0) -> xr.DataArray:
+    return _mask(np.random.default_rng((int(n), seed)).random((int(n), int(n))) < CRITICAL)
+
+
+def _island_density(mask: xr.DataArray) -> float:
+    return float(domains.islands(mask, periodic=True, keep=())["n_islands"]) / mask.size
+
+
+def _islands_error(density: float, n: float) -> float:
+    return float(abs(density / (PER_CELL + EXCESS / n**2) - 1.0))
+
+
+def _crosses(mask: xr.DataArray) -> bool:
+    return bool(domains.percolation(mask, periodic=False)["percolates"].sel(axis="x"))
+
+
+def _crossing_error(_: bool, n: float) -> float:
+    return float(abs(np.mean([_crosses(_critical(n, seed)) for seed in range(CROSSINGS)]) - 0.5))
+
+
+def _cascade(n: float) -> xr.DataArray:
+    measure = np.ones((1, 1))
+    while measure.shape[0] < n:
+        measure = np.kron(measure, WEIGHTS)
+    return xr.DataArray(measure, dims=("y", "x"))
+
+
+def _moments(measure: xr.DataArray) -> Array:
+    return domains.generalised_dimensions(measure, list(ORDERS))["generalised_dimension"].values
+
+
+def _moments_error(dimensions: Array, _: float) -> float:
+    exact = [np.log2(np.sum(WEIGHTS**q)) / (1.0 - q) for q in ORDERS]
+    return float(np.abs(dimensions - exact).max())

@@ -1,0 +1,121 @@
+"""Flow and rigid dilatancy against closed forms; the closure law against a solution to rounding."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact import joints, surfaces
+from fractalcontact.accuracy._benchmarks._benchmark import TOLERANCE, Array, Benchmark, Method
+
+RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean
+APERTURE = 1e-4  # m
+SHEAR = 0.13  # of the wavelength
+SIZE, YOUNG = 96, 30e9  # of the sheared joint
+
+
+def benchmarks() -> tuple[Benchmark, ...]:
+    """Return the benchmarks of flow, dilatancy and closure."""
+    sizes = (8, 16, 32, 64, 128, 256, 512)
+    wrapped = partial(_corrugated, periodic=True)
+    across = Method("transmissivity, across", sizes, _corrugated, _hydraulic_aperture, _across_error)
+    around = Method(
+        "transmissivity, across, periodic", sizes[:5], wrapped, _hydraulic_aperture, _across_error
+    )
+    board = Method(
+        "transmissivity, checkerboard", sizes[:5], _checkerboard, _hydraulic_aperture, _checkerboard_error
+    )
+    rigid = Method("rigid dilatancy", sizes[1:], _wave_joint, _rigid_dilatancy, _dilatancy_error)
+    tolerances = tuple(10.0**-k for k in range(2, 11))
+    closure = Method(
+        "closure of the interface", tolerances, _sheared_joint, _closure, _closure_error, TOLERANCE
+    )
+    return (
+        Benchmark(
+            "sinusoidal aperture, across",
+            "relative error of the hydraulic aperture",
+            "(1 - e^2)^(5/2) / (1 + e^2/2) for the cube of the aperture across the crests",
+            (across, around),
+        ),
+        Benchmark(
+            "checkerboard",
+            "relative error of the hydraulic aperture",
+            "sqrt(K1 K2) for the transmissivity, K1/K2 = 10",
+            (board,),
+        ),
+        Benchmark("sliding wave", "error over the amplitude", "2 A |sin(k v / 2)|", (rigid,)),
+        Benchmark(
+            "closure law",
+            "relative error of the closure of the interface, three forces",
+            "the same joint solved to a tolerance of 1e-13",
+            (closure,),
+        ),
+    )
+
+
+def _gap(values: Any, spacing: float, periodic: bool = False) -> xr.DataArray:
+    return surfaces.from_array(values, spacing, periodic=periodic).rename("gap")
+
+
+def _corrugated(n: float, periodic: bool = False) -> xr.DataArray:
+    x = (np.arange(int(n)) + 0.5) / n
+    gap = APERTURE * (1.0 + RIPPLE * np.cos(2.0 * np.pi * x))
+    return _gap(np.broadcast_to(gap, (int(n), int(n))), 1.0 / n, periodic)
+
+
+def _checkerboard(n: float) -> xr.DataArray:
+    i, j = np.mgrid[0 : 2 * int(n), 0 : 2 * int(n)] // int(n)
+    cubes = np.where((i + j) % 2 == 0, 10.0**0.5, 10.0**-0.5)
+    return _gap(APERTURE * cubes ** (1.0 / 3.0), 0.5 / n)
+
+
+def _hydraulic_aperture(gap: xr.DataArray) -> float:
+    return float(joints.transmissivity(gap)["hydraulic_aperture"].sel(axis="x"))
+
+
+def _across_error(aperture: float, _: float) -> float:
+    exact = ((1.0 - RIPPLE**2) ** 2.5 / (1.0 + RIPPLE**2 / 2.0)) ** (1.0 / 3.0)
+    return float(abs(aperture / APERTURE / exact - 1.0))
+
+
+def _checkerboard_error(aperture: float, _: float) -> float:
+    return float(abs(aperture / APERTURE - 1.0))
+
+
+def _wave_joint(n: float) -> joints.Crack:
+    x = np.arange(int(n)) / n
+    heights = np.broadcast_to(np.cos(2 * np.pi * x), (8, int(n)))
+    return joints.Crack(surfaces.from_array(heights, 1.0 / n, periodic=True), young=YOUNG, poisson=0.2)
+
+
+def _rigid_dilatancy(crack: joints.Crack) -> float:
+    return float(joints.dilatancy(crack, shear=[SHEAR], direction="E")["rigid_dilatancy"].squeeze())
+
+
+def _dilatancy_error(dilatancy: float, _: float) -> float:
+    return float(abs(dilatancy - 2.0 * np.sin(np.pi * SHEAR)))
+
+
+def _sheared_joint(tolerance: float) -> tuple[joints.Crack, float]:
+    surface = surfaces.fbm((SIZE, SIZE), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
+    return joints.Crack(surface, young=YOUNG, poisson=0.2, block=6.4e-3), float(tolerance)
+
+
+def _closure(problem: tuple[joints.Crack, float]) -> Array:
+    crack, tolerance = problem
+    laws = joints.closure(
+        crack, shear=[4e-4], direction="E", normal_force=[10.0, 100.0, 1000.0], tolerance=tolerance
+    )
+    return laws["interface_closure"].values
+
+
+@lru_cache(maxsize=1)
+def _exact_closure() -> Array:
+    return _closure(_sheared_joint(1e-13))
+
+
+def _closure_error(closure: Array, _: float) -> float:
+    return float(np.abs(closure / _exact_closure() - 1.0).max())

@@ -1,0 +1,305 @@
+"""Benchmark of the estimators of the Hurst exponent: bias, error, coverage and time."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import binomtest, chi2
+
+from fractalcontact import dimensions, surfaces
+from fractalcontact.accuracy._cramer_rao import band_bound, brownian_bound
+from fractalcontact.base import rng as streams
+from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.netcdf import open as read
+from fractalcontact.base.netcdf import save
+from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import label
+from fractalcontact.base.validation import Problems, float_array, word_tuple
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.accuracy.estimators"
+TITLE = "Estimators of the Hurst exponent on surfaces of known exponent"
+REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63"
+SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
+FAMILIES = {
+    "fbm": "exact fractional Brownian surface",
+    "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
+}
+SPACING, HEIGHT = 1e-4, 1e-6  # m
+BATCH = 1 << 22  # points generated at a time
+MEMBER_POINTS = 25600  # members times points along an edge, unless members are given
+LEVEL = 0.95
+
+DIMS = ("method", "family", "hurst", "size")
+MEASURED = (
+    "bias",
+    "rms_error",
+    "error_ratio",
+    "error_ratio_low",
+    "error_ratio_high",
+    "interval_coverage",
+    "interval_coverage_low",
+    "interval_coverage_high",
+    "interval_share",
+    "run_time",
+)
+
+
+def _check(
+    problems: Problems,
+    *,
+    hurst: Any,
+    sizes: Any,
+    families: Any,
+    methods: Any,
+    members: Any,
+    keep: Any,
+    **_: Any,
+) -> None:
+    problems.numbers("hurst", hurst, at_least=0.01, at_most=0.99)
+    for size in np.atleast_1d(sizes).tolist():
+        problems.integer("sizes", size, at_least=16)
+    chosen = problems.choices("families", families, FAMILIES)
+    if methods is not None:
+        chosen = problems.choices("methods", methods, dimensions.methods()) and chosen
+    if chosen:
+        some = bool(word_tuple(families)) and (methods is None or bool(word_tuple(methods)))
+        problems.require(some, "families / methods", "at least one of each", "none")
+    if members is not None:
+        counts = np.atleast_1d(members).tolist()
+        for count in counts:
+            problems.integer("members", count, at_least=2)
+        lengths = 1, len(np.unique(sizes))
+        expected = f"one number, or one for each of the {lengths[1]} sizes"
+        problems.require(len(counts) in lengths, "members", expected, members)
+    if keep is not None:
+        named = isinstance(keep, (str, os.PathLike)) and Path(keep).suffix == ".nc"
+        problems.require(named, "keep", "a file name that ends in '.nc'", keep)
+
+
+@public_result(title=TITLE, references=REFERENCES, check=_check)
+def estimators(
+    hurst: float | Sequence[float] = (0.1, 0.3, 0.5, 0.7, 0.9),
+    sizes: int | Sequence[int] = (64, 256, 1024),
+    families: str | Sequence[str] = ("fbm", "spectral"),
+    methods: str | Sequence[str] | None = None,
+    *,
+    members: int | Sequence[int] | None = None,
+    rng: streams.RNGLike = None,
+    keep: str | os.PathLike[str] | None = None,
+    progress: bool = False,
+) -> xr.Dataset:
+    """Measure every estimator of the Hurst exponent on surfaces whose exponent is known.
+
+    Parameters
+    ----------
+    hurst : float or sequence of float
+        Exponents, .01 to .99.
+    sizes : int or sequence of int
+        Points along an edge, at least 16.
+    families : str or sequence of str
+        "fbm": exact fractional Brownian surfaces; "spectral": periodic ones, a power law from the extent down
+        to 4 spacings. A method that is right on one of them may be wrong on the other.
+    methods : str or sequence of str, optional
+        Out of `fractalcontact.dimensions.methods()`. Default: all of them.
+    members : int or sequence of int, optional
+        Surfaces for each exponent and family, one number or one for each size. Default: 25600 over the size
+        (400, 100 and 25), which gives a coverage of 95 % to within 1, 2 and 4 %.
+    rng : None, int, SeedSequence, BitGenerator or Generator
+        Random stream; its entropy is kept in the provenance.
+    keep : path-like, optional
+        NetCDF file that is written anew after every case. After a stop the same call continues from it. A
+        file that is finished, or of another call, is replaced.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Dataset over (method, family, hurst, size)
+        bias, rms_error; error_ratio: rms error over the Cramer-Rao bound `least_error`; interval_coverage:
+        share of the 95 % intervals that hold the true exponent (NaN for a method without intervals), both
+        with their 95 % interval (_low, _high); interval_share: share of the surfaces with an interval;
+        run_time: median of one estimate (s); member_count.
+
+    Raises
+    ------
+    InvalidInput
+        A name is unknown or a number out of range.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> table = fc.accuracy.estimators(0.5, 32, "fbm", "increments", members=20, rng=1)
+    >>> print(table["error_ratio"].dims, bool(abs(table["bias"].item()) < 0.05))
+    ('method', 'family', 'hurst', 'size') True
+    """
+    exponents = np.unique(float_array(hurst))
+    edges = sorted({int(size) for size in np.atleast_1d(sizes).tolist()})
+    kinds = word_tuple(families)
+    names = word_tuple(methods) or tuple(dimensions.methods())
+    counts = _counts(members, edges)
+    table = _empty_table(names, kinds, exponents, edges, counts)
+    table, source = _resume(table, keep, rng)
+    entropy = streams.record(source)
+    places = [(k, h, n) for n in range(len(edges)) for k in range(len(kinds)) for h in range(exponents.size)]
+    # every case has a stream of its own, whatever else is asked for in the same run
+    cases = list(zip(places, source.spawn(len(places)), strict=True))
+    for place, stream in track(cases, progress, "estimators", unit="case"):
+        if np.isfinite(table["least_error"].values[place]):
+            continue
+        k, h, n = place
+        truth, size = float(exponents[h]), edges[n]
+        bound = _bound(kinds[k], truth, size)
+        samples = _sample(kinds[k], truth, size, counts[n], names, stream)
+        table["least_error"].values[place] = bound
+        for row, sample in enumerate(np.moveaxis(samples, -1, 0)):
+            for name, value in _scores(truth, bound, *sample).items():
+                table[name].values[(row, *place)] = value
+        if keep is not None:
+            save(_checkpoint(table, entropy), keep)
+    return _with_reasons(table).assign_attrs(random=entropy)
+
+
+def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[int]:
+    if members is None:
+        return [max(10, MEMBER_POINTS // size) for size in sizes]
+    counts = [int(count) for count in np.atleast_1d(members).tolist()]
+    return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
+
+
+def _bound(family: str, hurst: float, n: int) -> float:
+    return brownian_bound(hurst, n) if family == "fbm" else band_bound((n, n), SHORTEST, float(n))
+
+
+def _surfaces(family: str, hurst: float, n: int, count: int, stream: np.random.Generator) -> xr.DataArray:
+    shape: tuple[int, int] = n, n
+    options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
+    if family == "fbm":
+        return surfaces.fbm(shape, SPACING, rms_increment=HEIGHT, **options)
+    cutoff = SHORTEST * SPACING
+    return surfaces.spectral(shape, SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
+
+
+def _sample(
+    family: str, hurst: float, n: int, count: int, methods: Sequence[str], stream: np.random.Generator
+) -> Array:
+    """Return exponent, lower end, upper end and seconds of every estimate, (4, members, methods)."""
+    batch = max(1, min(count, BATCH // (n * n)))
+    parts = []
+    for start in range(0, count, batch):
+        ensemble = _surfaces(family, hurst, n, min(batch, count - start), stream)
+        estimates = dimensions.estimate(ensemble, list(methods))
+        parts.append(
+            np.stack([estimates[name].values for name in ("hurst", "ci_low", "ci_high", "run_time")])
+        )
+    return np.concatenate(parts, axis=1)
+
+
+def _scores(
+    truth: float, bound: float, exponents: Array, low: Array, high: Array, seconds: Array
+) -> dict[str, float]:
+    """Return bias, error, coverage and time of one method on the surfaces of one case."""
+    scores = {"run_time": float(np.median(seconds))}
+    errors = exponents[np.isfinite(exponents)] - truth
+    if errors.size:
+        rms = float(np.sqrt(np.mean(errors**2)))
+        # the interval is that of Gaussian errors
+        ends = np.sqrt(errors.size / chi2.ppf([0.5 + LEVEL / 2, 0.5 - LEVEL / 2], errors.size))
+        scores |= {
+            "bias": float(errors.mean()),
+            "rms_error": rms,
+            "error_ratio": rms / bound,
+            "error_ratio_low": rms / bound * float(ends[0]),
+            "error_ratio_high": rms / bound * float(ends[1]),
+        }
+    has_interval = np.isfinite(low) & np.isfinite(high)
+    scores["interval_share"] = float(has_interval.mean())
+    if has_interval.any():
+        hits, count = int(np.count_nonzero((low <= truth) & (truth <= high))), int(has_interval.sum())
+        interval = binomtest(hits, count).proportion_ci(LEVEL)
+        scores |= {
+            "interval_coverage": hits / count,
+            "interval_coverage_low": float(interval.low),
+            "interval_coverage_high": float(interval.high),
+        }
+    return scores
+
+
+# ---------------------------------------------------------------------------------------------------------
+# The table while it is being filled, and what a stopped run left of it
+
+
+def _empty_table(
+    methods: Sequence[str],
+    families: Sequence[str],
+    exponents: Array,
+    sizes: Sequence[int],
+    members: Sequence[int],
+) -> xr.Dataset:
+    shape = len(methods), len(families), exponents.size, len(sizes)
+    coords = {"method": list(methods), "family": list(families), "hurst": exponents, "size": list(sizes)}
+    columns = {name: (DIMS, np.full(shape, np.nan)) for name in MEASURED}
+    bounds = {"least_error": (DIMS[1:], np.full(shape[1:], np.nan))}
+    table = xr.Dataset(columns | bounds | {"member_count": ("size", np.asarray(members))}, coords=coords)
+    table["least_error"].attrs["comment"] = "; ".join(f"{name}: {FAMILIES[name]}" for name in families)
+    return table
+
+
+def _with_reasons(table: xr.Dataset) -> xr.Dataset:
+    """Say for every variable why values are missing."""
+    stopped = bool(table["least_error"].isnull().any())
+    for name in (*MEASURED, "least_error"):
+        reasons = ["the run was stopped before this case"] if stopped else []
+        if name.startswith("interval_coverage"):
+            reasons.append("the method gives no interval, because none was validated")
+        elif name in ("bias", "rms_error") or name.startswith("error_ratio"):
+            reasons.append("the method gave no exponent")
+        if reasons:
+            table[name].attrs["reason"] = f"NaN: {', or '.join(reasons)}"
+    return table
+
+
+def _checkpoint(table: xr.Dataset, entropy: dict[str, Any]) -> xr.Dataset:
+    """Return the table as far as it is filled, labelled, with the random stream to continue with."""
+    parameters = {str(name): coordinate.values for name, coordinate in table.coords.items()}
+    labelled = label(_with_reasons(table.copy()), keep_notes=True)
+    return stamp(labelled, WHERE, parameters, title=TITLE, references=REFERENCES, random=entropy)
+
+
+def _resume(
+    empty: xr.Dataset, file: str | os.PathLike[str] | None, rng: streams.RNGLike
+) -> tuple[xr.Dataset, np.random.Generator]:
+    """Return the table of an unfinished file of the same call, or the empty one; and the random stream."""
+    unfinished = _unfinished(empty, file)
+    if unfinished is None:
+        return empty, streams.generator(rng)
+    entropy = json.loads(unfinished.attrs["provenance"])["random"]
+    source = streams.generator(entropy if rng is None else rng)
+    if streams.record(source) != entropy:
+        return empty, source
+    values = {
+        name: (unfinished[name].dims, unfinished[name].values.copy()) for name in (*MEASURED, "least_error")
+    }
+    return empty.assign(values), source
+
+
+def _unfinished(empty: xr.Dataset, file: str | os.PathLike[str] | None) -> xr.Dataset | None:
+    """Return the table of a file, if it is one of the same cases and not finished."""
+    if file is None or not Path(file).is_file():
+        return None
+    try:
+        table: xr.Dataset = read(file)
+        same = all(np.array_equal(table[name].values, empty[name].values) for name in (*DIMS, "member_count"))
+        stopped = bool(table["least_error"].isnull().any())
+    except (UnreadableFile, KeyError, AttributeError, TypeError):
+        return None
+    return table if same and stopped else None

@@ -1,0 +1,50 @@
+"""The Cramer-Rao bounds against tables, direct sums and a simulation."""
+
+import numpy as np
+import pytest
+
+from fractalcontact.accuracy import _cramer_rao as cramer_rao
+
+
+def test_brownian_bound_matches_the_table():
+    table = {0.05: 0.356, 0.1: 0.512, 0.3: 0.856, 0.5: 1.029, 0.7: 1.130, 0.9: 1.194}
+    for hurst, value in table.items():
+        assert cramer_rao.brownian_bound(hurst, 100) * 100 == pytest.approx(value, rel=5e-3)
+
+
+def test_aliased_density_matches_a_sum_over_many_more_images():
+    hurst = 0.4
+    w = (np.arange(cramer_rao.POINTS) + 0.5) / cramer_rao.POINTS * np.pi
+    j = np.arange(-400, 401)
+    corner = (
+        np.sum(((w[-1] + 2 * np.pi * j[:, None]) ** 2 + (w[-1] + 2 * np.pi * j) ** 2) ** (-1 - hurst))
+        + 2 * np.pi * (801 * np.pi) ** (-2 * hurst) / (2 * hurst) / (2 * np.pi) ** 2
+    )
+    assert cramer_rao.aliased_density(hurst)[-1, -1] == pytest.approx(corner, rel=2e-3)
+
+
+def test_band_bound_of_all_modes_tends_to_the_closed_form():
+    """All modes of a periodic grid: n times the bound tends to 1.383."""
+    n = 512
+    assert cramer_rao.band_bound((n, n), 0.0, np.inf) * n == pytest.approx(1.383, rel=0.01)
+
+
+def test_band_bound_is_reached_by_regression_on_the_modes():
+    n, hurst = 32, 0.5
+    rng = np.random.default_rng(3)
+    q = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.fftfreq(n), indexing="ij"))
+    half = np.zeros((n, n), bool)
+    half[1 : n // 2] = True
+    half[0, 1 : n // 2] = True
+    band = half & (q >= 1 / n * (1 - 1e-9)) & (q <= 0.25 * (1 + 1e-9))
+    logs = np.log(q[band])
+    estimates = []
+    for _ in range(800):
+        power = q[band] ** (-2 - 2 * hurst) * rng.standard_exponential(band.sum())
+        estimate = hurst
+        for _ in range(8):  # scoring: each independent mode is two real numbers
+            scaled = power * q[band] ** (2 + 2 * estimate)
+            centred = logs - logs.mean()
+            estimate -= 0.5 * np.sum(centred * (scaled / scaled.mean() - 1)) / np.sum(centred**2)
+        estimates.append(estimate)
+    assert np.std(estimates) == pytest.approx(cramer_rao.band_bound((n, n), 4.0, float(n)), rel=0.08)

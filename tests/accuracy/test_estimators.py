@@ -1,0 +1,138 @@
+"""The benchmark of the estimators: numbers by hand, figure, command, and continuing after a stop."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.cli import main
+
+SMALL = {"hurst": (0.3, 0.7), "sizes": 32, "methods": ("likelihood", "variogram"), "members": 60, "rng": 5}
+
+
+@pytest.fixture(scope="module")
+def small():
+    return fc.accuracy.estimators(**SMALL)
+
+
+def test_numbers_of_one_case_match_a_calculation_by_hand(monkeypatch):
+    columns = {
+        "hurst": [0.5, 0.6, 0.4, np.nan],
+        "ci_low": [0.4, 0.55, 0.3, np.nan],
+        "ci_high": [0.6, 0.65, 0.5, np.nan],
+        "run_time": [1.0, 2.0, 3.0, 9.0],
+    }
+    estimates = xr.Dataset({key: (("member", "method"), np.c_[values]) for key, values in columns.items()})
+    monkeypatch.setattr(fc.dimensions, "estimate", lambda *_: estimates)
+    table = fc.accuracy.estimators(0.5, 32, "fbm", "variogram", members=4).squeeze()
+    bound = table["least_error"].item()
+    assert table["bias"].item() == pytest.approx(0.0)
+    assert table["rms_error"].item() == pytest.approx(np.sqrt(0.02 / 3))
+    assert table["error_ratio"].item() == pytest.approx(np.sqrt(0.02 / 3) / bound)
+    assert table["interval_coverage"].item() == pytest.approx(2 / 3)
+    assert table["interval_coverage_low"].item() < 2 / 3 < table["interval_coverage_high"].item()
+    assert table["interval_share"].item() == 0.75
+    assert table["run_time"].item() == 2.5
+
+
+def test_default_estimator_is_near_the_bound_on_both_families(small):
+    default = small.sel({"method": "likelihood"})
+    assert default["error_ratio"].dims == ("family", "hurst", "size")
+    assert (default["error_ratio_low"] < 1.15).all()
+    assert (default["interval_coverage_high"] > 0.93).all()
+    assert (default["interval_share"] == 1).all()
+    assert (default["run_time"] > 0).all()
+
+
+def test_method_without_intervals_states_the_reason(small):
+    variogram = small.sel({"method": "variogram"})
+    assert np.isnan(variogram["interval_coverage"]).all()
+    assert (variogram["interval_share"] == 0).all()
+    assert "no interval" in variogram["interval_coverage"].attrs["reason"]
+    # the wrong family for the variogram: its shortest lags carry no information on H
+    assert (variogram.sel(family="spectral", hurst=0.3)["bias"] > 0.3).all()
+
+
+def test_figure_shows_the_measured_ratios(small):
+    axes = fc.plotting.estimator_errors(small).axes
+    assert [ax.get_title(loc="left") for ax in axes[:2]] == ["fbm, n = 32", "spectral, n = 32"]
+    shown = [np.asarray(line.get_ydata()) for line in axes[1].lines]
+    for method in small["method"].values:
+        column = small.sel({"method": method, "family": "spectral", "size": 32})
+        assert any(np.array_equal(y, column["error_ratio"].values) for y in shown)
+    with pytest.raises(InvalidInput, match="error_ratio"):
+        fc.plotting.estimator_errors(small.drop_vars("error_ratio"))
+
+
+def test_same_stream_gives_the_same_numbers(small):
+    again = fc.accuracy.estimators(**SMALL)
+    assert again.drop_vars("run_time").equals(small.drop_vars("run_time"))
+
+
+def test_summary_and_command(capsys, tmp_path, small):
+    text = fc.accuracy.summary(small)
+    assert "fbm, 32 x 32 points, 60 surfaces" in text
+    assert "none" in text
+    words = (
+        "accuracy estimators --hurst .5 --sizes 16 --families fbm --methods increments --members 3 --seed 1"
+    )
+    assert main([*words.split(), "-o", str(tmp_path)]) == 0
+    assert "increments" in capsys.readouterr().out
+    assert (tmp_path / "estimators.png").stat().st_size > 0
+    assert fc.open(tmp_path / "estimators.nc")["error_ratio"].shape == (1, 1, 1, 1)
+
+
+def test_wrong_arguments_are_all_named():
+    with pytest.raises(InvalidInput) as caught:
+        fc.accuracy.estimators(hurst=1.5, sizes=8, families="cantor", methods="magic", members=[1, 2])
+    for word in ("hurst", "sizes", "cantor", "magic", "members"):
+        assert word in str(caught.value)
+
+
+CASES = {"hurst": (0.3, 0.7), "sizes": (16, 20), "families": "fbm", "methods": "increments", "members": 4}
+
+
+def test_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
+    """The third case is stopped; the same call does the last two and gives the numbers of a whole run."""
+    file, estimated, estimate = tmp_path / "bench.nc", [], fc.dimensions.estimate
+
+    def stopping(surfaces, *arguments):
+        if len(estimated) == 2:
+            raise KeyboardInterrupt
+        estimated.append(surfaces.sizes["x"])
+        return estimate(surfaces, *arguments)
+
+    def counting(surfaces, *arguments):
+        estimated.append(surfaces.sizes["x"])
+        return estimate(surfaces, *arguments)
+
+    monkeypatch.setattr(fc.dimensions, "estimate", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        fc.accuracy.estimators(**CASES, keep=file)
+    part = fc.open(file)
+    assert np.isfinite(part["least_error"]).sum() == 2
+    assert "stopped" in part["rms_error"].attrs["reason"]
+    monkeypatch.setattr(fc.dimensions, "estimate", counting)
+    finished = fc.accuracy.estimators(**CASES, keep=file)
+    assert estimated == [16, 16, 20, 20]
+    assert fc.open(file).drop_vars("run_time").equals(finished.drop_vars("run_time"))
+    stream = json.loads(finished.attrs["provenance"])["random"]
+    again = fc.accuracy.estimators(**CASES, rng=stream)
+    assert again.drop_vars("run_time").equals(finished.drop_vars("run_time"))
+
+
+def test_file_of_another_call_is_not_continued(tmp_path):
+    file = tmp_path / "bench.nc"
+    table = fc.accuracy.estimators(**CASES, rng=1, keep=file)
+    table["least_error"][0, 0, 0] = np.nan
+    table["bias"][:] = 99.0
+    for other in ({"rng": 2}, {"members": 5}, {"hurst": (0.3, 0.6)}):
+        fc.save(table, file)
+        assert float(abs(fc.accuracy.estimators(**CASES | other, keep=file)["bias"]).max()) < 1.0
+    file.write_text("no table")
+    assert np.isfinite(fc.accuracy.estimators(**CASES, keep=file)["bias"]).all()
+    with pytest.raises(InvalidInput, match=r"keep: expected a file name that ends in '\.nc'"):
+        fc.accuracy.estimators(**CASES, keep=tmp_path / "bench.txt")

@@ -1,0 +1,232 @@
+"""Error against run time: what is measured is true error, the budget is kept, and verdicts are clear."""
+
+import dataclasses
+import signal
+import time
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.accuracy import Benchmark, Method
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.signals import Stop
+
+PARTS = ("surfaces", "dimensions", "contact", "domains", "joints")
+
+
+def methods_of(part):
+    return {method.name: method for b in fc.accuracy.benchmarks(part) for method in b.methods}
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Return the result of each part, measured once with a small budget."""
+    results = {}
+
+    def measure(part):
+        if part not in results:
+            start = time.perf_counter()
+            tree = fc.accuracy.measure(part, budget=1)
+            assert time.perf_counter() - start < 60
+            results[part] = tree
+        return results[part]
+
+    return measure
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_each_part_is_measured_within_its_budget(part, measured):
+    tree = measured(part)
+    data = tree[part].to_dataset()
+    assert data["error"].dims == ("method", "setting")
+    finite = np.isfinite(data["error"].values)
+    assert finite.any(axis=1).all()
+    assert (data["run_time"].values[finite] > 0).all()
+    assert (data["memory"].values[finite] > 0).all()
+    assert (data["first_run_time"].values[finite] >= data["run_time"].values[finite]).all()
+    assert all(data[key].values.all() for key in ("truth", "error_meaning", "parameter_name", "benchmark"))
+    assert set(data["verdict"].values) <= {"alone", "Pareto optimal", "dominated", "undecided"}
+    assert part in fc.accuracy.summary(tree)
+
+
+def test_every_public_method_is_measured():
+    assert {"fbm", "spectral", "midpoint", "weierstrass"} <= set(methods_of("surfaces"))
+    assert set(fc.dimensions.methods()) <= set(methods_of("dimensions"))
+    for part in PARTS:
+        assert len(methods_of(part)) == sum(len(b.methods) for b in fc.accuracy.benchmarks(part))
+
+
+# functions that measure a set, a flow or a joint, and the first words of the name of their method; the others
+# count, map or summarise
+MEASURES = {
+    "domains": {
+        "box_dimension": "box dimension",
+        "correlation_dimension": "correlation dimension",
+        "minkowski_dimension": "Minkowski dimension",
+        "boundary_dimension": "boundary dimension",
+        "generalised_dimensions": "generalised dimensions",
+        "area_dimension": "area dimension",
+        "lacunarity": "lacunarity",
+        "islands": "islands",
+        "percolation": "percolation",
+    },
+    "joints": {
+        "transmissivity": "transmissivity",
+        "dilatancy": "rigid dilatancy",
+        "closure": "closure of the interface",
+    },
+}
+UNMEASURED = {"box_counts", "describe", "evolution", "lineage"}  # of domains
+
+
+def test_every_measure_of_a_domain_and_every_flow_has_a_method():
+    assert set(MEASURES["domains"]) | UNMEASURED == set(fc.domains.__all__)
+    for part, names in MEASURES.items():
+        for name in names.values():
+            assert any(method.startswith(name) for method in methods_of(part)), name
+
+
+def rms_error(method, parameter):
+    result = method.solve(method.prepare(parameter))
+    return float(np.sqrt(np.mean(np.square(method.errors(result, parameter)))))
+
+
+def test_islands_and_crossings_at_the_critical_coverage_match_percolation_theory():
+    methods = methods_of("domains")
+    assert rms_error(methods["islands"], 512) < 0.05
+    assert rms_error(methods["percolation"], 64) < 0.19
+
+
+def test_error_of_the_solver_falls_with_the_spacing():
+    methods = methods_of("contact")
+
+    def errors(name):
+        return [rms_error(methods[name], parameter) for parameter in methods[name].parameters[:2]]
+
+    coarse, fine = errors("fast, square")
+    assert fine < 0.5 * coarse
+    assert methods["elimination, disc"].parameters[:2] == methods["fast, disc"].parameters[:2]
+    np.testing.assert_allclose(errors("elimination, disc"), errors("fast, disc"), atol=1e-6)
+
+
+def stub(name, seconds, errors):
+    """Return a method whose run times and errors are known, one or several errors for each setting."""
+    return Method(
+        name,
+        range(len(errors)),
+        int,
+        lambda k: time.sleep(seconds[k]) or np.ones(1000 * (k + 1)).sum(),
+        lambda _, k: errors[int(k)],
+    )
+
+
+def measure_stubs(*methods, budget=20.0, **options):
+    tree = fc.accuracy.measure({"part": [Benchmark("of it", "", "known", methods, **options)]}, budget=budget)
+    return tree["part"].to_dataset()
+
+
+def verdicts(data):
+    return dict(zip(data["method"].values.tolist(), data["verdict"].values.tolist(), strict=True))
+
+
+def test_front_verdicts_and_memory_of_known_methods():
+    quick = stub("quick", [0.01, 0.04], [0.1, 0.02])
+    slow = stub("slow", [0.03, 0.08], [0.2, 0.05])
+    fine = stub("fine", [0.06], [0.001])
+    alone = stub("other", [0.01], [0.5])
+    benchmarks = Benchmark("a", "", "known", (quick, slow, fine)), Benchmark("b", "", "known", (alone,))
+    tree = fc.accuracy.measure({"contact": benchmarks}, budget=20)
+    data = tree["contact"].to_dataset()
+    for method, expected in {"quick": [1, 1], "slow": [0, 0], "fine": [1], "other": [1]}.items():
+        row = data.sel({"method": method})
+        assert row["on_pareto_front"].values[: len(expected)].tolist() == expected, method
+    assert data["share_on_pareto_front"].values.tolist() == [1.0, 0.0, 1.0, 1.0]
+    assert verdicts(data) == {
+        "quick": "Pareto optimal",
+        "slow": "dominated",
+        "fine": "Pareto optimal",
+        "other": "alone",
+    }
+    np.testing.assert_allclose(data["memory"].sel({"method": "quick"}), [8000, 16000], rtol=0.2)
+    np.testing.assert_allclose(data["run_time"].sel({"method": "slow"}), [0.03, 0.08], rtol=0.3)
+    lines = [line for line in fc.accuracy.summary(tree).splitlines() if "dominated" in line]
+    assert len(lines) == 1
+    assert "slow" in lines[0]
+
+
+def test_tie_is_undecided():
+    """Equal times, or random errors that overlap, decide nothing."""
+    equal = measure_stubs(stub("a", [0.03], [0.1]), stub("b", [0.03], [0.1]))
+    assert verdicts(equal) == {"a": "undecided", "b": "undecided"}
+    rng = np.random.default_rng(0)
+    errors = rng.normal(size=(2, 12))  # both of spread 1: the smaller one is so by chance
+    assert 1.05 < np.sqrt(np.max(np.mean(errors**2, axis=1)) / np.min(np.mean(errors**2, axis=1))) < 2
+    worse, better = errors[np.argsort(-np.mean(errors**2, axis=1))]
+    random = measure_stubs(stub("slow", [0.06], [worse]), stub("quick", [0.02], [better]))
+    assert verdicts(random) == {"slow": "undecided", "quick": "Pareto optimal"}
+    assert random["on_pareto_front"].values.all()
+
+
+def test_random_errors_are_compared_surface_by_surface():
+    """A small difference is clear where it is the same on all surfaces, and is not where they differ."""
+    rng = np.random.default_rng(1)
+    errors = rng.normal(size=12)
+    slow, quick = stub("slow", [0.06], [1.1 * errors]), stub("quick", [0.02], [errors])
+    assert verdicts(measure_stubs(slow, quick)) == {"slow": "dominated", "quick": "Pareto optimal"}
+    shuffled = stub("slow", [0.06], [1.1 * rng.permutation(errors)])
+    assert verdicts(measure_stubs(shuffled, quick))["slow"] == "undecided"
+
+
+def test_verdict_does_not_flip_with_the_budget():
+    """A method that is worst at first and best in the end is never called dominated."""
+    flat = stub("flat", [0.01, 0.02, 0.04], [0.1, 0.09, 0.08])
+    steep = stub("steep", [0.02, 0.03, 0.05], [0.2, 0.15, 0.001])
+    never = stub("never", [0.03, 0.05, 0.08], [0.3, 0.25, 0.2])
+    small, large = (verdicts(measure_stubs(flat, steep, never, budget=b)) for b in (0.05, 20.0))
+    assert large == {"flat": "Pareto optimal", "steep": "Pareto optimal", "never": "dominated"}
+    for method, verdict in small.items():
+        assert verdict in ("undecided", large[method])
+    assert small["steep"] == small["never"] == "undecided"
+
+
+def test_inputs_given_are_compared_at_equal_size_only():
+    first = stub("first", [0.01, 0.02, 0.03], [0.4, 0.2, 0.1])
+    late = stub("second", [0.03, 0.09], [0.5, 0.3])
+    early = stub("second", [0.004, 0.09], [0.5, 0.3])
+    assert measure_stubs(first, late)["on_pareto_front"].values.tolist() == [[True] * 3, [False] * 3]
+    at_equal_size = measure_stubs(first, early, equal_parameters=True)
+    assert at_equal_size["on_pareto_front"].values.tolist() == [[True] * 3, [True, False, False]]
+
+
+def test_stopped_measurement_keeps_what_it_has_and_names_what_is_missing():
+    stop = Stop()
+
+    def errors_and_stop(_, parameter):
+        stop.number = signal.SIGINT
+        return 0.1 / (parameter + 1)
+
+    one = stub("one", [0.01], [0.1])
+    two = dataclasses.replace(stub("two", [0.01, 0.01], [0.1, 0.1]), errors=errors_and_stop)
+    part = Benchmark("a", "", "known", (one, two)), Benchmark("b", "", "known", (stub("c", [0], [1]),))
+    tree = fc.accuracy.measure({"contact": part, "joints": part}, budget=20, stop=stop)
+    assert tree.attrs["completeness"] == "partial: the run was stopped; missing: c; one; two; c"
+    assert list(tree.children) == ["contact"]
+    assert tree["contact"]["method"].values.tolist() == ["one", "two"]
+    assert tree["contact"]["error"].shape == (2, 1)
+    assert "two" in fc.accuracy.summary(tree)
+
+
+def test_file_is_clean_and_round_trips(tmp_path, compliance, measured):
+    tree = measured("joints")
+    tree["joints"].to_dataset().to_netcdf(tmp_path / "joints.nc")
+    assert compliance(tmp_path / "joints.nc") == []
+    fc.save(tree, tmp_path / "accuracy.nc")
+    assert fc.open(tmp_path / "accuracy.nc")["joints"].to_dataset().identical(tree["joints"].to_dataset())
+
+
+def test_unknown_parts_and_budgets_are_refused():
+    with pytest.raises(InvalidInput, match="magic"):
+        fc.accuracy.measure("magic")
+    with pytest.raises(InvalidInput, match="budget"):
+        fc.accuracy.measure("contact", budget=0)
