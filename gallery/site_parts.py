@@ -37,15 +37,25 @@ class Extremes(Directive):
 
     def run(self):
         from fractalcontact import accuracy
-        from fractalcontact.accuracy.reporting import worst_rows
 
-        cases = {name: case for name, case in accuracy.cases.items() if not case.large}
-        head, *rows = worst_rows({name: accuracy.examine(case) for name, case in cases.items()})
-        table_rows = [
-            (name, accuracy.cases[name].story, nodes.literal(text=quantity), *rest)
-            for name, quantity, *rest in rows
+        worst = accuracy.worst_results(accuracy.extremes())
+        names = ("case", "quantity", "expectation", "outcome", "error", "run_time", "passed")
+        rows = [
+            (
+                case,
+                accuracy.cases[case].description,
+                nodes.literal(text=quantity),
+                expectation or "finite or explained",
+                ("" if passed else "FAILED: ") + outcome[:60],
+                "" if error != error else f"{error:.1e}",
+                f"{seconds:.2g}",
+            )
+            for case, quantity, expectation, outcome, error, seconds, passed in zip(
+                *(worst[name].values for name in names), strict=True
+            )
         ]
-        return [table((16, 28, 26, 12, 12, 8, 8), (head[0], "description", *head[1:]), table_rows)]
+        head = ("case", "description", "worst quantity", "expected", "result", "error", "slowest call, s")
+        return [table((16, 28, 26, 12, 12, 8, 8), head, rows)]
 
 
 def table(widths, head, rows):

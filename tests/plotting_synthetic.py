@@ -192,9 +192,12 @@ def accuracy():
     dims = ("method", "setting")
     seconds = 1e-6 * size**2 * np.array([[1.0], [3.0]])
     data = {"error": (dims, error), "run_time": (dims, seconds), "memory": (dims, 1e8 * seconds)}
-    data["on_frontier"] = (dims, np.array([[True, True, False, False], [False, True, True, False]]))
+    data["on_pareto_front"] = (dims, np.array([[True, True, False, False], [False, True, True, False]]))
     coords = {"method": ["plain", "fast, disc"], "setting": np.arange(4)}
-    coords |= {"contest": ("method", ["sphere", "sphere"]), "error_meaning": ("method", ["of the force"] * 2)}
+    coords |= {
+        "benchmark": ("method", ["sphere", "sphere"]),
+        "error_meaning": ("method", ["of the force"] * 2),
+    }
     part = label(xr.Dataset(data, coords=coords))
     return xr.DataTree.from_dict({"/contact": part, "/joints": part.copy()})
 

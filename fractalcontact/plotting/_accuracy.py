@@ -27,13 +27,13 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
     Each point is one setting of a method. A filled point is on the Pareto front: no other method of the
-    benchmark reached a smaller error in the same time.
+    benchmark is clearly better in both error and time.
 
     Parameters
     ----------
     measured : DataTree or Dataset
         From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
-        on_frontier over (method, setting), contest and error_meaning over method.
+        on_pareto_front over (method, setting), benchmark and error_meaning over method.
     figure : Figure or SubFigure, optional
         Draw here; otherwise on a new figure.
 
@@ -55,11 +55,11 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
     ...         "error": (("method", "setting"), [[0.1, 0.02]]),
     ...         "run_time": (("method", "setting"), [[0.01, 0.2]]),
     ...         "memory": (("method", "setting"), [[2e6, 8e6]]),
-    ...         "on_frontier": (("method", "setting"), [[True, True]]),
+    ...         "on_pareto_front": (("method", "setting"), [[True, True]]),
     ...     },
     ...     coords={
     ...         "method": ["fast"],
-    ...         "contest": ("method", ["sphere"]),
+    ...         "benchmark": ("method", ["sphere"]),
     ...         "error_meaning": ("method", ["relative error of the force"]),
     ...     },
     ... )
@@ -90,11 +90,11 @@ def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
         groups = {"": as_dataset(measured, "error_against_time")}
-    needed = ("error", "run_time", "memory", "on_frontier", "contest", "error_meaning")
+    needed = ("error", "run_time", "memory", "on_pareto_front", "benchmark", "error_meaning")
     benchmarks = {}
     for prefix, data in groups.items():
         require_variables(data, "error_against_time", needed, "measured")
-        names = np.asarray(words(data["contest"]))
+        names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):
             benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
     return benchmarks
@@ -103,7 +103,7 @@ def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
 def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
     """Draw error against a cost, a curve for each method; return the entries of the legend."""
     _style.style_axes(ax)
-    errors, on_front = table(data, "error", PLANE), table(data, "on_frontier", PLANE).astype(bool)
+    errors, on_front = table(data, "error", PLANE), table(data, "on_pareto_front", PLANE).astype(bool)
     entries = []
     for row, name in enumerate(words(data["method"])):
         finite = np.isfinite(errors[row]) & np.isfinite(cost[row])

@@ -17,7 +17,7 @@ def test_error_against_time_curves():
         unit = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", left.get_xlabel()).group(1)]
         for row, method in enumerate(part.method.values):
             expected = part.to_dataset().sel({"method": method}).dropna("setting")
-            best = expected.isel(setting=expected.on_frontier.values)
+            best = expected.isel(setting=expected.on_pareto_front.values)
             for ax, cost, scale in ((left, "run_time", unit), (right, "memory", 1e6)):
                 line, filled = ax.lines[2 * row : 2 * row + 2]
                 assert np.asarray(line.get_xdata()) * scale == pytest.approx(expected[cost].values)

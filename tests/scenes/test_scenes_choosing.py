@@ -170,13 +170,6 @@ def test_the_shipped_curves_are_those_of_the_methods_that_exist():
     assert curves.FILE.stat().st_size < 20_000
 
 
-def test_curves_are_written_and_read(tmp_path, monkeypatch):
-    curves.write(fc.accuracy.measure("contact", budget=1), tmp_path / "curves.json")
-    monkeypatch.setattr(curves, "FILE", tmp_path / "curves.json")
-    again = curves.shipped.__wrapped__()
-    assert "rough, free body" in again
-
-
 def test_a_curve_is_a_power_law_between_its_knobs():
     curve = curves.Curve((10.0, 40.0), (0.1, 0.025), (1.0, 16.0))
     error, seconds = curve.at(20.0)
