@@ -50,10 +50,12 @@ def sample(shape, hurst, members, seed, spacing=1e-4):
         yield fc.surfaces.fbm(shape, spacing, hurst=hurst, rms_increment=1e-6, rng=rng), rng
 
 
-def table(faces, methods, **options):
+def table(surfaces, methods, **options):
     """Return hurst, ci_low and ci_high: (members, methods) each."""
-    found = [fc.dimensions.estimate(face, methods, **options) for face in faces]
-    return tuple(np.array([one[key].values for one in found]) for key in ("hurst", "ci_low", "ci_high"))
+    result = [fc.dimensions.estimate(surface, methods, **options) for surface in surfaces]
+    return tuple(
+        np.array([dataset[key].values for dataset in result]) for key in ("hurst", "ci_low", "ci_high")
+    )
 
 
 def rms(values):
@@ -66,7 +68,7 @@ def covered(low, high, hurst):
     return share, max(0.02, 2.2 * np.sqrt(0.95 * 0.05 / len(low)))
 
 
-def test_bound_is_the_known_one():
+def test_bound_equals_published_values():
     known = {0.1: 0.512, 0.3: 0.856, 0.5: 1.029, 0.7: 1.130, 0.9: 1.194}
     for hurst, value in known.items():
         assert bound(hurst) == pytest.approx(value, rel=0.01)
@@ -74,10 +76,10 @@ def test_bound_is_the_known_one():
 
 @pytest.mark.parametrize("n", [64, 128, 256])
 @pytest.mark.parametrize("hurst", [0.1, 0.3, 0.5, 0.7, 0.9])
-def test_error_and_coverage_on_fractional_brownian_faces(n, hurst):
+def test_error_and_coverage_of_fbm(n, hurst):
     members = MEMBERS[n]
-    faces = (face for face, _ in sample((n, n), hurst, members, 1))
-    estimates, low, high = table(faces, ["default", "increments"])
+    surfaces = (surface for surface, _ in sample((n, n), hurst, members, 1))
+    estimates, low, high = table(surfaces, ["default", "increments"])
     scatter = 1.0 + 2.2 / np.sqrt(2 * members)
     assert (rms(estimates - hurst) * n / bound(hurst) < np.array([1.15, 1.4]) * scatter).all()
     share, allowed = covered(low, high, hurst)
@@ -85,38 +87,38 @@ def test_error_and_coverage_on_fractional_brownian_faces(n, hurst):
 
 
 @pytest.mark.parametrize("hurst", [0.1, 0.3, 0.5, 0.7, 0.9])
-def test_noise_of_a_tenth_of_the_short_variogram(hurst):
+def test_noise_of_a_tenth_of_the_variogram(hurst):
     """Variance of the noise: a tenth of half the mean square increment over one spacing."""
     n, members = 256, 40
-    faces = (
-        face.copy(data=face.values + np.sqrt(0.05) * 1e-6 * rng.standard_normal(face.shape))
-        for face, rng in sample((n, n), hurst, members, 2)
+    surfaces = (
+        surface.copy(data=surface.values + np.sqrt(0.05) * 1e-6 * rng.standard_normal(surface.shape))
+        for surface, rng in sample((n, n), hurst, members, 2)
     )
-    found = [fc.dimensions.estimate(face, noise=True).isel(method=0) for face in faces]
-    error = np.array([float(one.hurst) for one in found]) - hurst
+    result = [fc.dimensions.estimate(surface, noise=True).isel(method=0) for surface in surfaces]
+    error = np.array([float(dataset.hurst) for dataset in result]) - hurst
     least = bound(hurst, 0.1) / n
     assert abs(error.mean()) < 0.02
     assert rms(error) < 1.3 * least * (1.0 + 2.2 / np.sqrt(2 * members))
-    height = np.array([float(one.noise_height) for one in found])
+    height = np.array([float(dataset.noise_height) for dataset in result])
     # where noise and roughness look alike, only the sum of both is known well
     assert np.mean(height**2) == pytest.approx(0.05e-12, rel=0.1 if hurst > 0.4 else 1.0)
 
 
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.85])
-@pytest.mark.parametrize("kind", ["random", "blocks"])
-def test_missing_tenth(hurst, kind):
+@pytest.mark.parametrize("gaps", ["random", "blocks"])
+def test_coverage_with_gaps(hurst, gaps):
     n, members = 96, 200
-    allowed = 1.25 * np.sqrt(0.9)  # a full face of as many points has the edge n sqrt(.9)
+    allowed = 1.25 * np.sqrt(0.9)  # a full surface of as many points has the edge n sqrt(.9)
 
     def gapped():
-        for face, rng in sample((n, n), hurst, members, 3):
-            heights = face.values.copy()
-            if kind == "random":
+        for surface, rng in sample((n, n), hurst, members, 3):
+            heights = surface.values.copy()
+            if gaps == "random":
                 heights[rng.random(heights.shape) < 0.1] = np.nan
             while np.isfinite(heights).mean() > 0.9:
                 y, x, *size = *rng.integers(0, n - 4, 2), *rng.integers(4, n // 6, 2)
                 heights[y : y + size[0], x : x + size[1]] = np.nan
-            yield face.copy(data=heights)
+            yield surface.copy(data=heights)
 
     estimates, low, high = table(gapped(), ["default", "increments"])
     least = bound(hurst) / (n * 0.9)
@@ -128,8 +130,8 @@ def test_missing_tenth(hurst, kind):
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.85])
 def test_unequal_spacings(hurst):
     members = 200
-    faces = (face for face, _ in sample((64, 64), hurst, members, 4, (3e-4, 1e-4)))
-    estimates, low, high = table(faces, ["default", "increments"])
+    surfaces = (surface for surface, _ in sample((64, 64), hurst, members, 4, (3e-4, 1e-4)))
+    estimates, low, high = table(surfaces, ["default", "increments"])
     assert (rms(estimates - hurst) < 1.25 * 1.15 * bound(hurst) / 64).all()
     share, slack = covered(low, high, hurst)
     assert (np.abs(share - 0.95) < slack).all()
@@ -140,11 +142,11 @@ def test_unequal_spacings(hurst):
 def test_periodic_family(hurst, cut):
     """All modes of a square band: n times the least standard deviation is 1.383."""
     n, members = 128, 200
-    faces = (
+    surfaces = (
         fc.surfaces.spectral((n, n), 1e-4, hurst=hurst, rms_height=1e-6, rng=[5, k], **cut)
         for k in range(members)
     )
-    estimates, low, high = table(faces, ["default"])
+    estimates, low, high = table(surfaces, ["default"])
     if not cut:
         assert rms(estimates - hurst)[0] * n < 1.1 * 1.383
     share, slack = covered(low, high, hurst)
@@ -153,8 +155,8 @@ def test_periodic_family(hurst, cut):
 
 @pytest.mark.parametrize("hurst", [0.1, 0.5, 0.9])
 def test_profiles(hurst):
-    faces = (face for face, _ in sample((400,), hurst, 300, 6))
-    estimates, low, high = table(faces, ["default", "increments"])
+    surfaces = (surface for surface, _ in sample((400,), hurst, 300, 6))
+    estimates, low, high = table(surfaces, ["default", "increments"])
     assert rms(estimates - hurst)[0] * 20 < 0.85
     share, slack = covered(low, high, hurst)
     assert (np.abs(share - 0.95) < slack).all()

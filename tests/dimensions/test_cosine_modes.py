@@ -1,0 +1,107 @@
+"""Cosine modes of free surfaces against dense linear algebra."""
+
+import numpy as np
+import pytest
+import scipy.fft
+import scipy.stats
+
+from fractalcontact.dimensions import _cosine_modes
+
+
+def squares(shape, steps, observed=None):
+    y, x = (p.ravel() for p in np.indices(shape))
+    if observed is not None:
+        y, x = y[observed.ravel()], x[observed.ravel()]
+    return (steps[0] * (y[:, None] - y)) ** 2 + (steps[1] * (x[:, None] - x)) ** 2
+
+
+def orthonormal_modes(shape):
+    """Rows: orthonormal cosine modes that vary along both axes."""
+    points = np.eye(shape[0] * shape[1]).reshape(-1, *shape)
+    return scipy.fft.dctn(points, axes=(1, 2), norm="ortho")[:, 1:, 1:].reshape(points.shape[0], -1).T
+
+
+@pytest.fixture(scope="module")
+def holes():
+    rng = np.random.default_rng(5)
+    observed = rng.random((12, 14)) > 0.15
+    observed[4:7, 0:4] = False
+    observed[0, -1] = observed[-1, 0] = observed[0, 0] = observed[-1, -1] = True
+    return observed
+
+
+@pytest.mark.parametrize("shape", [(9, 9), (8, 13), (3, 20)])
+@pytest.mark.parametrize("ratio", [1.0, 2.5])
+@pytest.mark.parametrize("hurst", [0.05, 0.5, 0.9])
+def test_expected_power_equals_dense_covariance(shape, ratio, hurst):
+    lattice = _cosine_modes.Lattice.of(shape, (ratio, 1.0))
+    modes = orthonormal_modes(shape)
+    dense = -(squares(shape, (ratio, 1.0)) ** hurst) / (1.0 - hurst)
+    expected = np.einsum("ki,ij,kj->k", modes, dense, modes)
+    np.testing.assert_allclose(_cosine_modes.expected_power(lattice, hurst).ravel(), expected, rtol=1e-10)
+
+
+def test_expected_power_is_smooth_at_one():
+    lattice = _cosine_modes.Lattice.of((16, 16), (1.0, 1.0))
+    below, at, above = (_cosine_modes.expected_power(lattice, h) for h in (1 - 1e-5, 1.0, 1 + 1e-5))
+    assert (at > 0).all()
+    np.testing.assert_allclose(0.5 * (below + above), at, rtol=1e-7)
+
+
+def test_power_ignores_planes_rows_and_columns():
+    rng = np.random.default_rng(1)
+    heights = rng.standard_normal((12, 15))
+    expected = (orthonormal_modes((12, 15)) @ heights.ravel()) ** 2
+    np.testing.assert_allclose(_cosine_modes.mode_power(heights).ravel(), expected, rtol=1e-10, atol=1e-14)
+    moved = heights + rng.standard_normal((12, 1)) + rng.standard_normal(15) + 3.0 * np.arange(15)
+    np.testing.assert_allclose(_cosine_modes.mode_power(moved).ravel(), expected, rtol=1e-8, atol=1e-12)
+
+
+def test_wavelengths_along_diagonal():
+    lengths = _cosine_modes.wavelengths(_cosine_modes.Lattice.of((10, 20), (2.0, 1.0)))
+    assert lengths.shape == (9, 19)
+    assert lengths[0, 0] == pytest.approx(1.0 / np.hypot(1 / 40, 1 / 40))
+
+
+def test_filling_of_plane_and_transpose(holes):
+    filling = _cosine_modes.Filling(holes, (2.0, 1.0))
+    y, x = np.indices(holes.shape)
+    plane = 0.3 * y - 0.1 * x + 5.0
+    assert np.abs(filling(plane[holes])).max() < 1e-12
+    rng = np.random.default_rng(6)
+    surface, values = rng.standard_normal(holes.shape), rng.standard_normal(holes.sum())
+    assert np.sum(filling(values) * surface) == pytest.approx(values @ filling.transpose(surface), rel=1e-12)
+
+
+def test_filling_without_gaps_removes_plane():
+    whole = np.ones((5, 6), dtype=bool)
+    values = np.random.default_rng(7).standard_normal(30)
+    filled = _cosine_modes.Filling(whole, (1.0, 1.0))(values)
+    columns = np.stack([np.ones(30), *(p.ravel() for p in np.indices((5, 6)))], axis=1)
+    rest = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+    np.testing.assert_allclose(filled.ravel(), rest, atol=1e-13)
+
+
+def test_gapped_modes_equal_dense_algebra(holes):
+    hurst = 0.6
+    lattice = _cosine_modes.Lattice.of(holes.shape, (1.0, 1.0))
+    gapped = _cosine_modes.GappedModes(lattice, holes, 0.5, probes=500)
+    filling = _cosine_modes.Filling(holes, (1.0, 1.0))
+    operator = np.array([_cosine_modes.cosine_modes(filling(e)).ravel() for e in np.eye(holes.sum())]).T
+    dense = operator @ (-(squares(holes.shape, (1, 1), holes) ** hurst) / (1 - hurst)) @ operator.T
+    complete = _cosine_modes.expected_power(lattice, hurst).ravel()
+    reference = gapped.reference_power().ravel()
+    excess = gapped.excess(hurst).ravel()
+    assert np.sum((np.diag(dense) - complete) / reference) == pytest.approx(
+        np.sum(excess / reference), rel=0.04
+    )
+    white = np.sum(operator**2, axis=1) - 1.0
+    assert np.sum(white / reference) == pytest.approx(
+        np.sum(gapped.white_excess().ravel() / reference), rel=0.04
+    )
+    weights = np.random.default_rng(8).standard_normal((2, *gapped.reference_power().shape))
+    scaled = dense / np.sqrt(np.outer(reference, reference))
+    exact = [[2 * np.sum(a.ravel()[:, None] * scaled * b.ravel() * scaled) for b in weights] for a in weights]
+    result = gapped.score_covariance(weights, hurst)
+    np.testing.assert_allclose(np.diag(result), np.diag(exact), rtol=0.05)
+    assert abs(result[0, 1] - exact[0][1]) < 0.1 * np.sqrt(exact[0][0] * exact[1][1])

@@ -1,0 +1,66 @@
+"""Properties that every curve over scale shares: symmetry, units, stacks, labels, files."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+from fractalcontact.base.results import provenance_of
+from fractalcontact.base.schema import QUANTITIES
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return fc.surfaces.fbm((48, 40), (2e-3, 1e-3), hurst=0.6, rms_increment=1e-4, rng=1)
+
+
+CURVES = (
+    "spectrum",
+    "variogram",
+    "madogram",
+    "second_variogram",
+    "roughness_length",
+    "variation",
+    "cube_counts",
+    "covering",
+)
+
+
+def test_mirror_changes_no_value(rough):
+    for name in ("variogram", "spectrum"):
+        first = getattr(fc.dimensions, name)(rough)
+        second = getattr(fc.dimensions, name)(rough.copy(data=rough.values[:, ::-1]))
+        value = next(iter(first.data_vars))
+        np.testing.assert_allclose(second[value], first[value], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_powers_of_two_change_no_bit(rough, name):
+    if name == "covering":
+        pytest.skip("the area in natural scale depends on the unit of height")
+    curve = getattr(fc.dimensions, name)
+    first, second = curve(rough), curve(rough * 2.0**-30)
+    value = next(iter(first.data_vars))
+    power = {"cube_counts": 0, "madogram": 1, "roughness_length": 1, "variation": 1}.get(name, 2)
+    np.testing.assert_array_equal(first[value] * 2.0 ** (-30 * power), second[value])
+    np.testing.assert_array_equal(first.local_slope.isnull(), second.local_slope.isnull())
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_stack_equals_single_results(name):
+    stack = fc.surfaces.fbm((24, 20), 1e-3, hurst=0.5, rms_increment=1e-5, members=3, rng=8)
+    curve = getattr(fc.dimensions, name)
+    complete, first = curve(stack), curve(stack.isel(member=1))
+    for key in first.data_vars:
+        if key != "run_time":
+            assert complete[key].dims[: -1 if first[key].ndim else None] == ("member",)
+            np.testing.assert_array_equal(complete[key].isel(member=1), first[key])
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_units_and_round_trip(rough, name, tmp_path):
+    curve = getattr(fc.dimensions, name)(rough)
+    for key, variable in curve.variables.items():
+        assert variable.attrs["units"] == QUANTITIES[key].units
+    assert provenance_of(curve)["periodic_axes"] == "none"
+    xr.testing.assert_identical(fc.open(fc.save(curve, tmp_path / "curve.nc")), curve)

@@ -1,0 +1,283 @@
+"""Roughness by direction: surfaces of known anisotropy, invariances, and the size of the tests."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+
+SPACING = 1e-4
+
+
+def brownian(n, hurst, seed, spacing=SPACING, **options):
+    return fc.surfaces.fbm((n, n), spacing, hurst=hurst, rms_increment=1e-6, rng=seed, **options)
+
+
+def anisotropic(n, seed, anisotropy_ratio=2.0, azimuth=30.0, hurst=0.6, thin=4, **options):
+    """Anisotropic fractal with free edges: every fourth point of a quarter of a periodic surface."""
+    complete = fc.surfaces.spectral(
+        (2 * thin * n, 2 * thin * n), SPACING / thin, hurst=hurst, rms_height=1e-6,
+        anisotropy_ratio=anisotropy_ratio, azimuth=azimuth, rng=seed, **options,
+    )  # fmt: skip
+    return fc.surfaces.from_array(complete.values[: thin * n : thin, : thin * n : thin], SPACING)
+
+
+def angle_between(azimuth, second):
+    """Angle in degrees between two undirected lines."""
+    return abs((azimuth - second + 90.0) % 180.0 - 90.0)
+
+
+def profile(n, seed, hurst=0.7):
+    return fc.surfaces.fbm(n, SPACING, hurst=hurst, rms_increment=1e-6, rng=seed).values
+
+
+def within_binomial_bounds(count, trials, share):
+    """Return whether a count agrees with its expected share.
+
+    The bounds are those of the binomial distribution, so wide that chance alone violates one of the 132 of
+    the twelve cases (eight directions, two tests and one interval of the ratio in each) in one run of twenty.
+    """
+    risk = 0.05 / (12 * (8 + 2 + 1))
+    low, high = (binom.ppf(chance, trials, share) for chance in (0.5 * risk, 1 - 0.5 * risk))
+    return (low <= count) & (count <= high)
+
+
+def test_isotropic_surface():
+    result = fc.dimensions.directions(brownian(256, 0.7, 1))
+    assert result["hurst"].dims == ("azimuth",)
+    assert result["azimuth"].values[[0, 2, 4, 6]] == pytest.approx([0, 45, 90, 135])
+    assert ((result["ci_low"] < 0.7) & (result["ci_high"] > 0.7)).all()
+    assert result["rms_increment"].values == pytest.approx(1e-6, rel=0.03)
+    topothesy = SPACING * (1e-6 / SPACING) ** (1 / 0.3)
+    assert np.log(result["topothesy"].values) == pytest.approx(np.log(topothesy), rel=0.05)
+    assert float(result["isotropy_p_value"]) > 0.01
+    assert float(result["anisotropy_ratio_low"]) == 1.0
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_ratio_and_azimuth_recovered(free):
+    if free:
+        surface = anisotropic(192, 3)
+    else:
+        surface = fc.surfaces.spectral(
+            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, anisotropy_ratio=2.0, azimuth=30.0, rng=3
+        )
+    result = fc.dimensions.directions(surface)
+    assert float(result["isotropy_p_value"]) < 1e-6
+    assert float(result["anisotropy_ratio_low"]) < 2.0 < float(result["anisotropy_ratio_high"]) + 0.1
+    assert angle_between(float(result["anisotropy_azimuth"]), 30.0) < 2.0
+    assert float(result["anisotropy_p_value"]) > 1e-3
+    # the exponent is the same all round; heights change least along the longer correlation
+    assert ((result["ci_low"] < 0.65) & (result["ci_high"] > 0.55)).all()
+    least = float(result["azimuth"][int(np.argmin(result["rms_increment"].values))])
+    assert angle_between(least, 30.0) < 23.0
+
+
+def test_transposed_surface_swaps_azimuths():
+    surface = anisotropic(128, 4, anisotropy_ratio=1.6, azimuth=20.0)
+    second = fc.surfaces.from_array(np.ascontiguousarray(surface.values.T), SPACING)
+    first, two = (fc.dimensions.directions(each) for each in (surface, second))
+    assert angle_between(float(two["anisotropy_azimuth"]), 90.0 - float(first["anisotropy_azimuth"])) < 1e-6
+    assert float(two["anisotropy_ratio"]) == pytest.approx(float(first["anisotropy_ratio"]), rel=1e-9)
+    assert float(two["isotropy_p_value"]) == pytest.approx(float(first["isotropy_p_value"]), rel=1e-6)
+    for azimuth in (0.0, 45.0, 90.0):
+        pair = [
+            first["hurst"].sel(azimuth=azimuth, method="nearest"),
+            two["hurst"].sel(azimuth=(90.0 - azimuth) % 180.0, method="nearest"),
+        ]
+        assert float(pair[0]) == pytest.approx(float(pair[1]), rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [48, 160])
+def test_striations_are_anisotropic(size):
+    x, y = profile(size, 5), profile(size, 6)
+    noise = 1e-7 * np.random.default_rng(7).standard_normal((size, size))
+    for heights in (x + noise, x + y[:, None] + noise, x + y[:, None]):
+        result = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+        assert float(result["isotropy_p_value"]) < 1e-3
+        if size > 100:
+            assert "no model" in result["ci_low"].attrs["reason"]
+            assert np.isnan(result["ci_low"]).all()
+
+
+def test_no_exponent_along_ridges():
+    heights = np.broadcast_to(profile(96, 8), (96, 96))
+    result = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+    assert np.flatnonzero(np.isnan(result["hurst"].values)).tolist() == [4]
+    assert float(result["hurst"][0]) == pytest.approx(0.7, abs=0.15)
+    assert "do not vary" in result["hurst"].attrs["reason"]
+    assert float(result["isotropy_p_value"]) == 0.0
+
+
+def test_ridges_in_noise_have_no_ratio():
+    """Ridges as long as the surface have no ratio; the azimuth of the ridges remains."""
+    noise = 1e-7 * np.random.default_rng(7).standard_normal((96, 96))
+    result = fc.dimensions.directions(fc.surfaces.from_array(profile(96, 5)[:, None] + noise, SPACING))
+    assert float(result["isotropy_p_value"]) < 1e-6
+    assert np.isnan(result["anisotropy_ratio_high"])
+    assert "ridges" in result["anisotropy_ratio"].attrs["reason"]
+    assert angle_between(float(result["anisotropy_azimuth"]), 0.0) < 2.0
+    assert np.isnan(result["ci_low"]).all()
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+def test_smooth_isotropic_surface_is_isotropic(gaps):
+    """All waves longer than 30 spacings: leakage of the taper beyond them is no evidence."""
+    surface = fc.surfaces.spectral((128, 128), SPACING, hurst=0.9, rms_height=1e-6, short_cutoff=3e-3, rng=1)
+    heights = surface.values[:100, :100].copy()
+    if gaps:
+        heights[np.random.default_rng(2).random(heights.shape) < 0.1] = np.nan
+    result = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+    assert (result["hurst"] == 1.0).all()
+    assert not float(result["isotropy_p_value"]) < 0.01
+    assert "smoother" in result["anisotropy_ratio"].attrs["reason"]
+
+
+def test_band_limited_surface_with_gaps_widens_interval():
+    """No waves below the grid spacing: the exponent changes with the lag, the directions do not differ."""
+    surface = fc.surfaces.spectral((256, 256), SPACING, hurst=0.6, rms_height=1e-6, rng=5)
+    heights = np.where(np.random.default_rng(2).random((256, 256)) < 0.1, np.nan, surface.values)
+    result = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
+    assert float(result["isotropy_p_value"]) > 0.01
+    assert "changes with the lag" in result["hurst"].attrs["reason"]
+    assert (result["ci_high"] - result["ci_low"] > 6 * result["standard_error"]).all()
+
+
+def test_dtype_and_level_do_not_matter():
+    surface = brownian(64, 0.5, 1)
+    complete = fc.dimensions.directions(surface)["hurst"]
+    scaled = [np.rint(surface.values * 1e9).astype(np.int64), (surface.values * 1e6).astype(np.float32)]
+    for heights in (*scaled, surface.values * 1e12 + 1e9, surface.values * 1e-3):
+        second = fc.dimensions.directions(surface.copy(data=heights))["hurst"]
+        assert second.values == pytest.approx(complete.values, abs=2e-4)
+
+
+def test_two_exponents_exceed_ratio():
+    surface = fc.surfaces.spectral((192, 192), SPACING, hurst=(0.4, 0.8), rms_height=1e-6, rng=9)
+    result = fc.dimensions.directions(surface)
+    assert float(result["isotropy_p_value"]) < 1e-6
+    assert float(result["anisotropy_p_value"]) < 1e-6
+    assert float(result["hurst"].sel(azimuth=0)) - float(result["hurst"].sel(azimuth=90)) > 0.3
+
+
+def test_any_isotropic_spectrum_is_isotropic():
+    """A roll-off and a cut-off, which no fractional Brownian surface has; periodic, and cut with free edges."""
+    surface = fc.surfaces.spectral(
+        (256, 256), SPACING, hurst=0.8, rms_height=1e-6, rolloff=4e-3, short_cutoff=6e-4, rng=10
+    )
+    for part in (surface, surface[:200, :180]):
+        result = fc.dimensions.directions(part)
+        assert float(result["isotropy_p_value"]) > 0.01
+        assert float(result["anisotropy_p_value"]) > 0.01
+
+
+def test_gaps_and_unequal_spacings():
+    surface = brownian(160, 0.4, 11, (2e-4, 1e-4))
+    heights = surface.values.copy()
+    heights[np.random.default_rng(12).random(heights.shape) < 0.05] = np.nan
+    heights[20:50, 60:100] = np.nan
+    result = fc.dimensions.directions(surface.copy(data=heights))
+    assert ((result["ci_low"] - 0.02 < 0.4) & (result["ci_high"] + 0.02 > 0.4)).all()
+    assert float(result["isotropy_p_value"]) > 0.01
+    assert float(result["anisotropy_ratio_low"]) == 1.0
+
+
+def test_nearest_lattice_directions():
+    surface = brownian(64, 0.5, 13)
+    result = fc.dimensions.directions(surface, [210.0, 0.0, 90.0])
+    assert result["azimuth"].values == pytest.approx([0.0, np.degrees(np.arctan2(3, 5)), 90.0])
+    complete = fc.dimensions.directions(surface)
+    assert float(result["isotropy_p_value"]) == float(complete["isotropy_p_value"])
+    assert float(result["hurst"].sel(azimuth=90)) == float(complete["hurst"].sel(azimuth=90))
+    periodic = fc.surfaces.spectral((64, 64), SPACING, hurst=0.5, rms_height=1e-6, rng=14)
+    assert fc.dimensions.directions(periodic, 33.0)["azimuth"].values.tolist() == [33.0]
+
+
+def test_stack_equals_single_results():
+    surfaces = brownian(48, 0.5, 15, members=3)
+    result = fc.dimensions.directions(surfaces)
+    assert result["hurst"].dims == ("member", "azimuth")
+    assert result["isotropy_p_value"].dims == ("member",)
+    alone = fc.dimensions.directions(surfaces[1])
+    assert np.array_equal(result["hurst"][1], alone["hurst"])
+
+
+def test_powers_of_two_change_no_bit():
+    surface = brownian(64, 0.6, 16)
+    first = fc.dimensions.directions(surface)
+    for factor in (2.0**40, 2.0**-40):
+        second = fc.dimensions.directions(surface.copy(data=surface.values * factor))
+        assert np.array_equal(first["hurst"], second["hurst"])
+        assert float(first["isotropy_p_value"]) == float(second["isotropy_p_value"])
+        assert np.array_equal(first["rms_increment"] * factor, second["rms_increment"])
+
+
+def test_limits_and_invalid_arguments():
+    flat = fc.dimensions.directions(fc.surfaces.from_array(np.full((20, 20), 3.0), SPACING))
+    assert np.isnan(flat["hurst"]).all()
+    assert "constant" in flat["hurst"].attrs["reason"]
+    plane = fc.surfaces.from_array(np.broadcast_to(np.arange(20) * 1e-6, (20, 20)), SPACING)
+    assert (fc.dimensions.directions(plane)["hurst"] == 1).all()
+    white = fc.surfaces.from_array(np.random.default_rng(17).standard_normal((128, 128)), SPACING)
+    result = fc.dimensions.directions(white)
+    assert (result["hurst"] < 0.03).all()
+    assert float(result["isotropy_p_value"]) > 0.001
+    assert np.isnan(result["anisotropy_ratio"])
+    periodic = fc.surfaces.from_array(white.values, SPACING, periodic=True)
+    assert np.isnan(fc.dimensions.directions(periodic)["anisotropy_ratio"])
+    with pytest.raises(InvalidInput, match="16"):
+        fc.dimensions.directions(brownian(12, 0.5, 1))
+    with pytest.raises(InvalidInput, match="dims"):
+        fc.dimensions.directions(fc.surfaces.fbm(100, SPACING, hurst=0.5, rms_increment=1e-6, rng=1))
+    with pytest.raises(InvalidInput) as caught:
+        fc.dimensions.directions(brownian(32, 0.5, 1).transpose("x", "y"))
+    assert len(caught.value.problems) == 1
+    with pytest.raises(InvalidInput, match="nothing but NaN"):
+        fc.dimensions.directions(white.where(False))
+    with pytest.raises(InvalidInput, match="scales"):
+        fc.dimensions.directions(brownian(32, 0.5, 1), scales=(1.0, 2.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("case", ["free", "small", "gaps", "periodic"])
+def test_size_of_tests_and_coverage(case, hurst):
+    n, members = (48 if case == "small" else 112), 400
+    if case == "periodic":
+        surfaces = fc.surfaces.spectral(
+            (n, n), SPACING, hurst=hurst, rms_height=1e-6, short_cutoff=4e-4, members=members, rng=20
+        )
+    else:
+        surfaces = brownian(n, hurst, 20, members=members)
+        if case == "gaps":
+            heights = surfaces.values.copy()
+            heights[np.random.default_rng(21).random(heights.shape) < 0.1] = np.nan
+            surfaces = surfaces.copy(data=heights)
+    result = fc.dimensions.directions(surfaces)
+    for name in ("isotropy_p_value", "anisotropy_p_value"):
+        assert within_binomial_bounds((result[name] < 0.05).sum(), result[name].count(), 0.05).all()
+    is_defined = np.isfinite(result["anisotropy_ratio_low"])
+    assert float(is_defined.mean()) > 0.95  # not where the exponent is within three standard errors of none
+    assert within_binomial_bounds(
+        (result["anisotropy_ratio_low"] == 1.0).where(is_defined).sum(), is_defined.sum(), 0.95
+    ).all()
+    is_defined = np.isfinite(result["ci_low"])
+    assert float(is_defined.mean()) > 0.98  # not where the test of an anisotropy ratio is below .001
+    covered = ((result["ci_low"] <= hurst) & (hurst <= result["ci_high"])).where(is_defined).sum("member")
+    # an exponent within two standard errors of 0 or 1 is covered more often: estimates end there
+    limited = result["standard_error"].mean("member") > 0.5 * min(hurst, 1 - hurst)
+    assert (
+        within_binomial_bounds(covered, is_defined.sum("member"), 0.95)
+        | (limited & (covered > 0.95 * members))
+    ).all()
+
+
+def test_regular_gaps_are_isotropic():
+    """Every second row and column of an isotropic surface: shifts between its points are even."""
+    surface = brownian(96, 0.5, 24)
+    result = fc.dimensions.directions(
+        surface.where((surface.x / SPACING % 2 < 1) & (surface.y / SPACING % 2 < 1))
+    )
+    assert float(result["isotropy_p_value"]) > 0.01
+    assert ((result["ci_low"] - 0.05 < 0.5) & (result["ci_high"] + 0.05 > 0.5)).all()

@@ -1,0 +1,340 @@
+"""Estimates of the Hurst exponent: names, labels, families, limits, errors, invariances."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+from fractalcontact.base import threads
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.results import provenance_of
+
+VARIABLES = {
+    "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",
+    "scale_max", "rms_increment", "topothesy", "noise_height", "misfit", "run_time",
+}  # fmt: skip
+NAMES = list(fc.dimensions.methods())
+VALIDATED = ["likelihood", "increments"]
+SCALE_FREE = [name for name in NAMES if name != "covering"]
+
+
+def estimate(*arguments, **options):
+    return fc.dimensions.estimate(*arguments, **options)
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return fc.surfaces.fbm((96, 80), 1e-4, hurst=0.7, rms_increment=2e-6, rng=21)
+
+
+def estimate_one(surface, method=None, **options):
+    return estimate(surface, method, **options).isel(method=0)
+
+
+def surface_of(heights, spacing=1e-3):
+    return fc.surfaces.from_array(np.asarray(heights, float), spacing)
+
+
+def with_gaps(surface, share=0.1, seed=0):
+    rng = np.random.default_rng(seed)
+    heights = surface.values.copy()
+    heights[rng.random(heights.shape) < share] = np.nan
+    heights[10:20, 30:45] = np.nan
+    return surface.copy(data=heights)
+
+
+def test_default_method(rough):
+    result = estimate(rough)
+    assert list(result.method.values) == ["default"]
+    assert provenance_of(result)["default_method"] == "likelihood"
+    assert set(result.data_vars) == VARIABLES
+    assert all(result[name].dims == ("method",) for name in VARIABLES)
+    assert float(result.increment_lag) == 1e-4
+    again = estimate(rough, ["likelihood"])
+    for name in VARIABLES - {"run_time"}:
+        np.testing.assert_array_equal(result[name], again[name])
+
+
+def test_every_method(rough, tmp_path):
+    result = estimate(rough, ["default", *NAMES])
+    assert list(result.method.values) == ["default", *NAMES]
+    np.testing.assert_allclose(result.fractal_dimension, 3.0 - result.hurst, rtol=1e-15)
+    near = result.hurst.sel({"method": ["default", "increments", "second_variogram"]})
+    np.testing.assert_allclose(near, 0.7, atol=0.05)
+    given = np.isfinite(result.ci_low)
+    assert list(result.method.values[given.values]) == ["default", *VALIDATED]
+    reasons = json.loads(result.ci_low.attrs["reason"])
+    assert set(reasons) == set(NAMES) - set(VALIDATED)
+    assert all(reasons.values())
+    assert set(json.loads(result.scale_min.attrs["comment"])) == {"default", *NAMES}
+    assert (result.scale_min < result.scale_max).all()
+    xr.testing.assert_identical(fc.open(fc.save(result, tmp_path / "result.nc")), result)
+
+
+def test_increment_and_topothesy(rough):
+    result = estimate(rough, VALIDATED)
+    np.testing.assert_allclose(result.rms_increment, 2e-6, rtol=0.05)
+    exact = 1e-4 * (2e-6 / 1e-4) ** (1 / (1 - result.hurst))
+    np.testing.assert_allclose(
+        result.topothesy, exact * (result.rms_increment / 2e-6) ** (1 / (1 - result.hurst))
+    )
+
+
+@pytest.mark.parametrize("hurst", [0.15, 0.5, 0.85])
+@pytest.mark.parametrize("method", VALIDATED)
+def test_fbm_within_bound(hurst, method):
+    """Within four times the least possible standard deviation, 1.742 sqrt(H / (H + .979)) / n."""
+    surface = fc.surfaces.fbm((128, 128), 1e-3, hurst=hurst, rms_increment=1e-4, rng=22)
+    result = estimate_one(surface, method)
+    bound = 1.742 * np.sqrt(hurst / (hurst + 0.979)) / 128
+    assert abs(float(result.hurst) - hurst) < 4 * bound
+    assert 0.9 * bound < float(result.standard_error) < 1.35 * bound
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.8])
+@pytest.mark.parametrize("cut", [{}, {"long_cutoff": 0.1, "rolloff": 0.03, "short_cutoff": 0.004}])
+def test_periodic_surfaces(hurst, cut):
+    surface = fc.surfaces.spectral((160, 160), 1e-3, hurst=hurst, rms_height=1e-5, rng=23, **cut)
+    result = estimate(surface, ["default", "spectrum", "increments"])
+    assert float(result.hurst[0]) == pytest.approx(hurst, abs=0.1 if cut else 0.03)
+    assert float(result.ci_low[0]) < hurst < float(result.ci_high[0])
+    assert "periodic" in json.loads(result.hurst.attrs["comment"])["default"]
+    assert np.isnan(result.ci_low[2])
+    assert "periodic" in json.loads(result.ci_low.attrs["reason"])["increments"]
+    if cut:
+        assert float(result.scale_min[0]) == pytest.approx(0.004, rel=0.1)
+        assert 0.015 < float(result.scale_max[0]) < 0.04
+
+
+def test_crop_of_band_limited_surface_widens_interval():
+    surface = fc.surfaces.spectral((256, 256), 1e-3, hurst=0.8, rms_height=1e-5, rolloff=0.03, rng=24)
+    result = estimate_one(surface[:128, :128])
+    assert abs(float(result.misfit)) > 3.3
+    note = json.loads(estimate(surface[:128, :128]).hurst.attrs["comment"])["default"]
+    assert "changes with scale" in note
+    assert float(result.ci_high - result.ci_low) > 8 * float(result.standard_error)
+
+
+def test_gaps_cause_no_bias(rough):
+    result, complete = estimate(with_gaps(rough), VALIDATED), estimate(rough, VALIDATED)
+    np.testing.assert_allclose(result.hurst, complete.hurst, atol=0.03)
+    assert (result.standard_error > complete.standard_error).all()
+    np.testing.assert_allclose(result.standard_error, complete.standard_error, rtol=0.35)
+    np.testing.assert_allclose(result.rms_increment, 2e-6, rtol=0.06)
+    margin = rough.where((rough.y > rough.y[5]) & (rough.x < rough.x[-9]))
+    np.testing.assert_allclose(estimate_one(margin).hurst, estimate_one(rough[6:, :-9]).hurst, rtol=1e-9)
+
+
+def test_noise_is_separated():
+    rng = np.random.default_rng(25)
+    surface = fc.surfaces.fbm((160, 160), 1e-4, hurst=0.8, rms_increment=1e-6, rng=26)
+    noisy = surface.copy(data=surface.values + 2.3e-7 * rng.standard_normal(surface.shape))
+    plain, result = estimate_one(noisy), estimate_one(noisy, noise=True)
+    assert float(plain.hurst) < 0.72
+    assert float(result.ci_low) < 0.8 < float(result.ci_high)
+    assert float(result.noise_height) == pytest.approx(2.3e-7, rel=0.1)
+    assert np.isnan(plain.noise_height)
+    gapped = estimate_one(with_gaps(noisy), noise=True)
+    assert float(gapped.ci_low) < 0.8 < float(gapped.ci_high)
+    assert float(gapped.noise_height) == pytest.approx(2.3e-7, rel=0.15)
+    others = estimate(noisy, ["increments", "variogram"], noise=True)
+    assert np.isnan(others.ci_low).all()
+    assert "noise" in others.ci_low.attrs["reason"]
+
+
+def test_unequal_spacings_and_transposed():
+    surface = fc.surfaces.fbm((80, 150), (3e-4, 1e-4), hurst=0.4, rms_increment=1e-6, rng=27)
+    result = estimate(surface, VALIDATED)
+    assert ((result.ci_low < 0.4) & (result.ci_high > 0.4)).all()
+    np.testing.assert_allclose(result.rms_increment, 1e-6, rtol=0.06)
+    transposed = xr.DataArray(
+        surface.values.T,
+        dims=("y", "x"),
+        coords={"y": surface.x.values, "x": surface.y.values},
+        attrs=surface.attrs,
+    )
+    np.testing.assert_allclose(estimate(transposed, VALIDATED).hurst, result.hurst, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", SCALE_FREE)
+def test_powers_of_two_change_no_bit(rough, name):
+    result, tiny = estimate(rough, name), estimate(rough * 2.0**-40, name)
+    for key in ("hurst", "standard_error", "ci_low", "ci_high", "misfit"):
+        np.testing.assert_array_equal(result[key], tiny[key])
+    np.testing.assert_array_equal(result.rms_increment * 2.0**-40, tiny.rms_increment)
+    longer = rough.assign_coords(x=rough.x * 2.0**10, y=rough.y * 2.0**10)
+    if name != "cube_counts":
+        np.testing.assert_allclose(estimate(longer, name).hurst, result.hurst, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1e-9, 1e6])
+def test_any_unit_of_height(rough, factor):
+    np.testing.assert_allclose(
+        estimate(rough * factor, SCALE_FREE).hurst, estimate(rough, SCALE_FREE).hurst, rtol=1e-7
+    )
+
+
+def test_far_from_zero():
+    """At 1e9 m heights have a precision of 1e-7 m; the exponent tolerates that."""
+    surface = fc.surfaces.fbm((64, 64), 1.0, hurst=0.6, rms_increment=1e-3, rng=28)
+    np.testing.assert_allclose(
+        estimate(surface + 1e9, SCALE_FREE).hurst, estimate(surface, SCALE_FREE).hurst, atol=1e-3
+    )
+
+
+def test_threads_change_no_bit(rough):
+    result = []
+    for count in (1, 2):
+        with threads.limit(count):
+            result.append(
+                estimate(with_gaps(rough), [name for name in NAMES if name != "spectrum"]).drop_vars(
+                    "run_time"
+                )
+            )
+    for key in result[0].data_vars:
+        np.testing.assert_array_equal(result[0][key], result[1][key])
+
+
+def test_scales_limit_the_fit(rough):
+    window = (4e-4, 3.2e-3)
+    result = estimate(rough, NAMES, scales=window)
+    assert (result.scale_min >= window[0] * (1 - 1e-9)).all()
+    assert (result.scale_max <= window[1] * (1 + 1e-9)).all()
+    free = estimate(rough, ["likelihood"])
+    assert float(result.standard_error[0]) > 1.5 * float(free.standard_error[0])
+    assert float(result.ci_low[0]) < 0.7 < float(result.ci_high[0])
+    with pytest.raises(InvalidInput, match="scales: expected a window that meets the lengths of the surface"):
+        estimate(rough, NAMES, scales=(1.0, 2.0))
+    empty = estimate(rough, NAMES, scales=(1.05e-4, 1.3e-4))
+    assert np.isnan(empty.hurst).all()
+    assert set(json.loads(empty.hurst.attrs["comment"])) == set(NAMES)
+
+
+@pytest.mark.parametrize("method", ["variogram", "madogram", "second_variogram"])
+def test_scales_beyond_default_lags(rough, method):
+    """Lags longer than those of the default curve."""
+    extent = min(n * 1e-4 for n in rough.shape)
+    longest = {"variogram": 0.8, "madogram": 0.8, "second_variogram": 0.4}[method] * extent
+    result = fc.dimensions.estimate(rough, method, scales=(0.1 * extent, longest))
+    assert 0.85 * longest < float(result.scale_max[0]) <= longest * (1 + 1e-9)
+
+
+def test_stack_equals_single_results():
+    stack = fc.surfaces.fbm((40, 40), 1e-3, hurst=0.5, rms_increment=1e-5, members=3, rng=30)
+    result = estimate(stack, ["default", "variogram"])
+    assert result.hurst.dims == ("member", "method")
+    np.testing.assert_array_equal(result.hurst[2], estimate(stack[2], ["default", "variogram"]).hurst)
+    assert "member" in result.coords
+
+
+@pytest.mark.parametrize("hurst", [0.25, 0.75])
+def test_profiles(hurst):
+    profile = fc.surfaces.fbm(900, 1e-4, hurst=hurst, rms_increment=1e-6, rng=31)
+    result = estimate(profile, ["default", *NAMES])
+    np.testing.assert_allclose(result.fractal_dimension, 2.0 - result.hurst)
+    assert float(result.ci_low[0]) < hurst < float(result.ci_high[0])
+    assert abs(float(result.hurst[0]) - hurst) < 4 * 0.7 / 30
+    assert float(result.rms_increment[0]) == pytest.approx(1e-6, rel=0.1)
+    gapped = profile.where(np.random.default_rng(1).random(900) > 0.2)
+    assert float(estimate_one(gapped).hurst) == pytest.approx(hurst, abs=0.1)
+    tilted = profile.copy(data=profile.values + 1e-5 * np.arange(900))
+    np.testing.assert_allclose(estimate_one(tilted).hurst, result.hurst[0], atol=1e-4)
+
+
+def test_white_noise_gives_zero():
+    result = estimate(surface_of(np.random.default_rng(33).standard_normal((64, 64))), VALIDATED)
+    assert (result.hurst < 0.02).all()
+    assert (result.ci_low == 0.0).all()
+    assert (result.ci_high < 0.05).all()
+
+
+def test_planes_and_smooth_caps_give_one():
+    y = np.arange(24.0)
+    result = estimate(surface_of(np.add.outer(0.03 * y, 0.1 * y)), NAMES)
+    np.testing.assert_allclose(result.hurst, 1.0, rtol=1e-12)
+    assert np.isnan(result.ci_low).all()
+    assert "plane" in json.loads(result.hurst.attrs["comment"])["likelihood"]
+    cap = estimate(surface_of(np.sqrt(2000 - np.add.outer((y - 12) ** 2, (y - 12) ** 2))), VALIDATED)
+    np.testing.assert_array_equal(cap.hurst, 1.0)
+    assert (cap.fitted_hurst > 1.3).all()
+    assert "smoother than a fractal" in cap.hurst.attrs["comment"]
+
+
+@pytest.mark.parametrize("shape", [(40, 36), (60,)])
+def test_plane_far_from_zero(shape):
+    """Its heights are rounded to 1e-7 m."""
+    heights = np.sum(np.indices(shape).T * np.array([0.1, 0.03])[: len(shape)], axis=-1).T + 1e9
+    surface = fc.surfaces.from_array(heights, 1e-4)
+    result = fc.dimensions.estimate(
+        surface, ["likelihood", "increments", "second_variogram", "roughness_length"]
+    )
+    assert (result.hurst == 1.0).all()
+    assert result.ci_low.isnull().all()
+
+
+def test_constant_heights():
+    result = estimate(surface_of(np.full((16, 16), 1e6)), NAMES)
+    covers = result.method.isin(["cube_counts", "covering"]).values
+    assert (result.fractal_dimension.values[covers] == 2.0).all()
+    assert np.isnan(result.hurst.values[~covers]).all()
+    assert "constant" in json.loads(result.hurst.attrs["comment"])["likelihood"]
+
+
+@pytest.mark.parametrize("shape", [(5, 5), (7, 11), (4, 9), (4, 200), (31, 37)])
+def test_small_and_prime_shapes(shape):
+    surface = surface_of(np.random.default_rng(34).standard_normal(shape).cumsum(0).cumsum(1))
+    result = estimate(surface, [name for name in NAMES if name != "roughness_length"])
+    notes = json.loads(result.hurst.attrs["comment"])
+    for name, hurst in zip(result.method.values, result.hurst.values, strict=True):
+        assert np.isfinite(hurst) or notes[name]
+    low, high = float(result.ci_low[0]), float(result.ci_high[0])
+    if np.isnan(low):  # twice summed noise may be smoother than any fractal
+        assert json.loads(result.ci_low.attrs["reason"])["likelihood"]
+        assert float(result.fitted_hurst[0]) > 1.0
+    else:
+        assert 0.0 <= low <= float(result.hurst[0]) <= high <= 1.0
+
+
+def test_spike_and_rounded_heights():
+    spike = np.zeros((20, 20))
+    spike[7, 9] = 1.0
+    assert float(estimate_one(surface_of(spike)).hurst) < 0.05
+    surface = fc.surfaces.fbm((64, 64), 1e-3, hurst=0.7, rms_increment=1e-4, rng=35)
+    steps = surface.copy(data=5e-5 * np.rint(surface.values / 5e-5))
+    assert 0.5 < float(estimate_one(steps).hurst) < 0.75
+    assert float(estimate_one(steps, noise=True).hurst) == pytest.approx(0.7, abs=0.15)
+
+
+def test_invalid_arguments(rough):
+    with pytest.raises(ValueError, match=r"methods: .*'defalt'") as caught:
+        estimate(rough, ["defalt"], scales=(2.0, 1.0), noise="yes")
+    assert "3 problems" in str(caught.value)
+    for text, bad in {
+        "at least one name": lambda: estimate(rough, []),
+        "nothing but NaN": lambda: estimate(rough * np.nan),
+        "infinite": lambda: estimate(rough.where(rough > 0, np.inf)),
+        "uniform spacing": lambda: estimate(rough.assign_coords(x=rough.x**2)),
+        "at least 4 points": lambda: estimate(surface_of(np.eye(3))),
+        "at least 25 observed points": lambda: estimate(surface_of(np.eye(4))),
+        "see fractalcontact.surfaces.fill": lambda: estimate(with_gaps(rough), "spectrum"),
+        "a DataArray of heights": lambda: estimate(rough.values),
+        "'m'": lambda: estimate(rough.assign_attrs(units="um")),
+    }.items():
+        with pytest.raises(ValueError, match=text):
+            bad()
+
+
+@pytest.mark.parametrize("factor", [2.0**530, 2.0**-530])
+def test_heights_whose_squares_overflow(rough, factor):
+    """Exponents are dimensionless; the curves, in m2 and m4, raise an error."""
+    far = rough.copy(data=rough.values * factor)
+    unitless = [name for name in NAMES if name != "covering"]
+    here, there = estimate(rough, unitless), estimate(far, unitless)
+    np.testing.assert_array_equal(here.hurst, there.hurst)
+    np.testing.assert_array_equal(here.rms_increment * factor, there.rms_increment)
+    assert np.isfinite(estimate(far, "covering").hurst).all()
+    for curve in ("spectrum", "variogram", "second_variogram", "cube_counts", "roughness_length"):
+        with pytest.raises(InvalidInput, match="whose squares are numbers"):
+            getattr(fc.dimensions, curve)(far)

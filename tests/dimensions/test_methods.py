@@ -1,0 +1,24 @@
+"""Names and descriptions of the methods."""
+
+import subprocess
+import sys
+
+import fractalcontact as fc
+
+VALIDATED = ["likelihood", "increments"]
+
+
+def test_descriptions():
+    table = fc.dimensions.methods()
+    assert next(iter(table)) == "likelihood"
+    assert all(isinstance(line, str) and line.count("\n") == 0 for line in table.values())
+    assert [name for name, line in table.items() if "95 % interval" in line] == VALIDATED
+
+
+def test_import_loads_no_heavy_library():
+    code = (
+        "import sys, fractalcontact.dimensions as d; d.methods();"
+        "print(sorted(set(sys.modules) & {'numba', 'xarray', 'matplotlib', 'skimage', 'dask', 'netCDF4'}))"
+    )
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert process.stdout.strip() == "[]"

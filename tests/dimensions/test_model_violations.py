@@ -1,0 +1,137 @@
+"""Surfaces outside the families: the interval is widened or withheld, with a note."""
+
+import json
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+SIZE, SPACING, STEP = 96, 1e-4, 1e-5
+
+
+def brownian(hurst, rng, shape=(SIZE, SIZE)):
+    return fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=STEP, rng=rng).values
+
+
+def rounded(heights, levels):
+    step = np.ptp(heights) / levels
+    return np.round((heights - heights.min()) / step) * step
+
+
+def with_spikes(heights, rng):
+    spiked = heights.copy()
+    places = np.random.default_rng(rng).integers(0, SIZE, (2, 5))
+    spiked[tuple(places)] += 50 * STEP
+    return spiked
+
+
+def oblique_step(heights):
+    y, x = np.indices(heights.shape)
+    return heights + 20 * STEP * (x + 0.37 * y > 0.6 * SIZE)
+
+
+def estimated(heights, method, **options):
+    result = fc.dimensions.estimate(fc.surfaces.from_array(heights, SPACING), method, **options)
+    result = result.isel(method=0)
+    return (
+        float(result.hurst),
+        float(result.ci_low),
+        float(result.ci_high),
+        json.loads(result.hurst.attrs["comment"]).get(method, ""),
+    )
+
+
+DEFECTS = {
+    "an oblique step": (0.7, lambda s: oblique_step(brownian(0.7, s)), "parts|share"),
+    "outliers": (0.7, lambda s: with_spikes(brownian(0.7, s), s), "parts"),
+    "8 bits": (0.9, lambda s: rounded(brownian(0.9, s), 255), "rounded to steps"),
+    "5 bits": (0.7, lambda s: rounded(brownian(0.7, s), 31), "rounded to steps"),
+}
+
+
+@pytest.mark.parametrize("method", ["likelihood", "increments"])
+@pytest.mark.parametrize("name", DEFECTS)
+def test_defects_widen_interval_to_true_exponent(name, method):
+    hurst, defect, words = DEFECTS[name]
+    for seed in (1, 3):
+        result, low, high, note = estimated(defect(seed), method)
+        assert abs(result - hurst) > 0.02  # the estimate itself is wrong ...
+        assert low - 0.05 <= hurst <= high + 0.05  # ... and its interval is not that of one that is right
+        assert any(word in note for word in words.split("|"))
+
+
+@pytest.mark.parametrize("method", ["likelihood", "increments"])
+def test_two_exponents_side_by_side(method):
+    half = (SIZE, SIZE // 2)
+    rough, smooth = brownian(0.3, 4, half), brownian(0.8, 5, half)
+    heights = np.concatenate([rough, smooth - smooth[:, :1] + rough[:, -1:]], axis=1)
+    _, low, high, note = estimated(heights, method)
+    assert low < 0.35
+    assert high > 0.62
+    assert "differs from part to part" in note
+
+
+@pytest.mark.parametrize("method", ["likelihood", "increments"])
+def test_unequal_patches_widen_interval(method):
+    """The scatter of the estimate on lognormal surfaces, and the width of its interval."""
+    result = [estimated(np.exp(brownian(0.5, s) / (5 * STEP)), method)[:3] for s in range(8)]
+    hurst, low, high = np.array(result).T
+    half = 0.5 * (high - low)
+    assert np.std(hurst) < np.mean(half) < 8 * np.std(hurst)
+    assert np.mean(half) > 3 * 1.96 * 0.008
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_anisotropic_surface_is_noted(periodic):
+    surface = fc.surfaces.spectral(
+        (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=2.0, azimuth=30.0, rng=6
+    )
+    result = fc.dimensions.estimate(surface if periodic else fc.surfaces.from_array(surface.values, SPACING))
+    assert "more than their share" in result.hurst.attrs["comment"]
+    if periodic:
+        assert float(result.ci_low[0]) < 0.7 < float(result.ci_high[0])
+
+
+def test_band_limited_periodic_surface_fits():
+    for seed in range(5):
+        surface = fc.surfaces.spectral(
+            (SIZE, SIZE), SPACING, hurst=0.7, rms_height=STEP, rolloff=2e-3, short_cutoff=4e-4, rng=seed
+        )
+        assert "share" not in fc.dimensions.estimate(surface).hurst.attrs["comment"]
+
+
+def test_rounded_and_uneven_profiles_are_noted():
+    heights = brownian(0.8, 9, 300)
+    _, low, high, note = estimated(rounded(heights, 63), "likelihood")
+    assert low < 0.8 < high
+    assert "rounded to steps" in note
+    _, _, _, note = estimated(heights * np.where(np.arange(300) < 100, 8.0, 1.0), "likelihood")
+    assert "not equally rough" in note
+
+
+def test_fitted_noise_explains_rounding():
+    _, low, high, note = estimated(rounded(brownian(0.9, 12), 255), "likelihood", noise=True)
+    assert low < 0.9 < high
+    assert "rounded" not in note
+
+
+@pytest.mark.parametrize("method", ["increments", "likelihood"])
+@pytest.mark.parametrize("rng", [1, 2, 3])
+def test_unfitted_noise_widens_interval(method, rng):
+    heights = brownian(0.9, rng, (128, 128))
+    noise = np.random.default_rng(rng).standard_normal(heights.shape)
+    hurst, low, high, note = estimated(heights + np.sqrt(0.05) * STEP * noise, method)
+    assert "changes with" in note
+    assert "white noise" in note
+    assert hurst < 0.85
+    assert low < 0.9 < high
+
+
+def test_unfitted_noise_on_profile_widens_interval():
+    heights = brownian(0.9, 4, 4096)
+    noise = np.random.default_rng(4).standard_normal(heights.shape)
+    hurst, low, high, note = estimated(heights + np.sqrt(0.05) * STEP * noise, "likelihood")
+    assert "white noise" in note
+    assert hurst < 0.85
+    assert low < 0.9 < high

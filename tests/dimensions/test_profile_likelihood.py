@@ -1,0 +1,49 @@
+"""Exact likelihood of a profile against dense linear algebra."""
+
+import numpy as np
+import pytest
+
+from fractalcontact.base import threads
+from fractalcontact.dimensions import _profile_likelihood
+
+
+def test_deviance_equals_dense_algebra():
+    rng = np.random.default_rng(9)
+    heights = np.cumsum(rng.standard_normal(60))
+    heights[[3, 4, 20, 41]] = np.nan
+    places = np.flatnonzero(np.isfinite(heights)).astype(float)
+    jumps, gaps = np.diff(heights[np.isfinite(heights)]), np.diff(places)
+
+    def dense(hurst, noise):
+        rise = -0.5 * np.abs(places[:, None] - places) ** (2 * hurst) + noise * np.eye(places.size)
+        covariance = np.diff(np.diff(rise, axis=0), axis=1)
+        inverse = np.linalg.inv(covariance)
+        own = gaps @ inverse @ gaps
+        square = jumps @ inverse @ jumps - (jumps @ inverse @ gaps) ** 2 / own
+        freedom = jumps.size - 1
+        return np.linalg.slogdet(covariance)[1] + np.log(own) + freedom * np.log(square / freedom)
+
+    increments = _profile_likelihood.ProfileIncrements(heights)
+    for hurst, noise in ((0.2, 0.0), (0.7, 0.3), (0.95, 0.0)):
+        assert increments.solve(hurst, noise)[0] == pytest.approx(dense(hurst, noise), rel=1e-10)
+
+
+def test_regular_chunks_share_factorisation():
+    heights = np.cumsum(np.random.default_rng(10).standard_normal(600))
+    complete = _profile_likelihood.ProfileIncrements(heights)
+    assert complete.positions.shape == (3, 200)
+    assert complete.is_regular
+    deviance, amplitude = complete.solve(0.6, 0.1)
+    complete.is_regular = False
+    again = complete.solve(0.6, 0.1)
+    assert (deviance, amplitude) == pytest.approx(again, rel=1e-12)
+
+
+def test_threads_change_no_bit():
+    heights = np.cumsum(np.random.default_rng(11).standard_normal(1100))
+    heights[::97] = np.nan
+    result = []
+    for count in (1, 2):
+        with threads.limit(count):
+            result.append(_profile_likelihood.fit_profile(heights))
+    assert result[0] == result[1]

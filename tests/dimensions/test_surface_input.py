@@ -1,0 +1,51 @@
+"""Checks of the input surface, and surfaces that are not in memory."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return fc.surfaces.fbm((48, 40), (2e-3, 1e-3), hurst=0.6, rms_increment=1e-4, rng=1)
+
+
+NAMES = list(fc.dimensions.methods())
+
+
+def estimate(*arguments, **options):
+    return fc.dimensions.estimate(*arguments, **options)
+
+
+def test_dask_surface_gives_same_results(rough, monkeypatch):
+    pytest.importorskip("dask")
+    monkeypatch.setattr("fractalcontact.dimensions._surface_input.SLAB", 400)
+    lazy = rough.chunk({"y": 7})
+    for name in ("variogram", "madogram", "second_variogram"):
+        curve = getattr(fc.dimensions, name)
+        first, second = curve(rough, max_lag=8e-3), curve(lazy, max_lag=8e-3)
+        np.testing.assert_allclose(second[name], first[name], rtol=1e-12)
+        assert (second.pair_count == first.pair_count).all()
+    tiles = [fc.dimensions.spectrum(s, tile=16).power_spectral_density for s in (rough, lazy)]
+    np.testing.assert_allclose(tiles[1], tiles[0], rtol=1e-9)
+    result = [fc.dimensions.estimate(s, "increments").hurst.values for s in (rough, lazy)]
+    np.testing.assert_array_equal(*result)
+
+
+def test_invalid_arguments_of_curves(rough):
+    with pytest.raises(ValueError, match=r"window.*\n.*tile") as caught:
+        fc.dimensions.spectrum(rough, window="boxcar", tile=4)
+    assert "2 problems" in str(caught.value)
+    with pytest.raises(ValueError, match=r"surface: expected finite values.*fill"):
+        fc.dimensions.spectrum(rough.where(rough > rough.mean()))
+    with pytest.raises(ValueError, match="max_lag: expected at least one spacing"):
+        fc.dimensions.variogram(rough, max_lag=1e-5)
+    with pytest.raises(ValueError, match="uniform spacing"):
+        fc.dimensions.variogram(rough.assign_coords(x=rough.x**2))
+    with pytest.raises(ValueError, match="vertical_scale"):
+        fc.dimensions.covering(rough, vertical_scale=-1.0)
+    with pytest.raises(ValueError, match="nothing but NaN"):
+        fc.dimensions.madogram(rough * np.nan)
+    with pytest.raises(ValueError, match="infinite"):
+        fc.dimensions.cube_counts(rough.where(rough.x > 5e-3, np.inf))

@@ -1,0 +1,129 @@
+"""Variogram, madogram and second variogram against loops over pairs."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+
+def surface_of(heights, spacing=1e-3, periodic=False):
+    return fc.surfaces.from_array(np.asarray(heights, float), spacing, periodic=periodic)
+
+
+def pairs(heights, spacing, periodic, longest):
+    """Distance, squared increment of every pair of points within reach, by loops over lags."""
+    ny, nx = heights.shape
+    result = {}
+    for dy in range(-ny + 1, ny):
+        for dx in range(-nx + 1, nx):
+            h = np.hypot(dy * spacing[0], dx * spacing[1])
+            if not 0 < h <= longest or (dy, dx) < (0, 0):
+                continue
+            moved = np.roll(heights, (-dy, -dx), axis=(0, 1))
+            keep = np.ones(heights.shape, dtype=bool)
+            if not periodic:
+                keep[max(ny - dy, 0) :], keep[: max(-dy, 0)] = False, False
+                keep[:, max(nx - dx, 0) :], keep[:, : max(-dx, 0)] = False, False
+            d = (moved - heights)[keep]
+            d = d[np.isfinite(d)]
+            key = round(h / max(spacing), 9)
+            total, number = result.get(key, (0.0, 0))
+            result[key] = (total + np.sum(d**2), number + d.size)
+    return result
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return fc.surfaces.fbm((48, 40), (2e-3, 1e-3), hurst=0.6, rms_increment=1e-4, rng=1)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("longest", [2.5e-3, None])
+def test_variogram_equals_loop_over_pairs(periodic, longest):
+    rng = np.random.default_rng(2)
+    heights = rng.standard_normal((20, 17)).cumsum(axis=0)
+    heights[rng.random(heights.shape) < 0.1] = np.nan
+    spacing = (1e-3, 5e-4)
+    curve = fc.dimensions.variogram(surface_of(heights, spacing, periodic), max_lag=longest)
+    assert float(curve.lag.max()) <= (longest or 0.5 * min(20e-3, 8.5e-3)) * (1 + 1e-9)
+    direct = pairs(heights, spacing, periodic, min(float(curve.lag.max()), 4e-3) * 1.0001)
+    for lag in curve.lag.values[curve.lag.values <= 4e-3]:
+        total, number = direct[round(lag / 1e-3, 9)]
+        at = curve.sel(lag=lag)
+        assert float(at.variogram) == pytest.approx(0.5 * total / number, rel=1e-11)
+        assert int(at.pair_count) == number
+
+
+def test_direct_sums_equal_transforms(rough):
+    complete = fc.dimensions.variogram(rough)
+    short = fc.dimensions.variogram(rough, max_lag=6e-3)
+    same = complete.sel(lag=short.lag.values, method="nearest", tolerance=1e-9)
+    np.testing.assert_allclose(same.variogram, short.variogram, rtol=1e-10)
+    np.testing.assert_array_equal(same.pair_count, short.pair_count)
+
+
+def test_variogram_of_plane_wave_and_plane():
+    n, k = 64, 5
+    x = np.arange(n) / n
+    wave = surface_of(np.tile(np.cos(2 * np.pi * k * x), (n, 1)), 1.0 / n, periodic=True)
+    curve = fc.dimensions.variogram(wave, max_lag=1.0 / n)
+    # the lag of one spacing stands for (1, 0) and (0, 1), and along the crests nothing changes
+    assert float(curve.variogram[0]) == pytest.approx(0.25 * (1 - np.cos(2 * np.pi * k / n)), rel=1e-12)
+    y = np.arange(30)
+    plane = fc.dimensions.variogram(surface_of(np.add.outer(0.2 * y, 0.1 * y), 1.0), max_lag=1.0)
+    assert float(plane.variogram[0]) == pytest.approx(0.25 * (0.04 + 0.01), rel=1e-12)
+    tilted = fc.dimensions.variogram(surface_of(np.add.outer(0.0 * y, 0.1 * y), 1.0))
+    np.testing.assert_allclose(tilted.local_slope[:3], 2.0, atol=0.35)
+
+
+@pytest.mark.parametrize("name", ["madogram", "second_variogram"])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_increments_along_axes_equal_numpy(name, periodic):
+    rng = np.random.default_rng(3)
+    heights = rng.standard_normal((33, 41))
+    heights[rng.random(heights.shape) < 0.05] = np.nan
+    curve = getattr(fc.dimensions, name)(surface_of(heights, 1e-3, periodic))
+    order = 2 if name == "second_variogram" else 1
+    for lag in (1, 2, 3):
+        values = []
+        for axis in (0, 1):
+            d = heights
+            for _ in range(order):
+                n = d.shape[axis]
+                moved = np.roll(d, -lag, axis)
+                d = moved - d if periodic else (moved - d).take(range(n - lag), axis)
+            values.append(d[np.isfinite(d)])
+        values = np.concatenate(values)
+        expected = np.mean(values**2) if order == 2 else 0.5 * np.mean(np.abs(values))
+        at = curve.sel(lag=lag * 1e-3, method="nearest")
+        assert float(at[name]) == pytest.approx(expected, rel=1e-12)
+        assert int(at.pair_count) == values.size
+
+
+@pytest.mark.parametrize("name", ["variogram", "madogram", "second_variogram"])
+def test_periodic_lags_end_at_half_period(name):
+    surface = fc.surfaces.spectral(60, 1e-3, hurst=0.6, rms_height=1e-5, rng=3)
+    curve = getattr(fc.dimensions, name)(surface, max_lag=0.05)
+    assert 0.02 < float(curve.lag.max()) <= 0.03 * (1 + 1e-9)
+
+
+def test_slender_surface_uses_all_pairs():
+    heights = np.random.default_rng(5).standard_normal((6, 80)).cumsum(axis=1)
+    curve = fc.dimensions.variogram(surface_of(heights), max_lag=0.06)
+    assert float(curve.lag.max()) > 0.059
+    squares, number = 0.0, 0
+    for dy in range(6):
+        for dx in range(-79, 80):
+            if 0 < np.hypot(dx, dy) <= 60 and (dy > 0 or dx > 0):
+                here = heights[dy:, max(dx, 0) : 80 + min(dx, 0)]
+                there = heights[: 6 - dy, max(-dx, 0) : 80 - max(dx, 0)]
+                squares, number = squares + np.sum((here - there) ** 2), number + here.size
+    assert int(curve.pair_count.sum()) == number
+    assert float((2 * curve.variogram * curve.pair_count).sum()) == pytest.approx(squares, rel=1e-10)
+
+
+def test_second_variogram_ignores_plane(rough):
+    tilted = rough + 0.3 * rough.x - 0.2 * rough.y
+    tilted.attrs = rough.attrs
+    first, second = fc.dimensions.second_variogram(rough), fc.dimensions.second_variogram(tilted)
+    np.testing.assert_allclose(second.second_variogram, first.second_variogram, rtol=1e-8)
