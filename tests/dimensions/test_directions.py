@@ -162,7 +162,7 @@ def test_two_exponents_exceed_ratio():
 
 
 def test_any_isotropic_spectrum_is_isotropic():
-    """A roll-off and a cut-off, which no fractional Brownian surface has; periodic, and cut with free edges."""
+    """A roll-off and a cut-off, which fBm does not have; periodic, and cut with free edges."""
     surface = fc.surfaces.spectral(
         (256, 256), SPACING, hurst=0.8, rms_height=1e-6, rolloff=4e-3, short_cutoff=6e-4, rng=10
     )
