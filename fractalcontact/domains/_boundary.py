@@ -71,8 +71,8 @@ def boundary_dimension(
     -----
     NaN without a boundary (an empty or a full plane). The interval is NaN where fewer than 200 sides of cells
     lie on the boundary, or where one block holds all of them. The dimension is that at the scale of the cell:
-    a set smooth at that scale has the dimension 1 however rough it is at larger scales. Validation: "Theory:
-    contact domains".
+    a set smooth at that scale has the dimension 1 however rough it is at larger scales. Validation: see the
+    documentation, "Theory: contact domains".
 
     Examples
     --------

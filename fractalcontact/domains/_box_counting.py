@@ -108,7 +108,8 @@ def box_dimension(
     -----
     0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask; NaN for an empty one, with
     the reason in `comment`. Over the full range of scales the counts of any set measure little but its
-    coverage: compare with the null. Fit, interval and their validation: "Theory: contact domains".
+    coverage: compare with the null. Fit and interval: see the documentation,
+    "Theory: contact domains".
 
     Examples
     --------

@@ -80,7 +80,7 @@ def correlation_dimension(
     -----
     0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask; NaN for an empty one, with
     the reason in `comment`. D_2 of `generalised_dimensions` is the same quantity from boxes on one grid.
-    The interval was validated on sets of known dimension: "Theory: contact domains".
+    Validation on sets of known dimension: see the documentation, "Theory: contact domains".
 
     Examples
     --------

@@ -79,7 +79,8 @@ def minkowski_dimension(
     Notes
     -----
     1 for a row or column that spans the mask, 2 for a full mask, about 0 for one cell; NaN for an empty one,
-    with the reason in `comment`. Bias on rasters and validation: "Theory: contact domains".
+    with the reason in `comment`. Bias on rasters and validation: see the documentation,
+    "Theory: contact domains".
 
     Examples
     --------
