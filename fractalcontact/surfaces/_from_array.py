@@ -40,7 +40,10 @@ def check_heights(problems: Problems, heights: Any) -> int | None:
     for name, size in zip(("y", "x")[2 - axes :], values.shape[-axes:] if axes else (), strict=False):
         problems.require(size >= 2, f"heights ({name})", "at least 2 points", size)
     if not _is_lazy(values):
-        infinite = int(np.count_nonzero(np.ma.filled(np.isinf(values), False)))
+        is_infinite = np.isinf(np.ma.getdata(values))
+        if is_infinite.any():
+            is_infinite &= ~np.ma.getmaskarray(values)
+        infinite = int(np.count_nonzero(is_infinite))
         problems.require(
             infinite == 0, "heights", "finite values, or NaN where missing", f"{infinite} infinite"
         )
