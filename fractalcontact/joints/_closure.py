@@ -94,8 +94,7 @@ def closure(
     """Return the closure of a sheared crack under a path of load.
 
     The delta-surface of every shear is pressed together along the same path. The closure w counts from first
-    touch at that shear. The bulk part w_b(F) is subtracted: w_int = w - w_b, which is 0 to rounding for mated
-    faces.
+    touch at that shear; without its bulk part, w_int = w - w_b(F), it is 0 to rounding for mated faces.
 
     Parameters
     ----------
@@ -109,10 +108,10 @@ def closure(
         Exactly one of them: approach from first touch (m), force on the block (N), or force over its area
         (Pa). A sequence is a path of load, which may go up and down.
     bulk : {"flat_block", "uniform_pressure"}
-        Bulk part: closure of the flat block under the same influence coefficients, or its mean displacement
-        under uniform pressure (about 9 % more for a square). Zero for periodic bodies.
+        Bulk part w_b: closure of the flat block, or its mean displacement under uniform pressure (about 9 %
+        more for a square). Zero for periodic bodies.
     keep : sequence of str
-        Maps over (shear, step, y, x) to keep: "state", "pressure", "gap", "displacement", "residual_height".
+        Maps over (shear, step, y, x): "state", "pressure", "gap", "displacement", "residual_height".
     influence, disc_radius, hardness, tolerance, method
         As for `fractalcontact.contact.press`. With a `hardness` unloading is stiffer than loading.
     progress : bool
@@ -127,12 +126,8 @@ def closure(
     Raises
     ------
     InvalidInput
-        The block would leave its face, heights are missing in its path, or an argument is wrong.
-
-    Warns
-    -----
-    ConvergenceWarning
-        A step stopped before its tolerance was met.
+        The block would leave its face, heights are missing in its path, or an argument is wrong. A step that
+        stops before its tolerance is met gives a ConvergenceWarning.
 
     References
     ----------

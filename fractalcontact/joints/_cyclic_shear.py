@@ -119,9 +119,8 @@ def cyclic_shear(
     --------
     >>> import numpy as np
     >>> import fractalcontact as fc
-    >>> x = np.arange(60)
-    >>> teeth = np.abs((x + 10) % 20 - 10) * np.tan(np.radians(10)) * np.ones((6, 1))
-    >>> surface = fc.surfaces.from_array(teeth, 1.0)
+    >>> slope = np.tan(np.radians(10)) * np.arange(40.0) * np.ones((6, 1))
+    >>> surface = fc.surfaces.from_array(slope, 1.0)
     >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
     >>> climb = fc.joints.dilatancy(crack, shear=[0, 2, 4], direction="E")
     >>> cycle = fc.joints.cyclic_shear(climb, [0, 4, 0])

@@ -114,9 +114,9 @@ def dilatancy(
         rigid_dilatancy (direction, shear), m, relative to its value at v = 0, which is initial_offset;
         mean_slope (direction) of the lower face; plateau_dilatancy, rigid_dilatancy without mean_slope times
         v; interpolation_error, m, see `delta_surface`; basic_friction_angle (degree), nominal_area (m2). With
-        forces also, over (direction, shear, step): dilatancy, closure, interface_closure (m), the other
-        scalars of `press` and the maps in `keep`; over step (with a spring over all): normal_force,
-        nominal_pressure, bulk_closure. With a spring normal_stiffness (Pa/m) and initial_force over step.
+        forces also, over (direction, shear, step): dilatancy and interface_closure (m), the scalars of
+        `press` and the maps in `keep`; over step (with a spring over all): normal_force, nominal_pressure,
+        bulk_closure. With a spring normal_stiffness (Pa/m) and initial_force over step.
 
     Raises
     ------

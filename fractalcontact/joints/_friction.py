@@ -53,30 +53,23 @@ def friction(
     basic_friction_angle : float, optional
         Degree, 0 to 90; None: the one stored in `dilatancy`.
     smoothing : float, optional
-        Length of shear (m) over which a straight line is fitted to the dilatancy around each shear; near the
-        ends of the path the window is cut. None: the slope through the two neighbours of each shear.
+        Length of shear (m) of a straight fit to the dilatancy around each shear. None: the slope through the
+        neighbours. The angle depends on this length: compare only angles of equal `smoothing`.
     nominal_pressure : float or sequence of float, optional
         Pressures sigma (Pa) for the strength of rigid faces; dilatancy under force has its own.
 
     Returns
     -------
     Dataset
-        dilatancy_angle, friction_angle (degree) over (direction, shear), and over step where forces were
-        given; with forces or pressures also shear_strength (Pa) over (direction, shear, step), NaN with the
-        `reason` where the friction angle reaches 90 degrees and the faces lock, negative where the block
-        would slide down by itself. Over (direction[, step]): peak_friction_angle and peak_shear (where it
-        occurs); peak_shear_strength and peak_strength_shear, NaN where the faces lock somewhere. Also
-        basic_friction_angle and, over shear, smoothing.
+        dilatancy_angle, friction_angle (degree) over (direction, shear[, step]); with forces or pressures
+        shear_strength (Pa), NaN with the `reason` where the friction angle reaches 90 degrees and the faces
+        lock, negative where the block slides by itself. Over (direction[, step]): peak_friction_angle,
+        peak_shear_strength and the shears of both. Also basic_friction_angle and, over shear, smoothing.
 
     Raises
     ------
     InvalidInput
         `dilatancy` is not the Dataset of `dilatancy`, has fewer than two shears, or an argument is wrong.
-
-    Notes
-    -----
-    The angle depends on the smoothing length, as the slope of any fractal curve does. Compare only angles of
-    equal `smoothing`; the length in use is part of the result.
 
     References
     ----------
@@ -87,9 +80,8 @@ def friction(
     --------
     >>> import numpy as np
     >>> import fractalcontact as fc
-    >>> x = np.arange(60)
-    >>> teeth = np.abs((x + 10) % 20 - 10) * np.tan(np.radians(15)) * np.ones((6, 1))
-    >>> surface = fc.surfaces.from_array(teeth, 1.0)
+    >>> slope = np.tan(np.radians(15)) * np.arange(40.0) * np.ones((6, 1))
+    >>> surface = fc.surfaces.from_array(slope, 1.0)
     >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
     >>> climb = fc.joints.dilatancy(crack, shear=[0, 2, 4, 6], direction="E")
     >>> result = fc.joints.friction(climb, nominal_pressure=1e6)

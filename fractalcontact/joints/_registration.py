@@ -101,14 +101,7 @@ def register(
     Warns
     -----
     ConvergenceWarning
-        The position was still moving after the last step, or its standard error exceeds one point: the faces
-        may not belong together.
-
-    Notes
-    -----
-    The first guess is the best correlation over all shifts of whole cells, of the faces without their long
-    waves. Least squares with robust weights refine it, on faces smoothed over 4, 2 and 1 cells. The
-    interpolation (cubic spline) smooths the face slightly.
+        The position was still moving after the last step, or its standard error exceeds one point.
 
     References
     ----------

@@ -100,8 +100,7 @@ def transmissivity(
     Notes
     -----
     Exact for parallel plates and for layers along and across the flow. Elsewhere the error falls with the
-    spacing, as its square in smooth openings and more slowly where wide and narrow cells meet at corners.
-    The error of the flow is of second order in the residual; it is solved to about 1e-8.
+    spacing, as its square in smooth openings.
 
     References
     ----------
