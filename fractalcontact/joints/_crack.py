@@ -24,7 +24,7 @@ Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.Crack"
 SMALLEST = 3  # cells along an edge of the block
-WHOLE = 1e-6  # a shear this close to whole cells, in cells, is a shift by whole cells
+SHIFT_ROUNDING = 1e-6  # cells; a shift this close to whole cells is rounded to them
 FILL = "see fractalcontact.surfaces.fill"
 
 
@@ -50,8 +50,8 @@ class Block:
     @property
     def periodic(self) -> tuple[bool, bool]:
         """Whether the block is a whole period of its face, along y and x."""
-        whole = [n == b for n, b in zip(self.face_cells, self.cells, strict=True)]
-        return self.wraps[0] and whole[0], self.wraps[1] and whole[1]
+        (ny, nx), (by, bx) = self.face_cells, self.cells
+        return self.wraps[0] and by == ny, self.wraps[1] and bx == nx
 
     @property
     def slices(self) -> tuple[slice, slice]:
@@ -70,13 +70,13 @@ class Block:
         return travel
 
     def shift(self, shear: float, unit: Pair) -> Pair:
-        """Return the shift in cells (y, x), rounded where it is whole within `WHOLE`."""
+        """Return the shift in cells (y, x), rounded where it is whole within `SHIFT_ROUNDING`."""
         return _rounded(shear * unit[0] / self.spacing[0]), _rounded(shear * unit[1] / self.spacing[1])
 
 
 def _rounded(cells: float) -> float:
     nearest = float(math.floor(cells + 0.5))
-    return nearest if abs(cells - nearest) <= WHOLE else cells
+    return nearest if abs(cells - nearest) <= SHIFT_ROUNDING else cells
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -279,7 +279,7 @@ def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) ->
         expected = f"at most {travel:g} m towards {item.name}, where the block meets the edge of the face"
         if travel == 0:
             expected += " (give the Crack a smaller `block`, or periodic faces)"
-        slack = WHOLE * min(crack.layout.spacing)
+        slack = SHIFT_ROUNDING * min(crack.layout.spacing)
         inside &= problems.require(greatest <= travel + slack, "shear", expected, greatest)
     return once and inside
 

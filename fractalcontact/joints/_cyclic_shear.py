@@ -45,7 +45,7 @@ def _check(
     if valid[1]:
         turns = float_array(path)
         moves = turns.size > 1 and bool((np.diff(turns) != 0).all())
-        expected = "at least two positions, each other than the one before"
+        expected = "at least two positions, each different from the previous one"
         valid.append(problems.require(moves, "path", expected, path))
     if all(valid):
         _check_reach(problems, dilatancy, direction, turns)

@@ -165,9 +165,9 @@ def heights_under(face: Array, block: Block, shift: Pair) -> Array:
 
 
 def _shift_axis(part: Array, axis: int, block: Block, shift: float) -> Array:
-    whole, n, size = math.floor(shift), block.face_cells[axis], block.cells[axis]
-    first = block.start[axis] + whole
-    fraction = shift - whole
+    n, size = block.face_cells[axis], block.cells[axis]
+    first = block.start[axis] + math.floor(shift)
+    fraction = shift - math.floor(shift)
     if fraction and block.wraps[axis]:
         part, fraction = _fourier_shift(part, axis, fraction), 0.0
     if fraction:

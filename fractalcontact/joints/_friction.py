@@ -161,7 +161,7 @@ def check_dilatancy(
 
 
 def read_dilatancy(dilatancy: xr.Dataset) -> tuple[str, Array]:
-    """Return the name of the dilatancy to use, that under force before the rigid one, and the shears."""
+    """Return the name of the dilatancy to use (under force if present, otherwise rigid) and the shears."""
     return _dilatancy_name(dilatancy), np.asarray(dilatancy["shear"].values, dtype=np.float64)
 
 

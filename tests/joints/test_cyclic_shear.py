@@ -51,7 +51,7 @@ def test_locked_faces_have_no_stress(teeth):
 def test_invalid_paths_are_refused(teeth):
     for path, match in (
         ([0.0], "at least two positions"),
-        ([0.0, 1e-3, 1e-3], "each other than"),
+        ([0.0, 1e-3, 1e-3], "each different from"),
         ([0.0, 9e-3], "positions from 0 to 0.008 m"),
     ):
         with pytest.raises(ValueError, match=match):
