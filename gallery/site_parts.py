@@ -16,7 +16,11 @@ def prepare_docstring(app, what, name, obj, options, lines):  # noqa: ARG001
     """Keep the first paragraph of a module docstring; escape the bars of `|a - b|`."""
     if what == "module" and "" in lines:
         del lines[lines.index("") :]
-    lines[:] = [line.replace("|", r"\|") for line in lines]
+    in_example = False
+    for number, line in enumerate(lines):
+        in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
+        if not in_example:
+            lines[number] = line.replace("|", r"\|")
 
 
 class Names(Directive):
