@@ -1,7 +1,7 @@
-"""Varied contact problems, drawn at random, and a judge that knows nothing of the solver.
+"""Random contact problems, and an independent check of their solutions.
 
-The judge takes pressure and closure from a result and computes everything else anew in plain numpy: influence
-coefficients from their closed forms, settlement by one Fourier transform, and the conditions of contact in
+The check takes pressure and closure from a result and computes everything else anew in plain numpy: influence
+coefficients from their closed forms, displacement by one Fourier transform, and the conditions of contact in
 SI units.
 """
 
@@ -11,12 +11,12 @@ import numpy as np
 
 import fractalcontact as fc
 
-NOISE = 2e-13  # rounding of a recomputed settlement, over the greatest length in the problem
+NOISE = 2e-13  # rounding of a recomputed displacement, over the greatest length in the problem
 
 
 @dataclass
 class Case:
-    """One problem: a face, and how it is pressed."""
+    """One problem: a surface, and how it is pressed."""
 
     name: str
     heights: np.ndarray
@@ -55,14 +55,14 @@ def heights_of(rng, kind, shape):
     """Heights of about unit range."""
     y, x = plane_of(shape)
     if kind in ("rough", "plateaus", "pits", "quantised"):
-        face = self_affine(rng, shape, rng.uniform(0, 1))
-        face = face / max(np.ptp(face), 1e-300)
+        rough = self_affine(rng, shape, rng.uniform(0, 1))
+        rough = rough / max(np.ptp(rough), 1e-300)
         if kind == "plateaus":
-            return np.minimum(face, np.quantile(face, rng.uniform(0.1, 0.99)))
+            return np.minimum(rough, np.quantile(rough, rng.uniform(0.1, 0.99)))
         if kind == "pits":
-            return np.maximum(face, np.quantile(face, rng.uniform(0.1, 0.99)))
+            return np.maximum(rough, np.quantile(rough, rng.uniform(0.1, 0.99)))
         levels = 2 ** rng.integers(1, 8)
-        return np.round(face * levels) / levels if kind == "quantised" else face
+        return np.round(rough * levels) / levels if kind == "quantised" else rough
     faces = {
         "noise": lambda: rng.normal(size=shape),
         "sphere": lambda: -(x**2 + y**2),
@@ -92,7 +92,7 @@ KINDS = (
 
 
 def shape_of(rng, largest):
-    """From 3 points to `largest`, not only powers of two; now and then a hundred times longer than wide."""
+    """From 3 points to `largest`, not only powers of two; sometimes a hundred times longer than wide."""
     n = round(log_uniform(rng, 3, largest))
     other = n if rng.random() < 0.6 else max(3, round(n / log_uniform(rng, 1, 100)))
     return (n, other) if rng.random() < 0.5 else (other, n)
@@ -141,7 +141,7 @@ def draw(seed, largest=128):
 
 
 def long_table(case, radius):
-    """Settlement (m) at offset (i, j) under 1 Pa on one cell, from the closed forms."""
+    """Displacement (m) at offset (i, j) under 1 Pa on one cell, from the closed forms."""
     long = np.longdouble
     dy, dx = long(case.spacing[0]), long(case.spacing[1])
     shape, modulus = case.heights.shape, long(case.options["contact_modulus"])
@@ -160,7 +160,7 @@ def long_table(case, radius):
 
 
 def settle(case, pressure, radius):
-    """Settlement (m) of every node under `pressure` (Pa)."""
+    """Displacement (m) of every node under `pressure` (Pa)."""
     ny, nx = pressure.shape
     if case.periodic:
         q = (
@@ -179,20 +179,20 @@ def settle(case, pressure, radius):
     return np.fft.irfft2(np.fft.rfft2(pressure, padded) * symbol, padded)[:ny, :nx]
 
 
-def judge(case, found):
+def judge(case, result):
     """List what is wrong with a result; nothing for a right one that converged."""
     wrong = []
     tolerance, cell = case.options["tolerance"], case.spacing[0] * case.spacing[1]
     cap = case.options.get("hardness", np.inf)
     top = case.heights.max() - case.heights
-    radius = float(found["disc_radius"]) if "disc_radius" in found else 0.0
+    radius = float(result["disc_radius"]) if "disc_radius" in result else 0.0
     control = next(
         name for name in ("closure", "normal_force", "nominal_pressure") if case.options.get(name) is not None
     )
     asked = np.atleast_1d(case.options[control])
     plastic, noise = np.zeros_like(top), 0.0
     for step, value in enumerate(asked):
-        here = found.isel(step=step)
+        here = result.isel(step=step)
 
         def blame(what, here=here, step=step):
             wrong.append(f"step {step}: {what} [{here['stop_reason'].item()}]")

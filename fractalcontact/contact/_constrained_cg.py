@@ -66,7 +66,7 @@ from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped_simplex import project_onto_capped_simplex, uniform_on_lowest
 from fractalcontact.contact._operator import Operator
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, Preconditioner
-from fractalcontact.contact._scaling import Control, Problem, Solution, sum_by_rows
+from fractalcontact.contact._scaled_problem import Control, Problem, Solution, sum_by_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.linalg import solve as solve_dense
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.contact._scaling import Control, Problem, Solution
+from fractalcontact.contact._scaled_problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -17,7 +17,7 @@ from fractalcontact.base.grid import Grid
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.contact._options import BOUNDARIES, ContactOptions
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
-from fractalcontact.contact._scaling import (
+from fractalcontact.contact._scaled_problem import (
     Body,
     length_unit,
     mean_by_rows,

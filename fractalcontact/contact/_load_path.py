@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.contact._flat_block import flat_block
-from fractalcontact.contact._scaling import (
+from fractalcontact.contact._scaled_problem import (
     Body,
     Control,
     Problem,

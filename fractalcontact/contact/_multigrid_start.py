@@ -15,7 +15,7 @@ import numpy as np
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
 from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
-from fractalcontact.contact._scaling import Body, Control, Problem
+from fractalcontact.contact._scaled_problem import Body, Control, Problem
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

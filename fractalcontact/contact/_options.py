@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.grid import UNIFORM, Grid
 from fractalcontact.base.validation import Problems, float_array, given_option
 from fractalcontact.contact import _influence
-from fractalcontact.contact._scaling import length_unit, make_units, scaled_body
+from fractalcontact.contact._scaled_problem import length_unit, make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

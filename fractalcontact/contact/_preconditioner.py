@@ -26,7 +26,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._operator import PairSum, Wavenumbers
-from fractalcontact.contact._scaling import Body
+from fractalcontact.contact._scaled_problem import Body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

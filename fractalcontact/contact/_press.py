@@ -17,7 +17,7 @@ from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STOP_REASONS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
-from fractalcontact.contact._scaling import make_units, scaled_body
+from fractalcontact.contact._scaled_problem import make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -22,7 +22,7 @@ from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
 from fractalcontact.contact._multigrid_start import cold_start
 from fractalcontact.contact._operator import Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
-from fractalcontact.contact._scaling import Control, Problem, Solution
+from fractalcontact.contact._scaled_problem import Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]

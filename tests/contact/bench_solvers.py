@@ -82,7 +82,7 @@ def fractalcontact(case: Case, heights: np.ndarray) -> Callable[[float], Answer]
     influence = "spectral" if case.boundary == "periodic" else "square"
 
     def solve(tolerance: float) -> Answer:
-        found = fc.contact.press(
+        result = fc.contact.press(
             surface,
             contact_modulus=1.0,
             nominal_pressure=case.loads,
@@ -90,7 +90,7 @@ def fractalcontact(case: Case, heights: np.ndarray) -> Callable[[float], Answer]
             tolerance=tolerance,
             keep=("pressure",),
         )
-        yield from zip(found["pressure"].values, found["transforms"].values, strict=True)
+        yield from zip(result["pressure"].values, result["transforms"].values, strict=True)
 
     return solve
 
@@ -115,13 +115,13 @@ def aspher(mode: str, precision: str) -> Callable[[Case, np.ndarray], Callable[[
                 limits = {"tol": tolerance, "max_iter": 10000}
                 if solver is None:
                     given = {"grid_size": case.n, "gap": gap, "p_nominal": load, "coarsest": coarsest}
-                    found = peer.solve_nested(**given, **common, **limits, precision=precision)
+                    result = peer.solve_nested(**given, **common, **limits, precision=precision)
                 else:
-                    found = solver.solve(gap, load, **limits, precond="fourier-fft", p_init=before)
-                    before = np.array(found.pressure) if case.start == "path" else None
+                    result = solver.solve(gap, load, **limits, precond="fourier-fft", p_init=before)
+                    before = np.array(result.pressure) if case.start == "path" else None
                 yield (
-                    np.array(found.pressure).reshape(heights.shape),
-                    found.matvec_count + found.precond_count,
+                    np.array(result.pressure).reshape(heights.shape),
+                    result.matvec_count + result.precond_count,
                 )
 
         return solve
@@ -180,7 +180,7 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
                 padded = np.zeros(half_space.nb_subdomain_grid_pts)
                 padded[: shape[0], : shape[1]] = -before * (load / before.sum())
                 start["initial_forces"] = padded
-            found = constrained_conjugate_gradients(
+            result = constrained_conjugate_gradients(
                 half_space,
                 topography,
                 external_force=load,
@@ -190,11 +190,11 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
                 thermotol=tolerance,
                 **start,
             )
-            return np.array(found.jac).reshape(shape), float(found.nfev)
+            return np.array(result.jac).reshape(shape), float(result.nfev)
 
         def kept(load: float, tolerance: float, before: np.ndarray | None) -> tuple[np.ndarray, float]:
             start = np.full(size, load / size) if before is None else before.ravel() * (load / before.sum())
-            found = CCGWithoutRestart.constrained_conjugate_gradients(
+            result = CCGWithoutRestart.constrained_conjugate_gradients(
                 lambda force: (0.0, (settle(force) - heights).ravel()),
                 lambda force: settle(force).ravel(),
                 x0=start,
@@ -202,7 +202,7 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
                 gtol=tolerance * std,
                 maxiter=20000,
             )
-            return np.array(found.x).reshape(shape), 2.0 * found.nit + 1
+            return np.array(result.x).reshape(shape), 2.0 * result.nit + 1
 
         def solve(tolerance: float) -> Answer:
             before = None

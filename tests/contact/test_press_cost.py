@@ -1,4 +1,4 @@
-"""What a solution costs, where the work is done, and that the same bits come out however it is done."""
+"""Cost of a solution: transforms, memory, windows; and bits independent of threads and units."""
 
 import tracemalloc
 
@@ -44,9 +44,7 @@ def library(request, monkeypatch):
 @pytest.mark.parametrize(
     ("control", "force"), [("nominal_pressure", True), ("closure", False), ("hardness", True)]
 )
-def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
-    library, monkeypatch, single, boundary, control, force
-):
+def test_bits_independent_of_units_and_threads(library, monkeypatch, single, boundary, control, force):
     monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0 if single else 10**9)
     monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
     monkeypatch.setattr(fft, "SMALL", 1000)
@@ -66,7 +64,7 @@ def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
     other = fc.surfaces.from_array(surface.values * 2.0**-7, 1e-4 * 2.0**-7, periodic=True)
     scaled = {name: np.multiply(v, 2.0**9 if force else 2.0**-7) for name, v in path.items()}
     capped = {name: value * 2.0**9 for name, value in cap.items()}
-    found = fc.contact.press(
+    result = fc.contact.press(
         other,
         contact_modulus=MODULUS * 2.0**9,
         boundary=boundary,
@@ -76,10 +74,12 @@ def test_the_same_bits_in_other_units_and_on_any_number_of_threads(
         **capped,
     )
     lengths, pressures = dict.fromkeys(("gap", "displacement", "closure"), -7), {"pressure": 9, "state": 0}
-    same_bits(ours, found, {**lengths, **pressures, "iterations": 0, "residual": 0, "elastic_energy": 9 - 21})
+    same_bits(
+        ours, result, {**lengths, **pressures, "iterations": 0, "residual": 0, "elastic_energy": 9 - 21}
+    )
 
 
-def test_what_was_solved_before_changes_no_bit():
+def test_bits_independent_of_earlier_calls():
     first = press(rough(96), nominal_pressure=MODULUS * 1e-3, keep=("pressure",))
     press(rough(96, periodic=False, seed=4), closure=1e-5)
     again = press(rough(96), nominal_pressure=MODULUS * 1e-3, keep=("pressure",))
@@ -87,7 +87,7 @@ def test_what_was_solved_before_changes_no_bit():
 
 
 @pytest.mark.parametrize("share", [0.001, 0.01, 0.03])
-def test_pairs_of_transforms_hardly_grow_with_the_grid(share):
+def test_transforms_hardly_grow_with_grid(share):
     sizes = (128, 256, 512)
     pairs = [
         np.mean(
@@ -103,26 +103,26 @@ def test_pairs_of_transforms_hardly_grow_with_the_grid(share):
 
 
 @pytest.mark.parametrize("periodic", [True, False])
-def test_a_path_takes_few_pairs_a_step(periodic):
+def test_path_takes_few_transforms(periodic):
     path = MODULUS * np.geomspace(5e-4, 5e-2, 20)
-    found = press(rough(128, periodic), nominal_pressure=np.concatenate([path, path[::-1]]))
-    assert bool(found["converged"].all())
-    assert float(found["transforms"].mean()) < 40
-    assert int(found["transforms"].max()) < 60
+    result = press(rough(128, periodic), nominal_pressure=np.concatenate([path, path[::-1]]))
+    assert bool(result["converged"].all())
+    assert float(result["transforms"].mean()) < 40
+    assert int(result["transforms"].max()) < 60
 
 
-def test_a_periodic_solve_keeps_eight_arrays_beyond_the_heights():
+def test_memory_below_eight_arrays():
     surface = rough(640)
     press(rough(400), nominal_pressure=MODULUS * 1e-2)  # compiled
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
         tracemalloc.reset_peak()
-        found = press(surface, nominal_pressure=MODULUS * 1e-2)
+        result = press(surface, nominal_pressure=MODULUS * 1e-2)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert bool(found["converged"].all())
+    assert bool(result["converged"].all())
     assert (peak - before) / surface.values.nbytes < 8
 
 
@@ -140,24 +140,24 @@ def grids(monkeypatch):
 
 
 @pytest.mark.parametrize("corner", [(40, 50), (150, 170), (199, 0)])
-def test_a_free_contact_is_solved_where_it_touches(monkeypatch, grids, corner):
+def test_free_contact_uses_window(monkeypatch, grids, corner):
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     y, x = np.ogrid[:200, :200]
     ball = -((y - corner[0]) ** 2 + (x - corner[1]) ** 2) * 1e-10 / 2
     surface = fc.surfaces.from_array(ball + 1e-9 * rough(200).values, 1e-5)
     closure = (20 * 1e-5) ** 2
-    found = press(surface, closure=closure, keep=("state",))
-    assert bool(found["converged"].all())
+    result = press(surface, closure=closure, keep=("state",))
+    assert bool(result["converged"].all())
     ny, nx = grids[-1]
     assert ny * nx < 0.15 * surface.size
-    touched = np.argwhere(found["state"].values[0] > 0)
+    touched = np.argwhere(result["state"].values[0] > 0)
     assert (np.ptp(touched, axis=0) < (ny, nx)).all()
-    forced = press(surface, normal_force=found["normal_force"].values, keep=("state",))
+    forced = press(surface, normal_force=result["normal_force"].values, keep=("state",))
     assert grids[-1][0] * grids[-1][1] < 0.15 * surface.size
-    np.testing.assert_array_equal(forced["state"], found["state"])
+    np.testing.assert_array_equal(forced["state"], result["state"])
 
 
-def test_a_periodic_body_looks_for_no_window_and_a_full_contact_takes_the_plane(monkeypatch, grids):
+def test_whole_plane_for_periodic_and_full_contact(monkeypatch, grids):
     press(rough(128, periodic=False), nominal_pressure=MODULUS)
     assert grids[-1] == (128, 128)
 
@@ -170,12 +170,12 @@ def test_a_periodic_body_looks_for_no_window_and_a_full_contact_takes_the_plane(
 
 
 @pytest.mark.parametrize("influence", ["disc", "square"])
-def test_a_wide_free_contact_does_not_try_few_nodes_first(grids, influence):
+def test_pair_sums_only_for_light_contact(grids, influence):
     surface = rough(96, periodic=False)
-    found = press(surface, nominal_pressure=MODULUS, influence=influence)
+    result = press(surface, nominal_pressure=MODULUS, influence=influence)
     assert min(shape[0] for shape in grids) > 1
-    least = float(found["normal_force"][0]) / (MODULUS * np.hypot(*(n * 1e-4 for n in surface.shape)))
-    assert float(found["closure"][0]) > least  # a round flat punch of that diameter settles by that much
+    least = float(result["normal_force"][0]) / (MODULUS * np.hypot(*(n * 1e-4 for n in surface.shape)))
+    assert float(result["closure"][0]) > least  # a round flat punch of that diameter settles by that much
     light = press(surface, nominal_pressure=MODULUS * 1e-7, influence=influence)
     assert grids[-1][0] == 1
     assert bool(light["converged"].all())

@@ -6,10 +6,10 @@ from scipy.integrate import dblquad
 
 from fractalcontact.contact import _influence as influence
 from fractalcontact.contact._operator import FreeOperator, PeriodicOperator
-from fractalcontact.contact._scaling import Body
+from fractalcontact.contact._scaled_problem import Body
 
 
-def test_plate_under_itself_and_its_neighbours():
+def test_disc_coefficients():
     table = influence.disc_coefficients((5, 7), (1.0, 1.0), 0.5)
     assert table[0, 0] == 1.0
     assert table[0, 1] == pytest.approx(1 / 3, rel=1e-14)
@@ -19,14 +19,14 @@ def test_plate_under_itself_and_its_neighbours():
     assert far == pytest.approx(1 + (0.4 / 3999) ** 2 / 6, rel=1e-13)
 
 
-def test_love_square_at_its_centre_and_mean():
+def test_love_square_coefficients():
     table = influence.square_coefficients((3, 3), (1.0, 1.0))
     assert table[0, 0] == pytest.approx(4 * np.log(1 + np.sqrt(2)) / np.pi, rel=1e-14)
     assert table[0, 1] == pytest.approx(0.330421493, rel=1e-8)
 
 
 @pytest.mark.parametrize("spacing", [(1.0, 1.0), (1.0, 2.5), (0.3, 30.0), (7.0, 0.2)])
-def test_love_rectangle_against_its_closed_form_in_long_arithmetic(spacing):
+def test_love_rectangle_closed_form(spacing):
     shape = (60, 90)
     dy, dx = (np.longdouble(edge) for edge in spacing)
     y, x = np.arange(shape[0])[:, None] * dy, np.arange(shape[1])[None, :] * dx
@@ -35,24 +35,24 @@ def test_love_rectangle_against_its_closed_form_in_long_arithmetic(spacing):
         u, v = y + b * dy / 2, x + a * dx / 2
         total = total + sign * (u * np.arcsinh(v / abs(u)) + v * np.arcsinh(u / abs(v)))
     exact = total / (np.longdouble(np.pi) * dy * dx)
-    found = influence.square_coefficients(shape, spacing)
-    assert float(np.abs(found / exact - 1).max()) < 1e-13
+    result = influence.square_coefficients(shape, spacing)
+    assert float(np.abs(result / exact - 1).max()) < 1e-13
 
 
-def test_love_rectangle_against_quadrature_far_away():
-    found = influence.square_coefficients((400, 3), (1.0, 3.0))[399, 2]
+def test_love_rectangle_far_quadrature():
+    result = influence.square_coefficients((400, 3), (1.0, 3.0))[399, 2]
     integral = dblquad(lambda y, x: 1 / np.hypot(399 + y, 6 + x), -1.5, 1.5, -0.5, 0.5, epsabs=1e-16)[0]
-    assert found == pytest.approx(integral / (3 * np.pi), rel=1e-13)
+    assert result == pytest.approx(integral / (3 * np.pi), rel=1e-13)
 
 
-def test_the_second_order_radius_of_a_square_grid():
+def test_second_order_radius_square_grid():
     assert influence.second_order_radius(1.0) == pytest.approx(0.4365941, abs=5e-8)
     nearly = influence.second_order_radius(np.nextafter(1.0, 2.0))  # the root of the lattice sum
     assert influence.second_order_radius(1.0) == pytest.approx(nearly, rel=1e-14)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.3, 2.0])
-def test_the_second_order_radius_makes_plates_settle_as_the_half_space(ratio):
+def test_second_order_radius_matches_half_space(ratio):
     """Under uniform pressure the sum over plates less that over Love cells has no term in the spacing."""
     spacing = (np.sqrt(ratio), 1 / np.sqrt(ratio))
     radius = influence.second_order_radius(ratio)
@@ -72,11 +72,11 @@ def test_the_second_order_radius_makes_plates_settle_as_the_half_space(ratio):
 @pytest.mark.parametrize(
     ("radius", "excess"), [(0.5, -0.11296), (1 / np.sqrt(np.pi), -0.18790), (0.4365941, 0.0)]
 )
-def test_local_excess_of_the_usual_radii(radius, excess):
+def test_local_excess(radius, excess):
     assert influence.local_excess(radius, 1.0) == pytest.approx(excess, abs=1e-4)
 
 
-def test_epstein_sums():
+def test_epstein_zeta():
     assert influence.epstein_zeta(1, 1.0) == pytest.approx(-3.9002649200019558, rel=1e-13)
     assert influence.epstein_zeta(3, 1.0) == pytest.approx(9.0336216831, rel=1e-9)
     index = np.arange(-60, 61)
@@ -85,7 +85,7 @@ def test_epstein_sums():
 
 
 @pytest.mark.parametrize(("radius", "ratio"), [(0.3, 1.0), (0.5, 1.0), (0.4, 1.8), (0.9, 1.0)])
-def test_least_symbol_against_the_spectrum_of_a_large_matrix(radius, ratio):
+def test_least_symbol_matches_eigenvalues(radius, ratio):
     """A large Toeplitz matrix has its least eigenvalue at the least value of its symbol."""
     spacing = (np.sqrt(ratio), 1 / np.sqrt(ratio))
     table = influence.disc_coefficients((14, 14), spacing, radius)
@@ -97,7 +97,7 @@ def test_least_symbol_against_the_spectrum_of_a_large_matrix(radius, ratio):
 
 @pytest.mark.parametrize("shape", [(3, 5), (8, 8), (13, 7), (1, 9)])
 @pytest.mark.parametrize("kind", ["disc", "square"])
-def test_free_operator_against_the_sum_over_all_pairs(shape, kind):
+def test_free_operator_matches_pair_sum(shape, kind):
     body = Body(shape, (0.7, 1.0), False, kind, 0.3)
     table = body.influence_table()
     pressure = np.random.default_rng(1).random(shape)
@@ -112,9 +112,9 @@ def test_free_operator_against_the_sum_over_all_pairs(shape, kind):
 
 
 @pytest.mark.parametrize("shape", [(8, 12), (9, 7), (31, 5)])
-def test_periodic_operator_on_one_wave(shape):
+def test_periodic_operator_one_wave(shape):
     y, x = np.arange(shape[0])[:, None] * 0.5, np.arange(shape[1])[None, :] * 2.0
     q = (2 * np.pi / (shape[0] * 0.5), -2 * 2 * np.pi / (shape[1] * 2.0))
     wave = np.cos(q[0] * y + q[1] * x + 0.4)
-    found = PeriodicOperator(shape, (0.5, 2.0)).apply(3.0 + wave)
-    np.testing.assert_allclose(found, 2 * wave / np.hypot(*q), atol=1e-14)
+    result = PeriodicOperator(shape, (0.5, 2.0)).apply(3.0 + wave)
+    np.testing.assert_allclose(result, 2 * wave / np.hypot(*q), atol=1e-14)

@@ -1,4 +1,4 @@
-"""The parts of the fast method: preconditioner, nodes, windows, precision, paths; what the residual means."""
+"""The fast method: preconditioner, pair sums, windows, precision, paths, and what the residual bounds."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.contact import _constrained_cg, _window_solver
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
-from fractalcontact.contact._scaling import Body
+from fractalcontact.contact._scaled_problem import Body
 
 MODULUS = 1e9
 
@@ -44,7 +44,7 @@ def preconditioned(body, free):
 
 
 @pytest.mark.parametrize("periodic", [True, False])
-def test_the_preconditioner_is_symmetric_and_no_smaller_than_the_inverse(periodic):
+def test_preconditioner_symmetric_and_bounded_below(periodic):
     shape = (24, 32)
     body = Body(shape, (1.0, 1.0), periodic, "spectral" if periodic else "disc", 0.4365941)
     free = np.random.default_rng(0).random(shape)
@@ -67,7 +67,7 @@ def test_the_preconditioner_is_symmetric_and_no_smaller_than_the_inverse(periodi
 
 
 @pytest.mark.parametrize("pressure", [1e3, 1e5, 3e6])
-def test_few_nodes_give_what_the_plane_gives(monkeypatch, pressure):
+def test_pair_sums_match_plane(monkeypatch, pressure):
     surface = rough(80, periodic=False)
     nodes = press(surface, nominal_pressure=pressure, tolerance=1e-12)
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
@@ -86,7 +86,7 @@ def ball(n):
 
 
 @pytest.mark.parametrize("control", [{"closure": [1e-9, 4e-8]}, {"normal_force": [1e-6, 0.01]}])
-def test_a_window_gives_what_the_whole_plane_gives(monkeypatch, control):
+def test_window_matches_whole_plane(monkeypatch, control):
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     window = press(ball(192), tolerance=1e-12, **control)
     monkeypatch.setattr(_window_solver, "MAX_WINDOW_SHARE", 0.0)
@@ -97,7 +97,7 @@ def test_a_window_gives_what_the_whole_plane_gives(monkeypatch, control):
     np.testing.assert_allclose(window["gap"], whole["gap"], atol=1e-18)
 
 
-def test_single_precision_first_changes_nothing_that_counts(monkeypatch):
+def test_single_precision_start_same_solution(monkeypatch):
     surface = rough(128)
     double = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
     monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0)
@@ -106,7 +106,7 @@ def test_single_precision_first_changes_nothing_that_counts(monkeypatch):
     np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
 
 
-def test_every_step_of_a_path_is_what_it_is_alone():
+def test_path_steps_match_single_solves():
     surface, path = rough(96), [1e5, 3e5, 1e6, 1e6, 4e6, 2e5, 0.0, 1e5]
     along = press(surface, nominal_pressure=path, tolerance=1e-12)
     for step, pressure in enumerate(path):
@@ -118,7 +118,7 @@ def test_every_step_of_a_path_is_what_it_is_alone():
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-4])
 @pytest.mark.parametrize("control", ["nominal_pressure", "closure"])
-def test_the_residual_bounds_the_energy_of_the_error(periodic, tolerance, control):
+def test_residual_bounds_energy_error(periodic, tolerance, control):
     surface = rough(64, periodic)
     exact = press(surface, nominal_pressure=1e6, tolerance=1e-12)
     given = 1e6 if control == "nominal_pressure" else float(exact["closure"][0])
@@ -134,7 +134,7 @@ def test_the_residual_bounds_the_energy_of_the_error(periodic, tolerance, contro
 
 @pytest.mark.parametrize("fault", ["sign", "noise"])
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_a_preconditioner_that_fails_is_done_without(monkeypatch, fault, boundary):
+def test_failing_preconditioner_is_dropped(monkeypatch, fault, boundary):
     surface = rough(48)
     options = {"nominal_pressure": 1e6, "boundary": boundary, "tolerance": 1e-9}
     sound = press(surface, **options)
@@ -146,46 +146,46 @@ def test_a_preconditioner_that_fails_is_done_without(monkeypatch, fault, boundar
 
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
     monkeypatch.setattr(ExtensionPreconditioner, "apply", faulty)
-    found = press(surface, **options)
-    assert bool(found["converged"].all())
-    assert int(found["iterations"][0]) > int(sound["iterations"][0])
-    np.testing.assert_array_equal(found["state"], sound["state"])
-    np.testing.assert_allclose(found["closure"], sound["closure"], rtol=1e-9)
+    result = press(surface, **options)
+    assert bool(result["converged"].all())
+    assert int(result["iterations"][0]) > int(sound["iterations"][0])
+    np.testing.assert_array_equal(result["state"], sound["state"])
+    np.testing.assert_allclose(result["closure"], sound["closure"], rtol=1e-9)
 
 
-def test_a_tolerance_beyond_rounding_is_said_not_to_be_met():
+def test_tolerance_below_rounding_is_reported():
     with pytest.warns(ConvergenceWarning, match="step 0: rounding"):
-        found = press(rough(64), nominal_pressure=1e6, tolerance=1e-30)
-    assert not bool(found["converged"][0])
-    assert stopped(found) == ["rounding"]
-    assert float(found["residual"][0]) < 1e-11
+        result = press(rough(64), nominal_pressure=1e6, tolerance=1e-30)
+    assert not bool(result["converged"][0])
+    assert stopped(result) == ["rounding"]
+    assert float(result["residual"][0]) < 1e-11
 
 
-def stopped(found):
+def stopped(result):
     """Words for why the steps stopped, read as a user would."""
     flags = dict(
-        zip(found["stop_reason"].flag_values, found["stop_reason"].flag_meanings.split(), strict=True)
+        zip(result["stop_reason"].flag_values, result["stop_reason"].flag_meanings.split(), strict=True)
     )
-    return [flags[value] for value in found["stop_reason"].values]
+    return [flags[value] for value in result["stop_reason"].values]
 
 
-def test_a_step_that_runs_out_of_iterations_is_told_apart(monkeypatch):
+def test_iteration_limit_is_reported(monkeypatch):
     monkeypatch.setattr(_constrained_cg, "MAX_ITERATIONS", 2)
     with pytest.warns(ConvergenceWarning, match="step 1: iteration_limit"):
-        found = press(rough(64), nominal_pressure=[0.0, 1e6], tolerance=1e-10)
-    assert stopped(found) == ["converged", "iteration_limit"]
-    np.testing.assert_array_equal(found["converged"], [True, False])
-    assert found["stop_reason"].dtype == np.int8
-    assert float(found["residual"][1]) > 1e-10
-    np.testing.assert_allclose(found["pressure"][1].mean(), 1e6, rtol=1e-12)
+        result = press(rough(64), nominal_pressure=[0.0, 1e6], tolerance=1e-10)
+    assert stopped(result) == ["converged", "iteration_limit"]
+    np.testing.assert_array_equal(result["converged"], [True, False])
+    assert result["stop_reason"].dtype == np.int8
+    assert float(result["residual"][1]) > 1e-10
+    np.testing.assert_allclose(result["pressure"][1].mean(), 1e6, rtol=1e-12)
 
 
 @pytest.mark.parametrize("heights", ["spike", "plateaus", "quantised", "noise", "step", "offset"])
 @pytest.mark.parametrize("periodic", [True, False])
-def test_hard_faces_converge(heights, periodic):
+def test_hard_surfaces_converge(heights, periodic):
     n, rng = 40, np.random.default_rng(2)
     base = rough(n).values
-    face = {
+    plane = {
         "spike": np.where(np.arange(n * n).reshape(n, n) == 777, 1e-6, 0.0),
         "plateaus": np.minimum(base, 0.0),
         "quantised": np.round(base / 2e-6) * 2e-6,
@@ -193,48 +193,48 @@ def test_hard_faces_converge(heights, periodic):
         "step": np.where(np.arange(n)[None, :] > n // 2, 1e-6, 0.0) * np.ones((n, 1)),
         "offset": base + 1e3,
     }[heights]
-    surface = fc.surfaces.from_array(face, 1e-4, periodic=periodic)
-    found = press(surface, nominal_pressure=[1.0, 1e4, 1e6, 1e8, 1e10])
-    assert bool(found["converged"].all())
-    assert (found["gap"] >= 0).all()
-    assert (found["pressure"] >= 0).all()
-    assert (np.diff(found["closure"]) >= -1e-12 * float(found["closure"].max())).all()
+    surface = fc.surfaces.from_array(plane, 1e-4, periodic=periodic)
+    result = press(surface, nominal_pressure=[1.0, 1e4, 1e6, 1e8, 1e10])
+    assert bool(result["converged"].all())
+    assert (result["gap"] >= 0).all()
+    assert (result["pressure"] >= 0).all()
+    assert (np.diff(result["closure"]) >= -1e-12 * float(result["closure"].max())).all()
 
 
-def test_beyond_full_contact_the_body_is_linear():
+def test_full_contact_is_linear():
     surface = rough(48)
-    found = press(surface, nominal_pressure=[1e9, 2e9], tolerance=1e-12)
-    assert (found["contact_fraction"] == 1).all()
-    np.testing.assert_allclose(np.diff(found["pressure"], axis=0), 1e9, rtol=1e-9)
-    np.testing.assert_allclose(found["elastic_energy"][0], found["elastic_energy"][1], rtol=1e-9)
-    np.testing.assert_allclose(found["mean_gap"], 0.0, atol=1e-18)
+    result = press(surface, nominal_pressure=[1e9, 2e9], tolerance=1e-12)
+    assert (result["contact_fraction"] == 1).all()
+    np.testing.assert_allclose(np.diff(result["pressure"], axis=0), 1e9, rtol=1e-9)
+    np.testing.assert_allclose(result["elastic_energy"][0], result["elastic_energy"][1], rtol=1e-9)
+    np.testing.assert_allclose(result["mean_gap"], 0.0, atol=1e-18)
 
 
-def test_a_periodic_face_cannot_be_closed_beyond_its_mean():
+def test_closure_beyond_mean_plane():
     surface = rough(32)
     depth = float(surface.max() - surface.mean())
     keep = ("state", "pressure", "gap", "displacement")
     with pytest.warns(ConvergenceWarning, match="step 1: beyond_full_contact"):
-        found = press(surface, closure=[0.97 * depth, 1.001 * depth, 0.97 * depth, 1e3 * depth], keep=keep)
-    assert stopped(found) == ["converged", "beyond_full_contact"] * 2
-    assert float(found["mean_gap"][0]) == pytest.approx(0.03 * depth, rel=1e-6)
-    np.testing.assert_array_equal(np.isnan(found["normal_force"]), [False, True, False, True])
-    np.testing.assert_allclose(found["closure"], np.array([0.97, 1.001, 0.97, 1e3]) * depth, rtol=1e-15)
+        result = press(surface, closure=[0.97 * depth, 1.001 * depth, 0.97 * depth, 1e3 * depth], keep=keep)
+    assert stopped(result) == ["converged", "beyond_full_contact"] * 2
+    assert float(result["mean_gap"][0]) == pytest.approx(0.03 * depth, rel=1e-6)
+    np.testing.assert_array_equal(np.isnan(result["normal_force"]), [False, True, False, True])
+    np.testing.assert_allclose(result["closure"], np.array([0.97, 1.001, 0.97, 1e3]) * depth, rtol=1e-15)
     for name in ("normal_force", "nominal_pressure", "elastic_energy", "pressure", "displacement"):
-        assert "mean plane" in found[name].attrs["reason"]
-        assert bool(found[name][1].isnull().all())
-    assert (found["state"][1] == 1).all()
-    assert (found["gap"][1] == 0).all()
-    assert float(found["contact_fraction"][1]) == 1.0
-    assert float(found["normal_force"][2]) == pytest.approx(float(found["normal_force"][0]), rel=1e-7)
+        assert "mean plane" in result[name].attrs["reason"]
+        assert bool(result[name][1].isnull().all())
+    assert (result["state"][1] == 1).all()
+    assert (result["gap"][1] == 0).all()
+    assert float(result["contact_fraction"][1]) == 1.0
+    assert float(result["normal_force"][2]) == pytest.approx(float(result["normal_force"][0]), rel=1e-7)
 
 
 @pytest.mark.parametrize("share", [0.999, 0.999999, 1 - 1e-10])
-def test_a_periodic_face_nearly_closed_to_its_mean_is_in_full_contact(share):
+def test_closure_near_mean_plane_is_full_contact(share):
     surface = rough(32)
     depth = float(surface.max() - surface.mean())
-    found = press(surface, closure=share * depth)
-    assert bool(found["converged"].all())
+    result = press(surface, closure=share * depth)
+    assert bool(result["converged"].all())
     full = press(surface, nominal_pressure=1e10)
-    assert float(found["normal_force"][0]) < float(full["normal_force"][0])
-    assert float(found["contact_fraction"][0]) > 0.9
+    assert float(result["normal_force"][0]) < float(full["normal_force"][0])
+    assert float(result["contact_fraction"][0]) > 0.9

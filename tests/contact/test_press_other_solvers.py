@@ -16,7 +16,7 @@ TOLERANCE = 1e-11
 SHARES = (0.004, 0.08)
 
 
-def face(boundary):
+def rough_surface(boundary):
     rough = fc.surfaces.spectral((N, N), SPACING, hurst=0.8, rms_slope=0.1, short_cutoff=8e-4, rng=9)
     return rough if boundary == "periodic" else fc.surfaces.from_array(rough.values, SPACING)
 
@@ -46,7 +46,7 @@ def contact_mechanics(heights, pressure, boundary):
         kind = "PeriodicFFTElasticHalfSpace" if boundary == "periodic" else "FreeFFTElasticHalfSpace"
         body = getattr(half_space, kind)((N, N), MODULUS, (N * SPACING,) * 2)
         topography = Topography(heights, (N * SPACING,) * 2, periodic=boundary == "periodic")
-        found = ConstrainedConjugateGradients.constrained_conjugate_gradients(
+        result = ConstrainedConjugateGradients.constrained_conjugate_gradients(
             body,
             topography,
             external_force=pressure * (N * SPACING) ** 2,
@@ -55,8 +55,8 @@ def contact_mechanics(heights, pressure, boundary):
             thermotol=TOLERANCE,
             maxiter=5000,
         )
-    assert found.success
-    return np.asarray(found.jac).reshape(N, N) / SPACING**2
+    assert result.success
+    return np.asarray(result.jac).reshape(N, N) / SPACING**2
 
 
 def aspher(heights, pressure, boundary):
@@ -64,16 +64,16 @@ def aspher(heights, pressure, boundary):
     backend = "periodic" if boundary == "periodic" else "fft"
     solver = rival.ContactSolver(grid_size=N, domain_size=N * SPACING, E_star=MODULUS, backend=backend)
     gap = np.ascontiguousarray(heights.max() - heights).ravel()
-    found = solver.solve(gap, pressure, tol=TOLERANCE, max_iter=5000, precond="fourier-fft")
-    assert found.converged
-    return np.array(found.pressure, dtype=float).reshape(N, N)
+    result = solver.solve(gap, pressure, tol=TOLERANCE, max_iter=5000, precond="fourier-fft")
+    assert result.converged
+    return np.array(result.pressure, dtype=float).reshape(N, N)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 @pytest.mark.parametrize("rival", [tamaas, contact_mechanics, aspher])
-def test_pressure_and_area_agree(rival, boundary):
-    surface = face(boundary)
+def test_pressure_and_area_match_other_solvers(rival, boundary):
+    surface = rough_surface(boundary)
     influence = "spectral" if boundary == "periodic" else "square"
     for share in SHARES:
         pressure = share * MODULUS

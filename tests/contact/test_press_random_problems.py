@@ -1,6 +1,6 @@
-"""Varied problems, judged by conditions of contact computed anew: all converge or say why, none is wrong.
+"""Random problems, checked against the conditions of contact computed independently of the solver.
 
-`pytest -m slow tests/contact/test_contact_sweep.py` goes through all of them.
+`pytest -m slow tests/contact/test_press_random_problems.py` runs all of them.
 """
 
 import re
@@ -20,13 +20,13 @@ ROUNDED = 1  # stop_reason: the tolerance is beyond what rounding leaves
 
 def verdict(case):
     """What is wrong with the result of a case; a step that stopped at rounding has said why."""
-    found = case.press()
-    excused = {step for step, why in enumerate(found["stop_reason"].values) if why == ROUNDED}
-    return [line for line in judge(case, found) if int(line.split()[1][:-1]) not in excused], len(excused)
+    result = case.press()
+    excused = {step for step, why in enumerate(result["stop_reason"].values) if why == ROUNDED}
+    return [line for line in judge(case, result) if int(line.split()[1][:-1]) not in excused], len(excused)
 
 
 @pytest.mark.parametrize("tens", range(0, 120, 20))
-def test_small_problems_are_right(tens):
+def test_small_random_problems(tens):
     wrong = {seed: verdict(draw(seed, largest=40))[0] for seed in range(tens, tens + 20)}
     assert {seed: lines for seed, lines in wrong.items() if lines} == {}
 
@@ -34,20 +34,20 @@ def test_small_problems_are_right(tens):
 HARD = {
     (1187, 128): "a light load far below the hardness",
     (1248, 256): "nodes that change places at one level of the objective",
-    (13773, 40): "a flat face saturated twice",
+    (13773, 40): "a flat surface saturated twice",
     (16954, 40): "a force of so many nodes at the hardness and none between",
     (50925, 512): "a body four thousand times longer than wide",
 }
 
 
 @pytest.mark.parametrize(("seed", "largest"), HARD)
-def test_what_was_hard_once_is_right(seed, largest):
+def test_hard_problems(seed, largest):
     assert verdict(draw(seed, largest)) == ([], 0), HARD[seed, largest]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hundred", range(10))
-def test_large_problems_are_right(hundred):
+def test_large_random_problems(hundred):
     wrong, excused = {}, 0
     for seed in range(1000 + 70 * hundred, 1070 + 70 * hundred):
         lines, rounded = verdict(draw(seed, largest=512))
@@ -58,19 +58,19 @@ def test_large_problems_are_right(hundred):
     assert excused <= 3
 
 
-def test_the_judge_finds_a_wrong_result():
+def test_judge_detects_errors():
     rough = (case for case in map(draw, range(60)) if "rough" in case.name)
     case = next(case for case in rough if case.options["tolerance"] < 1e-7)
-    found = case.press()
-    assert judge(case, found) == []
+    result = case.press()
+    assert judge(case, result) == []
     for name in ("pressure", "gap", "closure", "normal_force", "elastic_energy"):
-        spoilt = found.copy(deep=True)
+        spoilt = result.copy(deep=True)
         spoilt[name] = spoilt[name] * (1 + 1e-3)
         assert judge(case, spoilt), name
 
 
 @pytest.mark.parametrize("seed", range(200, 224))
-def test_a_power_of_two_in_units_changes_no_bit(seed):
+def test_random_problems_in_binary_units(seed):
     case = draw(seed, largest=64)
     metre, pascal = 2.0**-13, 2.0**11
     scale = {
@@ -93,7 +93,7 @@ def test_a_power_of_two_in_units_changes_no_bit(seed):
 
 
 @pytest.mark.parametrize("seed", range(300, 324))
-def test_elimination_finds_the_same_set_and_force(seed):
+def test_elimination_matches_fast_on_random_problems(seed):
     case = draw(seed, largest=16)
     case.options.pop("hardness", None)
     case.options["tolerance"] = 1e-12
@@ -110,7 +110,7 @@ def test_elimination_finds_the_same_set_and_force(seed):
 
 
 @pytest.mark.parametrize("seed", range(400, 416))
-def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
+def test_random_path_steps_match_single_solves(seed):
     case = draw(seed, largest=96)
     case.options.pop("hardness", None)
     control = next(name for name in ("closure", "normal_force", "nominal_pressure") if name in case.options)
@@ -128,7 +128,7 @@ def test_a_step_of_an_elastic_path_is_what_it_is_alone(seed):
         assert float(along["normal_force"][step]) == pytest.approx(float(alone["normal_force"][0]), rel=1e-6)
 
 
-def test_what_a_residual_says_about_the_pressure():
+def test_residual_bounds_pressure_error():
     """The energy of the error is within its bound; the relative error is about the residual."""
     ratios = []
     for seed in range(500, 530):
@@ -141,8 +141,8 @@ def test_what_a_residual_says_about_the_pressure():
         exact = case.press(**load, tolerance=1e-13)
         radius, q = float(exact.get("disc_radius", 0.0)), exact["pressure"].values[0]
         for tolerance in (0.3, 1e-2, 1e-4, 1e-6):
-            found = case.press(**load, tolerance=tolerance)
-            p, residual = found["pressure"].values[0], float(found["residual"][0])
+            result = case.press(**load, tolerance=tolerance)
+            p, residual = result["pressure"].values[0], float(result["residual"][0])
             if residual < 1e-12:
                 continue
             local = p.mean() * np.sqrt(np.prod(case.spacing)) / case.options["contact_modulus"]
@@ -159,27 +159,27 @@ def test_what_a_residual_says_about_the_pressure():
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("control", ["closure", "normal_force", "nominal_pressure"])
 @pytest.mark.parametrize("hardness", [None, 1e6])
-def test_loads_out_of_all_proportion_are_solved_or_refused_in_words(periodic, control, hardness):
-    face = fc.surfaces.from_array(
+def test_extreme_loads_are_solved_or_refused(periodic, control, hardness):
+    surface = fc.surfaces.from_array(
         1e-6 * np.random.default_rng(3).normal(size=(100, 100)), 1e-4, periodic=periodic
     )
     refused = {}
     for value in (5e-324, 1e-300, 1e-200, 1e-100, 1e-60, 1e-40, 1e-25, 1e25, 1e40, 1e60, 1e100, 1e200, 1e308):
         try:
-            found = fc.contact.press(
-                face, contact_modulus=1e9, hardness=hardness, keep=("pressure",), **{control: value}
+            result = fc.contact.press(
+                surface, contact_modulus=1e9, hardness=hardness, keep=("pressure",), **{control: value}
             )
         except InvalidInput as error:
             refused[value] = str(error)
             continue
-        if int(found["stop_reason"][0]) == 5:
+        if int(result["stop_reason"][0]) == 5:
             assert periodic
             assert control == "closure"
             continue
-        assert float(found["normal_force"][0]) == pytest.approx(
-            float(found["pressure"].sum()) * 1e-8, rel=1e-9
+        assert float(result["normal_force"][0]) == pytest.approx(
+            float(result["pressure"].sum()) * 1e-8, rel=1e-9
         )
-        assert float(found[control][0]) == pytest.approx(value, rel=1e-13)
+        assert float(result[control][0]) == pytest.approx(value, rel=1e-13)
     for value, words in refused.items():
         assert re.search(f"{control}: expected (0 or between|a (force|pressure) of at most)", words)
         assert not 1e-60 <= value <= 1e60 or "hardness" in words

@@ -1,4 +1,4 @@
-"""The hardness cap: a bounded dense minimisation, what a path remembers, where the work goes."""
+"""Hardness: bounded dense minimisation, hysteresis, plastic work, residual heights."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from fractalcontact.base.errors import InvalidInput
 MODULUS = 1e9
 
 
-def face(n=32, periodic=True):
+def rough_surface(n=32, periodic=True):
     rough = fc.surfaces.spectral((n, n), 1e-4, hurst=0.8, rms_height=1e-5, rng=1)
     return rough if periodic else fc.surfaces.from_array(rough.values, 1e-4)
 
@@ -29,33 +29,33 @@ def love(n, spacing):
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 @pytest.mark.parametrize("pressure", [1e5, 1e6, 3e6, 9e6, 9.99e6])
-def test_the_cap_holds_and_the_force_is_carried(boundary, pressure):
-    found = fc.contact.press(
-        face(),
+def test_pressure_bounded_and_force_carried(boundary, pressure):
+    result = fc.contact.press(
+        rough_surface(),
         contact_modulus=MODULUS,
         nominal_pressure=pressure,
         hardness=1e7,
         boundary=boundary,
         keep=("state", "pressure", "gap"),
     )
-    assert bool(found["converged"].all())
-    np.testing.assert_allclose(float(found["pressure"].mean()), pressure, rtol=1e-9)
-    assert float(found["pressure"].max()) <= 1e7
-    yielded = found["state"] == 2
-    np.testing.assert_array_equal(yielded, found["pressure"] >= 1e7)
-    assert float(found["gap"].where(found["state"] == 1, 0.0).max()) < 1e-6 * 1e-5
-    assert (found["pressure"].where(found["state"] == 0, 0.0) == 0).all()
+    assert bool(result["converged"].all())
+    np.testing.assert_allclose(float(result["pressure"].mean()), pressure, rtol=1e-9)
+    assert float(result["pressure"].max()) <= 1e7
+    yielded = result["state"] == 2
+    np.testing.assert_array_equal(yielded, result["pressure"] >= 1e7)
+    assert float(result["gap"].where(result["state"] == 1, 0.0).max()) < 1e-6 * 1e-5
+    assert (result["pressure"].where(result["state"] == 0, 0.0) == 0).all()
 
 
-def test_agrees_with_a_bounded_dense_minimisation():
+def test_matches_bounded_least_squares():
     n, closure, cap = 10, 2.5e-5, 6e7
-    rough = face(n, periodic=False)
+    rough = rough_surface(n, periodic=False)
     gap = float(rough.max()) - rough.values.ravel()
     matrix = love(n, 1e-4)
     factor = np.linalg.cholesky(matrix)  # min |L^T p - L^-1 (closure - gap)|
     target = np.linalg.solve(factor, closure - gap)
     exact = lsq_linear(factor.T, target, bounds=(0.0, cap), tol=1e-15, method="bvls").x.reshape(n, n)
-    found = fc.contact.press(
+    result = fc.contact.press(
         rough,
         contact_modulus=MODULUS,
         closure=closure,
@@ -65,87 +65,88 @@ def test_agrees_with_a_bounded_dense_minimisation():
         keep=("state", "pressure"),
     )
     assert (exact >= cap).sum() > 2
-    np.testing.assert_allclose(found["pressure"][0], exact, atol=1e-6 * cap)
+    np.testing.assert_allclose(result["pressure"][0], exact, atol=1e-6 * cap)
 
 
-def test_a_very_high_cap_changes_nothing():
+def test_very_high_hardness_changes_nothing():
     options = {"contact_modulus": MODULUS, "nominal_pressure": [1e6, 5e6, 1e6], "keep": ("state", "pressure")}
-    free = fc.contact.press(face(), **options)
-    capped = fc.contact.press(face(), hardness=1e15, **options)
+    free = fc.contact.press(rough_surface(), **options)
+    capped = fc.contact.press(rough_surface(), hardness=1e15, **options)
     np.testing.assert_allclose(capped["pressure"], free["pressure"], atol=1e-4 * 1e7)
     assert (capped["plastic_work"] == 0).all()
-    low = fc.contact.press(face(), hardness=1e7, tolerance=1e-12, **options)
+    low = fc.contact.press(rough_surface(), hardness=1e7, tolerance=1e-12, **options)
     assert (low["contact_fraction"] > free["contact_fraction"]).all()
 
 
-def test_an_elastic_surface_remembers_nothing():
+def test_elastic_path_is_reversible():
     path = np.array([1e5, 1e6, 5e6, 1e6, 1e5])
-    found = fc.contact.press(face(), contact_modulus=MODULUS, nominal_pressure=path, tolerance=1e-12)
+    options = {"contact_modulus": MODULUS, "tolerance": 1e-12}
+    result = fc.contact.press(rough_surface(), nominal_pressure=path, **options)
     for name in ("closure", "elastic_energy", "mean_gap"):
-        np.testing.assert_allclose(found[name][::-1], found[name], rtol=1e-9)
-    np.testing.assert_array_equal(found["state"][::-1], found["state"])
-    assert "plastic_work" not in found
+        np.testing.assert_allclose(result[name][::-1], result[name], rtol=1e-9)
+    np.testing.assert_array_equal(result["state"][::-1], result["state"])
+    assert "plastic_work" not in result
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_a_yielded_surface_unloads_on_another_way_and_loads_back_on_it(boundary):
+def test_hysteresis_after_yielding(boundary):
     path = np.array([1e6, 3e6, 5e6, 3e6, 1e6, 0.0, 1e6, 3e6, 5e6])
     maps = ("state", "pressure", "gap", "residual_height")
     options = {"contact_modulus": MODULUS, "boundary": boundary, "hardness": 1e7, "keep": maps}
-    found = fc.contact.press(face(), nominal_pressure=path, tolerance=1e-12, **options)
-    closure = found["closure"].values
+    result = fc.contact.press(rough_surface(), nominal_pressure=path, tolerance=1e-12, **options)
+    closure = result["closure"].values
     assert closure[3] > 1.01 * closure[1]  # hysteresis: more closure for the same force
     assert closure[4] > 1.05 * closure[0]
     assert closure[5] > 0  # what is left of it without force
     np.testing.assert_allclose(closure[6:], closure[4:1:-1], rtol=1e-9)
-    np.testing.assert_allclose(found["pressure"][8], found["pressure"][2], atol=1e-7 * 1e7)
-    work = found["plastic_work"].values
+    np.testing.assert_allclose(result["pressure"][8], result["pressure"][2], atol=1e-7 * 1e7)
+    work = result["plastic_work"].values
     assert (np.diff(work[:3]) > 0).all()
     np.testing.assert_allclose(work[2:], work[2], rtol=1e-9)
-    assert (found["state"][3:7] < 2).all()
+    assert (result["state"][3:7] < 2).all()
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_under_a_growing_load_the_steps_in_between_make_no_difference(boundary):
+def test_growing_load_independent_of_steps(boundary):
     options = {"contact_modulus": MODULUS, "boundary": boundary, "hardness": 2e7, "tolerance": 1e-11}
-    many = fc.contact.press(face(), nominal_pressure=np.linspace(0, 1.3e7, 14), **options)
-    one = fc.contact.press(face(), nominal_pressure=1.3e7, **options)
+    many = fc.contact.press(rough_surface(), nominal_pressure=np.linspace(0, 1.3e7, 14), **options)
+    one = fc.contact.press(rough_surface(), nominal_pressure=1.3e7, **options)
     for name in ("closure", "plastic_work", "elastic_energy", "contact_fraction"):
         assert float(many[name][-1]) == pytest.approx(float(one[name][0]), rel=1e-9)
     np.testing.assert_array_equal(many["state"][-1], one["state"][0])
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_the_residual_height_is_the_surface_that_is_left(boundary):
+def test_residual_height(boundary):
     """Pressed again from its residual height, an unloaded surface answers as it does along the path."""
     options = {"contact_modulus": MODULUS, "boundary": boundary, "tolerance": 1e-12}
     maps = {"hardness": 1e7, "keep": ("state", "residual_height", "pressure")}
-    found = fc.contact.press(face(), nominal_pressure=[5e6, 2e6], **options, **maps)
-    left = face().copy(data=found["residual_height"].values[1])
-    lowered = (face() - left).values
+    result = fc.contact.press(rough_surface(), nominal_pressure=[5e6, 2e6], **options, **maps)
+    left = rough_surface().copy(data=result["residual_height"].values[1])
+    lowered = (rough_surface() - left).values
     assert lowered.min() == 0.0
-    assert (lowered[found["state"].values[0] != 2] == 0).all()
-    assert 0 < lowered.max() < float(found["closure"][0])
+    assert (lowered[result["state"].values[0] != 2] == 0).all()
+    assert 0 < lowered.max() < float(result["closure"][0])
     again = fc.contact.press(left, nominal_pressure=2e6, keep=("pressure",), **options)
-    np.testing.assert_allclose(again["pressure"][0], found["pressure"][1], atol=1e-7 * 1e7)
-    offset = float(face().max() - left.max())
-    assert float(again["closure"][0]) + offset == pytest.approx(float(found["closure"][1]), rel=1e-9)
+    np.testing.assert_allclose(again["pressure"][0], result["pressure"][1], atol=1e-7 * 1e7)
+    offset = float(rough_surface().max() - left.max())
+    assert float(again["closure"][0]) + offset == pytest.approx(float(result["closure"][1]), rel=1e-9)
 
 
-def test_the_work_of_the_force_is_stored_or_spent():
+def test_energy_balance_with_yielding():
     """Along a fine path the work of the force is the elastic energy and what the indentation takes."""
     closure = np.linspace(0.0, 2.5e-5, 60)
     path = np.concatenate([closure, closure[:-16:-1]])
-    found = fc.contact.press(face(), contact_modulus=MODULUS, closure=path, hardness=3e7, keep=())
-    force = found["normal_force"].values
+    result = fc.contact.press(rough_surface(), contact_modulus=MODULUS, closure=path, hardness=3e7, keep=())
+    force = result["normal_force"].values
     work = np.concatenate([[0.0], np.cumsum(np.diff(path) * (force[1:] + force[:-1]) / 2)])
-    stored = (found["elastic_energy"] + found["plastic_work"]).values
+    stored = (result["elastic_energy"] + result["plastic_work"]).values
     np.testing.assert_allclose(work, stored, atol=2e-3 * work.max())
-    assert float(found["plastic_work"][-1]) > 0.1 * work.max()
+    assert float(result["plastic_work"][-1]) > 0.1 * work.max()
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_flat_faces_yield_where_their_pressure_reaches_the_hardness(boundary):
+def test_flat_surface_yields_at_hardness(boundary):
     flat = fc.surfaces.from_array(np.zeros((16, 16)), 1e-4, periodic=boundary == "periodic")
     options = {"contact_modulus": MODULUS, "hardness": 1e7, "keep": ("pressure", "state", "residual_height")}
     most = 1e7 * 256e-8
@@ -162,7 +163,7 @@ def test_flat_faces_yield_where_their_pressure_reaches_the_hardness(boundary):
         assert (pressed["closure"] == 0).all()
 
 
-def test_a_ball_yields_from_its_centre_and_keeps_a_cap():
+def test_ball_yields_from_centre():
     """Yield begins at the greatest pressure of Hertz, 2 E*/pi sqrt(d/R); far beyond it all is at the cap."""
     n, radius, spacing = 81, 1.0, 1e-3
     x = (np.arange(n) - n // 2) * spacing
@@ -181,9 +182,9 @@ def test_a_ball_yields_from_its_centre_and_keeps_a_cap():
     assert float(soft["normal_force"][0]) == pytest.approx(0.002 * greatest * cut, rel=0.02)
 
 
-def test_more_than_the_cap_can_carry_is_refused():
+def test_load_above_hardness_is_refused():
     """It is named as it was given, in its own unit."""
-    surface = face()
+    surface = rough_surface()
     with pytest.raises(InvalidInput, match=r"nominal_pressure: .*hardness, 1e\+07 Pa, got 10100000"):
         fc.contact.press(surface, contact_modulus=MODULUS, nominal_pressure=1.01e7, hardness=1e7)
     area = float(fc.contact.press(surface, contact_modulus=MODULUS, closure=0)["nominal_area"])
@@ -191,7 +192,7 @@ def test_more_than_the_cap_can_carry_is_refused():
         fc.contact.press(surface, contact_modulus=MODULUS, normal_force=1.01e7 * area, hardness=1e7)
 
 
-def test_a_step_that_leaves_the_bounds_is_seen_and_one_that_reaches_them_is_not():
+def test_projection_counts_only_violations():
     from fractalcontact.contact._kernels import projected_step_sums
 
     pressure = np.array([[1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0]])
