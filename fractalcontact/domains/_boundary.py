@@ -51,7 +51,7 @@ def boundary_dimension(
     mask : DataArray, dims (..., y, x)
         Boolean, or integer flags where contact means value > 0.
     periodic : bool, optional
-        Whether pairs wrap around the edges; by default as the axes say. True needs periodic axes.
+        Whether pairs wrap around the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; only pairs of them count.
 

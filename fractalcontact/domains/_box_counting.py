@@ -87,7 +87,7 @@ def box_dimension(
         The fewest boxes over all offsets of the grid, their mean over all offsets, or the boxes of the one
         grid that starts at the first cell. The default fit combines the first two.
     periodic : bool, optional
-        Whether boxes wrap around the edges; by default as the axes say. True needs periodic axes.
+        Whether boxes wrap around the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; counts are divided by the share of the boxes' area that was observed.
 

@@ -59,7 +59,7 @@ def correlation_dimension(
         Edges of the squares in cells; by default the default sizes of `box_dimension`. A cell on the outline
         of a square of an even number of cells counts by its part inside.
     periodic : bool, optional
-        Whether pairs wrap around the edges; by default as the axes say. True needs periodic axes.
+        Whether pairs wrap around the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; only pairs of them count.
 

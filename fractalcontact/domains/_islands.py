@@ -52,7 +52,7 @@ def islands(
     connectivity : {1, 2}
         1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
     periodic : bool, optional
-        Whether islands continue across the edges; by default as the axes say. True needs periodic axes.
+        Whether islands continue across the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; the others are in no island.
     keep : sequence of str

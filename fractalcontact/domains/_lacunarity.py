@@ -65,7 +65,7 @@ def lacunarity(
         All positions of the box, or those of the one grid that starts at the first cell, on which sets built
         by a fixed rule have the lacunarity (L/r)^(2 - D) exactly.
     periodic : bool, optional
-        Whether the box wraps around the edges; by default as the axes say. True needs periodic axes. On a
+        Whether the box wraps around the edges; by default along periodic axes. True needs periodic axes. On a
         free axis only positions inside the plane count.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; only boxes of observed cells count.

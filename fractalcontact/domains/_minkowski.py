@@ -57,8 +57,8 @@ def minkowski_dimension(
         Radii in cells (in sides of a square with the area of a cell), at least 1/2. By default half the
         default sizes of `box_dimension`: a radius of 1/2 corresponds to a box of one cell.
     periodic : bool, optional
-        Whether distances wrap around the edges; by default as the axes say. True needs periodic axes. Beyond
-        a free edge the area is the mirror image of that on the other side of the nearest cell of the set.
+        Whether distances wrap around the edges; by default along periodic axes. True needs periodic axes.
+        Beyond a free edge the area is the mirror image of that on the other side of the nearest cell.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; the area elsewhere is completed in the same way.
 

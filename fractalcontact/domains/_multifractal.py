@@ -114,14 +114,14 @@ def generalised_dimensions(
         for k, measure in enumerate(_measure(mask, planes))
     ]
     has_value = np.array([np.isfinite(fit[0]).any() for fit in fits])
-    dimension, half_width, exponent, strength, spectrum = np.moveaxis(np.array(fits), 1, 0)
+    dimension, half_width, tau, alpha, f = np.moveaxis(np.array(fits), 1, 0)
     variables = {
         "generalised_dimension": planes.variable(dimension, "moment_order"),
         "ci_low": planes.variable(dimension - half_width, "moment_order"),
         "ci_high": planes.variable(dimension + half_width, "moment_order"),
-        "mass_exponent": planes.variable(exponent, "moment_order"),
-        "singularity_strength": planes.variable(strength, "moment_order"),
-        "singularity_spectrum": planes.variable(spectrum, "moment_order"),
+        "mass_exponent": planes.variable(tau, "moment_order"),
+        "singularity_strength": planes.variable(alpha, "moment_order"),
+        "singularity_spectrum": planes.variable(f, "moment_order"),
         "scale_min": planes.variable(np.where(has_value, sizes.min(), np.nan)),
         "scale_max": planes.variable(np.where(has_value, sizes.max(), np.nan)),
     }
@@ -148,7 +148,7 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
         return np.full((5, orders.size), np.nan)
     levels = {1: measure / total}
     observed = {1: np.ones(1) if valid is None else valid.astype(float)}
-    partition, strength = np.empty((orders.size, sizes.size)), np.empty((orders.size, sizes.size))
+    log_partition, mean_log_mu = np.empty((2, orders.size, sizes.size))
     for place, size in enumerate(sizes.tolist()):
         coarsest = max(other for other in levels if size % other == 0)
         levels[size] = _sum_boxes(levels[coarsest], size // coarsest)
@@ -158,15 +158,14 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
             observed[size] = _sum_boxes(observed[coarsest], size // coarsest)
             weight = (observed[size] / _sum_boxes(np.ones(measure.shape), size))[occupied]
         log_mu = np.log(share / share.sum() / weight)
-        partition[:, place], strength[:, place] = _moments(log_mu, weight, orders)
-    x = np.log(sizes)
-    exponent, spread, _ = fit_line(x, partition)
-    alpha, alpha_spread, _ = fit_line(x, strength)
-    is_one = orders == 1.0
-    below = np.where(is_one, 1.0, orders - 1.0)
-    dimension = np.where(is_one, alpha, exponent / below)
-    half_width = ROUNDING + 2.0 * np.where(is_one, alpha_spread, spread / np.abs(below))
-    return np.stack([dimension, half_width, exponent, alpha, orders * alpha - exponent])
+        log_partition[:, place], mean_log_mu[:, place] = _moments(log_mu, weight, orders)
+    tau, tau_spread, _ = fit_line(np.log(sizes), log_partition)
+    alpha, alpha_spread, _ = fit_line(np.log(sizes), mean_log_mu)  # Chhabra and Jensen (1989)
+    is_one = orders == 1.0  # D_1 = alpha(1), the slope of the entropy
+    q_less_1 = np.where(is_one, 1.0, orders - 1.0)
+    dimension = np.where(is_one, alpha, tau / q_less_1)
+    half_width = ROUNDING + 2.0 * np.where(is_one, alpha_spread, tau_spread / np.abs(q_less_1))
+    return np.stack([dimension, half_width, tau, alpha, orders * alpha - tau])
 
 
 def _sum_boxes(plane: Array, factor: int) -> Array:
@@ -183,14 +182,14 @@ def _moments(log_mu: Array, weight: Array, orders: Array) -> tuple[Array, Array]
 
     The largest exponent is taken out of the sum, so that large orders do not underflow.
     """
-    partition, strength = np.empty(orders.size), np.empty(orders.size)
-    for place, order in enumerate(orders):
-        scaled = order * log_mu
-        top = scaled.max()
-        terms = weight * np.exp(scaled - top)
-        partition[place] = top + np.log(terms.sum())
-        strength[place] = (terms * log_mu).sum() / terms.sum()
-    return partition, strength
+    log_partition, mean_log_mu = np.empty((2, orders.size))
+    for place, q in enumerate(orders):
+        log_terms = q * log_mu
+        largest = log_terms.max()
+        terms = weight * np.exp(log_terms - largest)
+        log_partition[place] = largest + np.log(terms.sum())
+        mean_log_mu[place] = (terms * log_mu).sum() / terms.sum()
+    return log_partition, mean_log_mu
 
 
 def _notes(has_value: Array, sizes: Array) -> dict[str, dict[str, str]]:

@@ -43,7 +43,7 @@ def percolation(
         1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours). A
         set that crosses with 4 neighbours separates its complement with 8, across the crossing.
     periodic : bool, optional
-        Whether islands continue across the edges; by default as the axes say. True needs periodic axes.
+        Whether islands continue across the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
         Observed cells; the others are not in the set.
 
