@@ -1,4 +1,4 @@
-from ._covering import covering as covering
+from ._covering_area import covering as covering
 from ._cube_counts import cube_counts as cube_counts
 from ._directions import directions as directions
 from ._estimate import estimate as estimate

@@ -93,8 +93,8 @@ def directions(
     surface : DataArray
         Heights in m, dims (..., y, x), at least 16 points along each axis. NaN marks missing points.
     azimuth : float or sequence of float, optional
-        Directions in degrees anticlockwise from E, modulo 180. Default: eight over the half-circle. On a
-        surface with free edges, the nearest directions of the lattice are used.
+        Degrees anticlockwise from E, modulo 180; on free edges the nearest lattice directions are used.
+        Default: eight over the half-circle.
     scales : (low, high), optional
         Lengths in m: lags on free edges, wavelengths on periodic ones and for the tests. Default: the
         shortest lags, or the band of the spectrum.
@@ -117,7 +117,7 @@ def directions(
     Notes
     -----
     Free edges: second differences along lattice directions. Periodic: sectors of the spectrum. Models,
-    tests, and their measured size, power and coverage: see "Theory of the dimensions" in the documentation.
+    tests, and their measured size, power and coverage: page `theory_dimensions`.
 
     References
     ----------

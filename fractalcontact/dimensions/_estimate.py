@@ -15,7 +15,7 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.scaling import fit_line
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.dimensions import _covering, _cube_counts, _roughness_length, _spectrum, _variation
+from fractalcontact.dimensions import _covering_area, _cube_counts, _roughness_length, _spectrum, _variation
 from fractalcontact.dimensions import _variogram as _lags
 from fractalcontact.dimensions._curve import Curve
 from fractalcontact.dimensions._increments import increments
@@ -84,8 +84,7 @@ def estimate(
     Parameters
     ----------
     surface : DataArray
-        Heights in m, dims (..., y, x), or (..., x) for a profile. NaN marks missing points (not allowed for
-        "spectrum").
+        Heights in m, dims (..., y, x), or (..., x) for a profile; NaN where missing (not for "spectrum").
     methods : str or sequence of str, optional
         Names of `fractalcontact.dimensions.methods()`, or "default" ("likelihood"), which is the default.
     scales : (low, high), optional
@@ -111,8 +110,8 @@ def estimate(
     Notes
     -----
     Free edges: fractional Brownian heights. Periodic: a power-law spectrum between cut-offs. The interval
-    is widened, with a note, where the surface fits neither: see "Theory of the dimensions" in the
-    documentation, which has the measured coverage. Choose a method with ``sel({"method": "spectrum"})``.
+    is widened, with a note, where the surface fits neither. Theory, coverage and limits: page
+    `theory_dimensions`. Select a method with ``sel({"method": "spectrum"})``.
 
     References
     ----------
@@ -369,6 +368,6 @@ _ESTIMATORS: dict[str, Callable[[Surface, Scales, bool], Estimate]] = {
         unit_note=_UNIT,
     ),
     "covering": CurveMethod(
-        _covering.covering_curve, lambda slope, _: 1.0 + slope, 0.0, _cube_window, unit_note=_UNIT
+        _covering_area.covering_curve, lambda slope, _: 1.0 + slope, 0.0, _cube_window, unit_note=_UNIT
     ),
 }

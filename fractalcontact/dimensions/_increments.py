@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
+from fractalcontact.dimensions._heterogeneity import heterogeneity
 from fractalcontact.dimensions._increment_covariance import (
     NODES,
     complete_covariance,
@@ -56,7 +56,7 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
         return undefined(CONSTANT)
-    window = {
+    window: dict[str, Any] = {
         "scale_min": stride * min(surface.grid.spacing),
         "scale_max": stride * LAGS[lags - 1] * coarse,
         "window": "the shortest lags, which carry nearly all information on H"
@@ -65,7 +65,7 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     }
     rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0]))) / unit
     if not np.nansum(second) > max(1e-22 * np.nansum(first), rounding**2):
-        return replace(plane(), **window)  # type: ignore[arg-type]
+        return replace(plane(), **window)
     fit = closed_form(moments, surface.relative_spacing, lags=lags)
     if not np.isfinite(fit.hurst):
         return undefined(
@@ -73,13 +73,22 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
             f"{stride * surface.spacing[1]:g} m are needed"
         )
     reason = _no_interval(surface, noise)
-    error = np.nan if reason else fit.standard_error * fit.inflation
-    blocks = Heterogeneity() if reason else heterogeneity(moments, surface.relative_spacing, fit.hurst)
+    if reason:
+        return Estimate(fit.hurst, rms_increment=fit.rms_increment * unit, reason=reason, **window)
+    error, low, high, note = _interval(surface, moments, unit, fit, lags)
+    return Estimate(fit.hurst, error, low, high, rms_increment=fit.rms_increment * unit, note=note, **window)
+
+
+def _interval(
+    surface: Surface, moments: Moments, unit: float, fit: ClosedForm, lags: int
+) -> tuple[float, float, float, str]:
+    """Return standard error, interval and notes, widened where the surface does not fit the model."""
+    error = fit.standard_error * fit.inflation
+    blocks = heterogeneity(moments, surface.relative_spacing, fit.hurst)
     low, high = blocks.widened(fit.hurst, *normal_interval(fit.hurst, error))
-    noise_note = rounding_note = ""
-    if not reason:
-        low, high, noise_note = fit.widened_for_noise(low, high)
-    if not reason and not surface.is_lazy:
+    low, high, noise_note = fit.widened_for_noise(low, high)
+    rounding_note = ""
+    if not surface.is_lazy:
         interval, rounding_note = _without_quantisation(surface, moments, unit, lags, error)
         low, high = float(np.fmin(low, interval[0])), float(np.fmax(high, interval[1]))
     disagreement = (
@@ -87,16 +96,8 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
         if fit.inflation > 1.0
         else ""
     )
-    return Estimate(
-        fit.hurst,
-        error * blocks.widening,
-        low,
-        high,
-        rms_increment=fit.rms_increment * unit,
-        reason=reason,
-        note=joined(disagreement, noise_note, blocks.note, rounding_note),
-        **window,  # type: ignore[arg-type]
-    )
+    note = joined(disagreement, noise_note, blocks.note, rounding_note)
+    return error * blocks.widening, low, high, note
 
 
 def _moments(surface: Surface, stride: int) -> tuple[Moments, float]:

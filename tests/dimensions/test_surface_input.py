@@ -49,3 +49,17 @@ def test_invalid_arguments_of_curves(rough):
         fc.dimensions.madogram(rough * np.nan)
     with pytest.raises(ValueError, match="infinite"):
         fc.dimensions.cube_counts(rough.where(rough.x > 5e-3, np.inf))
+
+
+@pytest.mark.parametrize(
+    "name", ["estimate", "directions", "spectrum", "variogram", "cube_counts", "covering"]
+)
+def test_validate_raises_like_the_call(rough, name):
+    function = getattr(fc.dimensions, name)
+    assert function.validate(rough) is None
+    for arguments in ({"surface": rough * np.nan}, {"surface": rough.values}):
+        with pytest.raises(ValueError, match="surface") as of_call:
+            function(**arguments)
+        with pytest.raises(ValueError, match="surface") as of_validate:
+            function.validate(**arguments)
+        assert str(of_validate.value) == str(of_call.value)
