@@ -351,7 +351,9 @@ QUANTITIES: dict[str, Quantity] = {
     "on_pareto_front": Quantity("1", "no other method of the benchmark is clearly better in error and time"),
     "share_on_pareto_front": Quantity("1", "share of the settings on the Pareto front"),
     "verdict": Quantity(None, "Pareto optimal, dominated, undecided, or alone in its benchmark"),
-    "run_time_scatter": Quantity("1", "standard deviation of the logarithm of repeated run times"),
+    "run_time_scatter": Quantity(
+        "1", "standard deviation of the logarithm of repeated run times, median over the settings"
+    ),
     "result": Quantity("1", "number of the result"),
     "case": Quantity(None, "extreme case"),
     "quantity": Quantity(None, "subpackage, function and quantity"),

@@ -19,6 +19,7 @@ HURST = 0.7
 SIZES = (32, 64, 128, 256, 512, 1024)
 ROLLOFF, SHORT = 0.5, 4.0  # of the extent; in spacings
 _POINTS, _FEWEST = 1 << 18, 100  # points, and surfaces, of the ensemble over which the error is taken
+_BATCH = 1 << 22  # points that are generated at a time
 
 
 def benchmarks() -> tuple[Benchmark, ...]:
@@ -62,8 +63,13 @@ def _method(name: str, make: Generator, measure: Callable[[Array], Array]) -> Me
 
     def measured_ensemble(_: Any, parameter: float) -> Array:
         n = int(parameter)
-        streams = np.random.SeedSequence(1).spawn(max(_FEWEST, _POINTS // n**2))
-        return np.array([measure(make(n, rng=stream).values) for stream in streams])
+        count, batch = max(_FEWEST, _POINTS // n**2), max(1, _BATCH // n**2)
+        rng = np.random.default_rng(1)
+        replicates: list[Array] = []
+        while len(replicates) < count:
+            ensemble = make(n, members=min(batch, count - len(replicates)), rng=rng)
+            replicates += [measure(heights) for heights in ensemble.values]
+        return np.array(replicates)
 
     return Method(name, SIZES, int, solve, measured_ensemble)
 
