@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import warnings
 from collections.abc import Sequence
@@ -17,7 +16,7 @@ import xarray as xr
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._files import EmptyTable, NotATable, file_suffix, read_npy, read_table
@@ -182,24 +181,18 @@ def _table_content(
         expected = f"the spacing in metres, which {path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
-        problems.require(
-            infinite == 0, "path", "finite heights, or NaN where missing", f"{infinite} infinite"
-        )
+        expected = "finite heights, or NaN where missing"
+        problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
         if is_text:
             expected = "a grid of heights, one row to a line"
             problems.require(min(values.shape) > 1, "path", expected, f"shape {values.shape}")
             is_list = values.shape[1] == 3 and values.shape[0] > 9
             points = "three columns, which look like x, y, z points"
             problems.require(not is_list, "path", expected, points)
-        with problems.collect():
-            _check_array(values, spacing)
+        if not problems.found:
+            check_spacing(problems, spacing, check_heights(problems, values))
     heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")
     return FileContent(heights, {"stated_unit": None})
-
-
-def _check_array(values: Array, spacing: Any) -> None:
-    with Problems(WHERE) as problems:
-        check_spacing(problems, spacing, check_heights(problems, values)) if spacing is not None else None
 
 
 def _from_bottom(values: Array, first_row: str) -> Array:
@@ -237,9 +230,8 @@ def _netcdf_content(path: Path, channel: Any, units: str | None, spacing: Any) -
             array = _in_metres(candidates[name], units, spacing, problems)
             problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = candidates[name].attrs.get("units")
-    source = candidates[name].attrs.get("provenance")
     array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
-    return FileContent(array, {"stated_unit": stated, "before": json.loads(source) if source else None})
+    return FileContent(array, {"stated_unit": stated, "before": provenance_of(candidates[name]) or None})
 
 
 def _height_variables(content: Any) -> dict[str, xr.DataArray]:
@@ -268,7 +260,7 @@ def _in_metres(array: xr.DataArray, units: str | None, spacing: Any, problems: P
     array.attrs["units"] = "m"
     for dim in set(core) & set(array.coords):
         array = _ascending_metres(array, dim)
-    if spacing is not None:
+    if spacing is not None and check_spacing(problems, spacing, len(core)):
         sizes = [array.sizes[dim] for dim in core]
         array = array.assign_coords(
             plane_coords(sizes, axis_spacing(spacing, len(core)), [False] * len(core), core)

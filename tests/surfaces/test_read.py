@@ -285,3 +285,17 @@ def test_measured_crack_faces(measured, side):
     expected = json.loads((measured / f"freiberg_gneiss_side_{side}.json").read_text())["check"]["rms_plane"]
     assert float(fc.surfaces.level(surface).std()) == pytest.approx(expected, rel=0.01)
     assert int(fc.surfaces.fill(surface).filled_points) == {"a": 9, "b": 18}[side]
+
+
+def test_spacing_of_a_profile_is_one_length(tmp_path):
+    profile = fc.surfaces.from_array(HEIGHTS[0], 1e-5)
+    fc.save(profile, tmp_path / "profile.nc")
+    with pytest.raises(UnreadableFile, match="spacing: expected one length"):
+        fc.surfaces.read(tmp_path / "profile.nc", spacing=(1e-5, 1e-5))
+
+
+def test_netcdf_with_a_provenance_of_another_origin(tmp_path):
+    surface = fc.surfaces.from_array(HEIGHTS, 1e-5)
+    surface.attrs["provenance"] = "scanned by hand"
+    surface.to_netcdf(tmp_path / "a.nc")
+    np.testing.assert_array_equal(fc.surfaces.read(tmp_path / "a.nc").values, HEIGHTS)
