@@ -60,7 +60,7 @@ class Problems(validation.Problems):
     def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
         self.where = where
         self.error = error
-        self.found: list[str] = []
+        self.messages: list[str] = []
 
     def __enter__(self) -> Problems:
         if (depth := _depth.get()) is not None:
@@ -73,16 +73,16 @@ class Problems(validation.Problems):
         if (depth := _depth.get()) is not None:
             _depth.set(depth - 1)
         if isinstance(value, InvalidInput):
-            self.found.extend(p for p in value.problems if p not in self.found)
-            raise self.error(self.where, self.found) from value
-        if kind is None and self.found:
-            raise self.error(self.where, self.found)
+            self.messages.extend(p for p in value.problems if p not in self.messages)
+            raise self.error(self.where, self.messages) from value
+        if kind is None and self.messages:
+            raise self.error(self.where, self.messages)
         if kind is None and depth == 1:
             raise _Checked
 
     def add(self, argument: str, expected: str, got: object) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
-        self.found.append(f"{argument}: expected {expected}, got {_shown(got)}")
+        self.messages.append(f"{argument}: expected {expected}, got {_shown(got)}")
 
     def require(self, condition: bool, argument: str, expected: str, got: object) -> bool:
         """Note a problem unless `condition` holds; return the condition."""

@@ -35,13 +35,16 @@ def leading_coords(
     }
 
 
-def familiar(array: xr.DataArray) -> xr.DataArray:
+def drop_unknown_coords(array: xr.DataArray) -> xr.DataArray:
     """Return an array with the coordinates of its dims and those with names of `base.schema` only."""
     levels = _levels(array)
     unknown = [
         name for name in array.coords if name in levels or not (name in QUANTITIES or name in array.dims)
     ]
     return array.drop_vars(unknown)
+
+
+familiar = drop_unknown_coords  # until nobody uses it
 
 
 def check_leading(

@@ -25,14 +25,14 @@ Fault = tuple[str, str, object]  # argument, what is expected, what is given
 class Grid:
     """Shape (ny, nx), spacing (dy, dx) in metres, and which axes are periodic, (y, x).
 
-    A profile has one entry in each. `known` is False for a mask without coordinates: its spacing is one
-    cell, and it has no lengths in metres.
+    A profile has one entry in each. A mask without coordinates has a spacing of one cell and no lengths in
+    metres; `has_coordinates` is then False.
     """
 
     shape: tuple[int, ...]
     spacing: tuple[float, ...]
     periodic: tuple[bool, ...]
-    known: bool = True
+    has_coordinates: bool = True
 
     @property
     def extent(self) -> tuple[float, ...]:

@@ -42,12 +42,22 @@ class Problems:
         Public name of the function that is called, or the file that is read.
     error : type, default InvalidInput
         The exception to raise.
+
+    Attributes
+    ----------
+    messages : list of str
+        One line for each problem, so far.
     """
 
     def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
         self.where = where
         self.error = error
-        self.found: list[str] = []
+        self.messages: list[str] = []
+
+    @property
+    def found(self) -> list[str]:
+        """Former name of `messages`."""
+        return self.messages
 
     def __enter__(self) -> Problems:
         return self
@@ -57,13 +67,13 @@ class Problems:
     ) -> None:
         if isinstance(value, InvalidInput):
             self._extend(value.problems)
-            raise self.error(self.where, self.found) from value
-        if error_type is None and self.found:
-            raise self.error(self.where, self.found)
+            raise self.error(self.where, self.messages) from value
+        if error_type is None and self.messages:
+            raise self.error(self.where, self.messages)
 
     def add(self, argument: str, expected: str, got: object) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
-        self.found.append(f"{argument}: expected {expected}, got {_shown(got)}")
+        self.messages.append(f"{argument}: expected {expected}, got {_shown(got)}")
 
     @contextmanager
     def collect(self, prefix: str = "") -> Iterator[None]:
@@ -86,7 +96,7 @@ class Problems:
             return None
 
     def _extend(self, lines: Iterable[str]) -> None:
-        self.found.extend(line for line in lines if line not in self.found)
+        self.messages.extend(line for line in lines if line not in self.messages)
 
     def require(self, condition: bool, argument: str, expected: str, got: object) -> bool:
         """Note a problem unless `condition` holds; return the condition."""
@@ -264,10 +274,10 @@ class Problems:
 
     def _add_all(self, faults: Iterable[tuple[str, str, object]]) -> bool:
         """Note every fault; return whether there is none."""
-        before = len(self.found)
+        before = len(self.messages)
         for fault in faults:
             self.add(*fault)
-        return len(self.found) == before
+        return len(self.messages) == before
 
     def periodic(self, argument: str, value: Any, grid: Grid) -> bool:
         """Check a choice of periodicity (None, True, False); `base.grid.periodic_axes` then applies it.
@@ -277,7 +287,7 @@ class Problems:
         """
         if not self.boolean(argument, value, optional=True):
             return False
-        allowed = not value or not grid.known or all(grid.periodic)
+        allowed = not value or not grid.has_coordinates or all(grid.periodic)
         expected = "periodic axes (attribute `period` of x and y equal to n * spacing)"
         return self.require(allowed, argument, expected, value)
 

@@ -98,7 +98,7 @@ class ContactOptions:
 
     def check_grid(self, grid: Grid, problems: Problems) -> bool:
         """Check boundary, influence and plate radius against shape, spacing and periodicity of a grid."""
-        before = len(problems.found)
+        before = len(problems.messages)
         if self.boundary is None:
             mixed = any(grid.periodic) and not all(grid.periodic)
             expected = "'free' where one axis is periodic and the other is not"
@@ -117,7 +117,7 @@ class ContactOptions:
         else:
             expected = "'second_order', the default: other values are only valid with influence='disc'"
             problems.require(self.disc_radius == "second_order", "disc_radius", expected, self.disc_radius)
-        return len(problems.found) == before
+        return len(problems.messages) == before
 
     def _check_radius(self, spacing: tuple[float, float], problems: Problems) -> None:
         """Check that the plates exist on this grid and leave the elastic operator positive."""
@@ -222,7 +222,7 @@ def check_scale(
         f"scales {sizes}",
     ):
         return False
-    before = len(problems.found)
+    before = len(problems.messages)
     if hardness is not None:
         low, high = units.pressure / REACH, units.pressure * REACH
         expected = f"None or between {low:.3g} and {high:.3g} for this surface"
@@ -232,7 +232,7 @@ def check_scale(
     expected = f"0 or between {scale / REACH:.3g} and {scale * REACH:.3g} for this surface and modulus"
     for given, value in zip(load.values, values, strict=True):
         problems.require(value == 0 or unit / REACH < value < unit * REACH, load.control, expected, given)
-    return len(problems.found) == before
+    return len(problems.messages) == before
 
 
 @lru_cache(maxsize=64)

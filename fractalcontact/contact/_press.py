@@ -55,7 +55,7 @@ def _check(
         return
     grid = read_grid(surface)
     options.check_grid(grid, problems)
-    if load is None or problems.found:
+    if load is None or problems.messages:
         return
     height_range = float(surface.values.max()) - float(surface.values.min())
     check_scale(problems, grid, height_range, float(contact_modulus), options.hardness, load)

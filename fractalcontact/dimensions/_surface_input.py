@@ -189,7 +189,7 @@ def check_surface(
     reserved : collection of str
         Names of the result, which no leading dim may have.
     """
-    before = len(problems.found)
+    before = len(problems.messages)
     problems.surface(
         "surface",
         surface,
@@ -200,17 +200,17 @@ def check_surface(
         decades=DECADES,
     )
     check_leading(surface, reserved, problems)
-    if len(problems.found) > before or is_lazy(surface):
-        return len(problems.found) == before
+    if len(problems.messages) > before or is_lazy(surface):
+        return len(problems.messages) == before
     axes = len(_core_dims(surface))
     _check_heights(problems, surface.values, axes, gaps)
-    if len(problems.found) == before:
+    if len(problems.messages) == before:
         stack = np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:])))
         if points:
             _check_number_of_points(problems, stack, 8 if axes == 1 else 25)
         if squares:
             _check_squares(problems, stack)
-    return len(problems.found) == before
+    return len(problems.messages) == before
 
 
 def check_scales(problems: Problems, scales: Any, surface: xr.DataArray | None) -> None:

@@ -119,7 +119,7 @@ def measure_planes(
     """Measure what is wanted out of `MEASURES`; `components` are needed for islands and percolation."""
     result = Measurements(planes)
     if "islands" in wanted:
-        spacing = planes.grid.spacing if planes.grid.known else (np.nan, np.nan)
+        spacing = planes.grid.spacing if planes.grid.has_coordinates else (np.nan, np.nan)
         perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
         values = {"total_perimeter": perimeter, **island_scalars(components, planes, connectivity)}
         result.variables.update({name: planes.variable(array) for name, array in values.items()})

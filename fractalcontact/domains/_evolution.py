@@ -113,7 +113,7 @@ def _add_changes(measurements: Measurements, components: Sequence[Components]) -
     has_previous = np.isfinite(rows[:, 0])
     if np.isnan(rows[has_previous, CHANGE_NAMES.index("overlap") :]).any():
         reasons = {"overlap": "both sets are empty", "hausdorff_distance": "a set is empty"}
-        if not planes.grid.known:
+        if not planes.grid.has_coordinates:
             reasons["hausdorff_distance"] = "the mask has no coordinates"
         for name, reason in reasons.items():
             measurements.notes[name] = {"comment": f"{comment}, and where {reason}"}
@@ -121,7 +121,7 @@ def _add_changes(measurements: Measurements, components: Sequence[Components]) -
 
 def _change(planes: Planes, components: Sequence[Components], plane: int) -> Array:
     before, after = planes.cells[plane - 1], planes.cells[plane]
-    distance = hausdorff_distance(before, after, planes.grid) if planes.grid.known else np.nan
+    distance = hausdorff_distance(before, after, planes.grid) if planes.grid.has_coordinates else np.nan
     events = island_overlaps(components[plane - 1], components[plane]).event_counts
     return np.array([*events, area_overlap(before, after), distance])
 

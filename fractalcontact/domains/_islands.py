@@ -116,7 +116,7 @@ def island_scalars(components: Sequence[Components], planes: Planes, connectivit
     """Return the numbers of every plane: islands, their sizes, the Euler number."""
     sizes = [plane.sizes for plane in components]
     euler = [euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
-    area = planes.grid.cell_area if planes.grid.known else np.nan
+    area = planes.grid.cell_area if planes.grid.has_coordinates else np.nan
     largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
     mean = np.array([cells.mean() if cells.size else np.nan for cells in sizes])
     return {
@@ -136,7 +136,7 @@ def _table(components: Sequence[Components], planes: Planes, columns: Sequence[s
     origin = [float(axes[dim].values[0]) if axes else 0.0 for dim in ("y", "x")]
     tables = [component_table(plane, planes.grid, origin, columns) for plane in components]
     joined = {name: _chain([table.pop(name) for table in tables]) for name in columns}
-    if planes.grid.known:
+    if planes.grid.has_coordinates:
         return joined
     return {
         name: values if name == "cells" else np.full(values.shape, np.nan) for name, values in joined.items()
@@ -150,7 +150,7 @@ def _chain(arrays: Sequence[Array]) -> Array:
 
 def _notes(planes: Planes, *, too_many: bool) -> dict[str, dict[str, str]]:
     reasons = []
-    if not planes.grid.known:
+    if not planes.grid.has_coordinates:
         reasons.append("the mask has no coordinates")
     if np.any(planes.occupied == 0):
         reasons.append("the set is empty")

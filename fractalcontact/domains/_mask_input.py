@@ -72,7 +72,7 @@ class Planes:
     @property
     def side(self) -> float:
         """Edge in metres of a square with the area of one cell; NaN without coordinates."""
-        return float(np.sqrt(self.grid.cell_area)) if self.grid.known else float("nan")
+        return float(np.sqrt(self.grid.cell_area)) if self.grid.has_coordinates else float("nan")
 
     def valid_of(self, plane: int) -> Array | None:
         """Return the observed cells of one plane, or None if all of them are."""
@@ -154,7 +154,7 @@ def mask_grid(mask: xr.DataArray) -> Grid:
     if any(dim in mask.coords for dim in CORE_DIMS):
         return read_grid(mask)
     shape = (int(mask.sizes["y"]), int(mask.sizes["x"]))
-    return Grid(shape, (1.0, 1.0), (False, False), known=False)
+    return Grid(shape, (1.0, 1.0), (False, False), has_coordinates=False)
 
 
 def read_mask(
@@ -162,7 +162,7 @@ def read_mask(
 ) -> Planes:
     """Return the planes of a mask that passed `check_mask`."""
     grid = mask_grid(mask)
-    grid = Grid(grid.shape, grid.spacing, periodic_axes(periodic, grid), grid.known)
+    grid = Grid(grid.shape, grid.spacing, periodic_axes(periodic, grid), grid.has_coordinates)
     cells = _flags(mask).view(np.uint8).reshape(-1, *grid.shape)
     observed = None
     if valid is not None:
@@ -175,7 +175,7 @@ def read_mask(
         tuple(str(dim) for dim in mask.dims[:-2]),
         tuple(mask.shape[:-2]),
         leading_coords(mask, mask.dims[:-2], RESULT_DIMS),
-        {dim: mask.coords.variables[dim] for dim in CORE_DIMS} if grid.known else {},
+        {dim: mask.coords.variables[dim] for dim in CORE_DIMS} if grid.has_coordinates else {},
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import familiar
+from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 
@@ -93,12 +93,12 @@ def friction(
     """
     name, shears = read_dilatancy(dilatancy)
     basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
-    heights = familiar(dilatancy[name]).drop_attrs().transpose("shear", ...)
+    heights = drop_unknown_coords(dilatancy[name]).drop_attrs().transpose("shear", ...)
     slopes, lengths = dilatancy_slopes(shears, heights.values.reshape(shears.size, -1), smoothing)
     angle = heights.copy(data=np.degrees(np.arctan(slopes)).reshape(heights.shape))
     angle = angle.transpose(*dilatancy[name].dims)
     result = xr.Dataset({"dilatancy_angle": angle, "friction_angle": angle + basic_angle})
-    pressure = familiar(dilatancy["nominal_pressure"]) if name == "dilatancy" else None
+    pressure = drop_unknown_coords(dilatancy["nominal_pressure"]) if name == "dilatancy" else None
     if nominal_pressure is not None:
         values = float_array(nominal_pressure)
         pressure = xr.DataArray(values, dims="step", coords={"step": np.arange(values.size)})

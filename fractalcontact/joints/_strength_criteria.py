@@ -95,7 +95,7 @@ def barton_choubey_strength(
         problems.number("roughness", roughness, at_least=0, at_most=20)
         problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
         problems.number("residual_angle", residual_angle, at_least=0, below=90)
-        if not problems.found:
+        if not problems.messages:
             pressure = np.asarray(nominal_pressure, dtype=np.float64)
             jrc, jcs, phi_r = float(roughness), float(wall_strength), float(residual_angle)
             angle = phi_r + jrc * (np.log10(jcs) - np.log10(pressure))
@@ -190,7 +190,7 @@ def bandis_constants(roughness: float, wall_strength: float, aperture: float) ->
         problems.number("roughness", roughness, at_least=0, at_most=20)
         problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
         problems.number("aperture", aperture, above=0, at_most=LARGEST)
-        if not problems.found:
+        if not problems.messages:
             jrc = float(roughness)
             stress = (float(wall_strength) / MPA) / (float(aperture) / MM)
             stiffness = -7.15 + 1.75 * jrc + 0.02 * stress

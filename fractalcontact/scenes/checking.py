@@ -53,12 +53,12 @@ def preflight(scene: Scene) -> None:
                     flat = stand_in(table)
                     faces[name] = read_surface(table, scene.folder) if flat is None else flat
         if (
-            not problems.found
+            not problems.messages
             and (scene.wanted("joints") or scene.wanted("domains"))
             and not scene.wanted("contact")
         ):
             _preflight_joint(scene, faces, problems)
-        if not problems.found:
+        if not problems.messages:
             _rehearse(scene, faces["surface"], faces.get("upper"), problems)
     doubting.warn(doubting.of_the_given(scene, faces["surface"]))
 
@@ -136,5 +136,5 @@ class _gather:
         if not isinstance(value, InvalidInput):
             return False
         lines = [f"{self.place}: {line}" for line in value.problems]
-        self.problems.found.extend(line for line in lines if line not in self.problems.found)
+        self.problems.messages.extend(line for line in lines if line not in self.problems.messages)
         return True

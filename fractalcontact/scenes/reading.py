@@ -52,9 +52,9 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
     tables = {key: _spelled_out(value, key, problems) for key, value in tables.items()}
     scene = Scene(source.stem, tables, source.resolve().parent)
     _check(scene, problems)
-    if not problems.found:
-        check_loads(scene, problems.found)
-    return scene, problems.found
+    if not problems.messages:
+        check_loads(scene, problems.messages)
+    return scene, problems.messages
 
 
 def _find(path: Path) -> Path:
@@ -85,13 +85,13 @@ def _spelled_out(value: Any, key: str, problems: Problems) -> Any:
 
 
 def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -> list[float]:
-    before = len(problems.found)
+    before = len(problems.messages)
     for word in words:
         if problems.require(
             word in value, f"{key}.{word}", f"a number (a range has {', '.join(words)})", "none"
         ):
             problems.number(f"{key}.{word}", value[word])
-    if len(problems.found) > before:
+    if len(problems.messages) > before:
         return [0.0]
     if words is EVEN:
         start, stop, step = (float(value[word]) for word in words)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import familiar
+from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
@@ -84,7 +84,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -
     heights = np.asarray(surface.values, dtype=np.float64)
     is_spike, deviation = _spikes(heights, int(window), float(threshold))
     count = int(is_spike.sum())
-    result = familiar(surface.copy(data=np.where(is_spike, np.nan, heights)).rename("height"))
+    result = drop_unknown_coords(surface.copy(data=np.where(is_spike, np.nan, heights)).rename("height"))
     result = result.assign_coords(removed_points=count)
     result.attrs = {"removed_points": count, "robust_standard_deviation": deviation}
     return result

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import familiar
+from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
@@ -88,7 +88,7 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # no
     leading = surface.dims[: surface.ndim - len(grid.shape)]
     missing = np.count_nonzero(np.isnan(planes), axis=tuple(range(1, planes.ndim))).astype(np.int64)
     missing = missing.reshape(surface.shape[: len(leading)])
-    result = familiar(surface.copy(data=filled.reshape(surface.shape)).rename("height"))
+    result = drop_unknown_coords(surface.copy(data=filled.reshape(surface.shape)).rename("height"))
     result = result.assign_coords(filled_points=(leading, missing))
     result.attrs = {"filled_points": missing}
     return result

@@ -24,7 +24,7 @@ def check_heights(problems: Problems, heights: Any) -> int | None:
     if values is None:
         problems.add("heights", "an array of real numbers", heights)
         return None
-    before = len(problems.found)
+    before = len(problems.messages)
     axes = _plane_axes(heights, values.ndim)
     if isinstance(heights, xr.DataArray):
         core = ("y", "x")[2 - axes :]
@@ -47,7 +47,7 @@ def check_heights(problems: Problems, heights: Any) -> int | None:
         problems.require(
             infinite == 0, "heights", "finite values, or NaN where missing", f"{infinite} infinite"
         )
-    return axes if len(problems.found) == before else None
+    return axes if len(problems.messages) == before else None
 
 
 def _check(problems: Problems, *, heights: Any, spacing: Any, periodic: Any, units: Any) -> None:

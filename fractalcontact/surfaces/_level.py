@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import familiar
+from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
@@ -68,7 +68,7 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
         message = f"surface: expected {expected}, got too few of them{where}"
         raise InvalidInput("fractalcontact.surfaces.level", [message])
     residuals = np.stack([residual for residual, _ in fits]).reshape(surface.shape)
-    levelled = familiar(surface.copy(data=residuals).rename("height"))
+    levelled = drop_unknown_coords(surface.copy(data=residuals).rename("height"))
     if order > 0:
         for dim in {"y", "x"} & set(levelled.coords):
             levelled.coords[dim].attrs.pop("period", None)

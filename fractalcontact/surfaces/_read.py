@@ -189,7 +189,7 @@ def _table_content(
             is_list = values.shape[1] == 3 and values.shape[0] > 9
             points = "three columns, which look like x, y, z points"
             problems.require(not is_list, "path", expected, points)
-        if not problems.found:
+        if not problems.messages:
             check_spacing(problems, spacing, check_heights(problems, values))
     heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")
     return FileContent(heights, {"stated_unit": None})

@@ -44,7 +44,7 @@ def _check(
     members: Any,
     rng: Any,
 ) -> None:
-    before = len(problems.found)
+    before = len(problems.messages)
     valid_plane = check_plane(problems, shape, spacing)
     axes = np.size(shape) if valid_plane else 2
     valid_hurst = problems.numbers("hurst", hurst, at_least=0.01, at_most=1.0) and problems.require(
@@ -67,7 +67,7 @@ def _check(
         )
         problems.require(isotropic or axes == 2, "anisotropy_ratio", "1 for a profile", anisotropy_ratio)
     check_ensemble(problems, members, rng)
-    if len(problems.found) == before:
+    if len(problems.messages) == before:
         _check_modes(
             problems, _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, azimuth), shape, spacing
         )

@@ -16,8 +16,8 @@ from fractalcontact.base.validation import (
 def problems_of(check):
     """Return the lines that one check adds."""
     problems = Problems("somewhere")
-    assert check(problems) is (not problems.found)
-    return problems.found
+    assert check(problems) is (not problems.messages)
+    return problems.messages
 
 
 @pytest.mark.parametrize(
