@@ -153,6 +153,19 @@ def closure(
     pressed = [press_sheared(crack, shears, towards, pressing, progress) for towards in directions]
     for towards, columns in zip(directions, pressed, strict=True):
         warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
+    result = _dataset(crack, shears, directions, pressed)
+    if is_single(direction):
+        result = result.isel(direction=0)
+    result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
+    _explain_undetermined(result)
+    residual = float(np.max([columns["residual"].max() for columns in pressed]))
+    return result.assign_attrs(achieved_residual=residual)
+
+
+def _dataset(
+    crack: Crack, shears: Array, directions: Sequence[Direction], pressed: Sequence[dict[str, Array]]
+) -> xr.Dataset:
+    """Return the columns of all directions over (direction, shear, step), and maps over (..., y, x)."""
     columns = {name: np.stack([each[name] for each in pressed]) for name in pressed[0]}
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
@@ -160,14 +173,9 @@ def closure(
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
     coords |= {"shear": ("shear", shears), "step": np.arange(columns["closure"].shape[2])}
     coords |= direction_coords(directions)
-    if pressing.keep:
+    if any(values.ndim > 3 for values in columns.values()):
         coords |= block_coords(crack)
-    result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
-    if is_single(direction):
-        result = result.isel(direction=0)
-    result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
-    _explain_undetermined(result)
-    return result.assign_attrs(achieved_residual=float(columns["residual"].max()))
+    return xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
 
 
 def _explain_undetermined(result: xr.Dataset) -> None:

@@ -134,9 +134,8 @@ def dilatancy(
     >>> x = np.arange(60)
     >>> teeth = np.abs((x + 10) % 20 - 10) * 0.1 * np.ones((6, 1))  # slope 0.1, period 20
     >>> crack = fc.joints.Crack(fc.surfaces.from_array(teeth, 1.0), young=30e9, poisson=0.2, block=(6, 20))
-    >>> fc.joints.dilatancy(crack, shear=[0, 5, 10, 15], direction="E").rigid_dilatancy.values.round(
-    ...     6
-    ... ).tolist()
+    >>> result = fc.joints.dilatancy(crack, shear=[0, 5, 10, 15], direction="E")
+    >>> result.rigid_dilatancy.values.round(6).tolist()
     [[0.0, 0.5, 1.0, 0.5]]
     """
     directions, shears = read_directions(direction), float_array(shear)
@@ -162,7 +161,8 @@ def dilatancy(
         result = result.assign(normal_stiffness=float(normal_stiffness))
         result["initial_force"] = "step", float_array(pressing.load.values)
     result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
-    return result.assign_attrs(achieved_residual=max(float(each["residual"].max()) for each in pressed))
+    residual = float(np.max([columns["residual"].max() for columns in pressed]))
+    return result.assign_attrs(achieved_residual=residual)
 
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:
@@ -171,13 +171,13 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
     initial = separations(lower, upper, layout, np.zeros(1), (0.0, 1.0))[0]
     lifted = np.stack([_separations(crack, shears, towards) for towards in directions]) - initial
     slope_y, slope_x = mean_slopes(lower, layout)
-    slopes = np.array([slope_y * towards.unit[0] + slope_x * towards.unit[1] for towards in directions])
+    mean_slope = np.array([slope_y * towards.unit[0] + slope_x * towards.unit[1] for towards in directions])
     dims = ("direction", "shear")
     return xr.Dataset(
         {
             "rigid_dilatancy": (dims, lifted),
-            "plateau_dilatancy": (dims, lifted - slopes[:, None] * shears),
-            "mean_slope": ("direction", slopes),
+            "plateau_dilatancy": (dims, lifted - mean_slope[:, None] * shears),
+            "mean_slope": ("direction", mean_slope),
             "interpolation_error": (dims, interpolation_errors(crack, shears, directions)),
             "initial_offset": initial,
             "basic_friction_angle": crack.basic_friction_angle,
