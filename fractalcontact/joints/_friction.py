@@ -85,11 +85,10 @@ def friction(
     >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
     >>> climb = fc.joints.dilatancy(crack, shear=[0, 2, 4, 6], direction="E")
     >>> result = fc.joints.friction(climb, nominal_pressure=1e6)
-    >>> (
-    ...     round(float(result.peak_friction_angle[0]), 3),
-    ...     round(float(result.peak_shear_strength[0, 0]) / 1e6, 3),
-    ... )
-    (45.0, 1.0)
+    >>> result.peak_friction_angle.values.round(3).tolist()
+    [45.0]
+    >>> (result.peak_shear_strength / 1e6).values.round(3).tolist()
+    [[1.0]]
     """
     name, shears = read_dilatancy(dilatancy)
     basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
