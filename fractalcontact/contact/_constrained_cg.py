@@ -16,7 +16,7 @@ Symbols are those of Polonsky and Keer where they have one:
 
 One iteration takes these steps; the code cites them by number:
 
-    (1)  closure = sum p (u + h) / sum p over p < p_max under force control; energy 1/2 p u + p h
+    (1)  closure = sum p (u + h) / sum p over p < p_max under force control; objective 1/2 p u + p h
     (2)  residual: (sum p max(g, 0) / sum p + largest overlap) / scale
     (3)  free set I_c: 0 < p < p_max, and where admitted the nodes outside that violate the conditions
     (4)  z = M (g - mean g) on I_c, less its mean under force control; z = g - mean g in the paper
@@ -113,15 +113,15 @@ class ContactSystem:
 
 
 @dataclass
-class Energy:
-    """Sums over the current pressure: closure, objective, and the scale of the error."""
+class Objective:
+    """The objective at the current pressure, with the sums and the closure that come with it."""
 
+    value: float
+    rounding: float  # of the value
     force: float  # sum p
     work: float  # sum p u
     closure: float
     scale: float  # of the error, a length
-    objective: float
-    rounding: float  # of the objective
     residual_floor: float  # residual that rounding allows
 
 
@@ -169,15 +169,16 @@ class ConstrainedCG:
         self.block_sums = np.zeros((self.blocks, 8))
 
         shape = self.h.shape
-        self.p, self.t, self.work = (np.zeros(shape, dtype=self.dtype) for _ in range(3))
+        self.p = np.zeros(shape, dtype=self.dtype)  # pressure
+        self.u = RELEASED  # displacement, see `update_displacement`
+        self.t = np.zeros(shape, dtype=self.dtype)  # search direction
+        self.work = np.zeros(shape, dtype=self.dtype)  # z, r, or the pressure before a projected step
         same_plane = self.preconditioner.plane == shape
         self.wide = None if same_plane else np.zeros(self.preconditioner.plane, dtype=self.dtype)
-        self.u = RELEASED
+        self.tau, self.G = 0.0, 0.0
         self.u_is_exact = False  # u = K p to rounding, not updated by steps
-        self.tau = 0.0
         self.projected = False  # the last step left the bounds and was projected
-        self.halvings = 0
-        self.G = 0.0
+        self.halvings = 0  # of the last step
         self.last_objective = np.inf
         self.preconditioned = True
         np.clip(start, 0, self.p_max, out=self.p, casting="same_kind")
@@ -187,25 +188,25 @@ class ConstrainedCG:
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
         while iteration <= MAX_ITERATIONS:
-            energy = self.energy()
-            if self.overshot(energy, progress):
+            objective = self.objective()  # (1)
+            if self.overshot(objective, progress):
                 self.backtrack()
                 continue
-            self.last_objective, self.halvings, self.projected = energy.objective, 0, False
-            inside, outside, residual = self.kkt_residual(energy)
+            self.last_objective, self.halvings, self.projected = objective.value, 0, False
+            inside, outside, residual = self.kkt_residual(objective)  # (2)
             if residual <= tolerance:
                 if self.u_is_exact or not certify:
                     reason = "converged"
                     break
                 self.update_displacement()
                 continue
-            least_fall = SMALLEST_FALL * energy.rounding / (8 * self.epsilon)
-            progress.update(residual, energy.objective, least_fall)
-            at_rounding = residual <= energy.residual_floor
+            least_fall = SMALLEST_FALL * objective.rounding / (8 * self.epsilon)
+            progress.update(residual, objective.value, least_fall)
+            at_rounding = residual <= objective.residual_floor
             iteration += 1
             patience = PATIENCE // 8 if at_rounding else PATIENCE
-            if progress.stalled <= patience and self.search(energy, inside, outside):
-                self.take_step()
+            if progress.stalled <= patience and self.find_step(objective, inside, outside):  # (3) to (8)
+                self.take_step()  # (9), (10)
             elif at_rounding or not self.preconditioned:
                 reason = "rounding" if at_rounding else "stagnated"
                 break
@@ -213,19 +214,19 @@ class ConstrainedCG:
                 self.preconditioned, self.G, progress.stalled = False, 0.0, 0
         if certify and not self.u_is_exact:
             self.update_displacement()
-            energy = self.energy()
-            residual = self.kkt_residual(energy)[2]
+            objective = self.objective()
+            residual = self.kkt_residual(objective)[2]
         transforms = self.operator.transforms + self.preconditioner.transforms - self.transforms_before
         return Solution(
             self.p,
             self.u,
-            energy.closure,
-            energy.force,
+            objective.closure,
+            objective.force,
             iteration,
             transforms,
             residual,
             reason,
-            energy.work,
+            objective.work,
         )
 
     # start
@@ -269,20 +270,20 @@ class ConstrainedCG:
 
     # objective and error
 
-    def energy(self) -> Energy:
-        """Closure and objective (1), and the scale of the error."""
+    def objective(self) -> Objective:
+        """Return closure and objective (1), and the scale of the error."""
         sums = self.pass_sums(_kernels.objective_sums, self.h, self.u, self.p, self.p_max)
         force, p_u, p_h, force_below, level = sums[:5]
-        objective = 0.5 * p_u + p_h
+        value = 0.5 * p_u + p_h
         if self.force_controlled:
             closure = level / force_below if force_below > 0 else self.saturated_closure()
         else:
             closure = self.control.value
-            objective -= closure * force
+            value -= closure * force
         scale = max(p_u / force if force > 0 else 0.0, force * self.local_compliance)
         rounding = 8 * self.epsilon * (abs(p_u) + abs(p_h) + abs(closure) * force)
         floor = 64 * self.epsilon * abs(closure) / scale if scale > 0 else 0.0
-        return Energy(force, p_u, closure, scale, objective, rounding, floor)
+        return Objective(value, rounding, force, p_u, closure, scale, floor)
 
     def saturated_closure(self) -> float:
         """Return the least closure at which every loaded node is at p_max.
@@ -296,19 +297,19 @@ class ConstrainedCG:
             return 0.0
         return highest_loaded if highest_loaded <= lowest_open else 0.5 * (highest_loaded + lowest_open)
 
-    def kkt_residual(self, energy: Energy) -> tuple[SetError, SetError, float]:
+    def kkt_residual(self, objective: Objective) -> tuple[SetError, SetError, float]:
         """Return the error inside the free set and outside of it, and the residual (2)."""
-        closure = self.dtype(energy.closure)
+        closure = self.dtype(objective.closure)
         sums = self.pass_sums(_kernels.residual_sums, self.h, self.u, self.p, self.p_max, closure)
         overlap = float(self.block_sums[:, 1].max())
         inside, outside = SetError(*sums[2:5]), SetError(*sums[5:8])
-        if energy.force <= 0:
+        if objective.force <= 0:
             return inside, outside, float(overlap > 0)
-        return inside, outside, (float(sums[0]) / energy.force + overlap) / energy.scale
+        return inside, outside, (float(sums[0]) / objective.force + overlap) / objective.scale
 
     # search direction and step length
 
-    def search(self, energy: Energy, inside: SetError, outside: SetError) -> bool:
+    def find_step(self, objective: Objective, inside: SetError, outside: SetError) -> bool:
         """Find direction (3 to 7) and step length (8); False where there is none."""
         mean_part = inside.g**2 / inside.count if self.force_controlled and inside.count else 0.0
         spread = max(inside.g2 - mean_part, 0.0)
@@ -318,11 +319,11 @@ class ConstrainedCG:
             count, g_sum = inside.count + outside.count, inside.g + outside.g
         if count == 0:
             return False
-        t_sum, t_g = self.search_direction(self.dtype(energy.closure), admit, count, g_sum)
+        t_sum, t_g = self.search_direction(self.dtype(objective.closure), admit, count, g_sum)
         self.tau = self.step_length(t_g)
         if not self.force_controlled and t_g > 0 and t_sum > 0:
             # full contact of a periodic body costs nothing to relieve: no further than to no force at all
-            self.tau = min(self.tau, 1.01 * energy.force / t_sum)
+            self.tau = min(self.tau, 1.01 * objective.force / t_sum)
         return self.tau < np.inf
 
     def search_direction(self, closure: Any, admit: bool, count: float, g_sum: float) -> tuple[float, float]:
@@ -420,13 +421,13 @@ class ConstrainedCG:
         rest = sum_by_rows(np.where(free, 0, self.p))
         self.work[free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
 
-    def overshot(self, energy: Energy, progress: Progress) -> bool:
+    def overshot(self, objective: Objective, progress: Progress) -> bool:
         """Return whether the last projected step has raised the objective and can be halved."""
         if not self.projected or self.halvings >= MAX_HALVINGS:
             return False
         # nodes may change places without end at one level of the objective: then it must fall
-        slack = energy.rounding if progress.stalled < PATIENCE // 4 else -energy.rounding
-        return energy.objective > self.last_objective + slack
+        slack = objective.rounding if progress.stalled < PATIENCE // 4 else -objective.rounding
+        return objective.value > self.last_objective + slack
 
     def backtrack(self) -> None:
         """Go back half of the last projected step."""

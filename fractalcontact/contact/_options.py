@@ -107,11 +107,13 @@ class ContactOptions:
             expected = "periodic axes (attribute `period` of x and y equal to n * spacing), or 'free'"
             problems.require(all(grid.periodic), "boundary", expected, self.boundary)
         influence = self.influence_on(grid)
-        allowed, bodies = (
-            (("spectral",), "periodic") if self.is_periodic(grid) else (("disc", "square"), "free")
-        )
-        expected = f"{' or '.join(map(repr, allowed))} for {bodies} bodies"
-        problems.require(influence in allowed, "influence", expected, influence)
+        if self.is_periodic(grid):
+            problems.require(
+                influence == "spectral", "influence", "'spectral' for periodic bodies", influence
+            )
+        else:
+            expected = "'disc' or 'square' for free bodies"
+            problems.require(influence in ("disc", "square"), "influence", expected, influence)
         if influence == "disc":
             self._check_radius((grid.spacing[0], grid.spacing[1]), problems)
         else:

@@ -16,7 +16,7 @@ def rough_surface(n=32, periodic=True):
 
 
 def love(n, spacing):
-    """Settlement (m) of the centre of each cell under 1 Pa on another (Love 1929), E* = MODULUS."""
+    """Displacement (m) of the centre of each cell under 1 Pa on another (Love 1929), E* = MODULUS."""
     x = (np.arange(n) - np.arange(n)[:, None]) * spacing
     dy, dx = np.repeat(np.repeat(x, n, 0), n, 1), np.tile(x, (n, n))
     half, total = spacing / 2, 0.0
