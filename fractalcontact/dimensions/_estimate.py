@@ -15,8 +15,14 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.scaling import fit_line
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.dimensions import _covering_area, _cube_counts, _roughness_length, _spectrum, _variation
-from fractalcontact.dimensions import _variogram as _lags
+from fractalcontact.dimensions import (
+    _covering_area,
+    _cube_counts,
+    _roughness_length,
+    _spectrum,
+    _variation,
+    _variogram,
+)
 from fractalcontact.dimensions._curve import Curve
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
@@ -340,11 +346,13 @@ _ESTIMATORS: dict[str, Callable[[Surface, Scales, bool], Estimate]] = {
         ignores_plane=True,
     ),
     "variogram": CurveMethod(
-        _lags.variogram_curve, lambda slope, _: 0.5 * slope, -2.0, _lag_window, has_lags=True
+        _variogram.variogram_curve, lambda slope, _: 0.5 * slope, -2.0, _lag_window, has_lags=True
     ),
-    "madogram": CurveMethod(_lags.madogram_curve, lambda slope, _: slope, 0.0, _lag_window, has_lags=True),
+    "madogram": CurveMethod(
+        _variogram.madogram_curve, lambda slope, _: slope, 0.0, _lag_window, has_lags=True
+    ),
     "second_variogram": CurveMethod(
-        _lags.second_variogram_curve,
+        _variogram.second_variogram_curve,
         lambda slope, _: 0.5 * slope,
         0.0,
         _lag_window,

@@ -1,4 +1,7 @@
-"""Compiled loops over heights."""
+"""Compiled loops over heights.
+
+They are imported inside the functions that call them: a study that needs no loop does not load numba.
+"""
 
 from __future__ import annotations
 

@@ -25,10 +25,10 @@ DIRECTIONS = 8
 LAG_MULTIPLES = (1, 2, 4)
 _LARGEST_COMPONENT = 8  # of a lattice direction that is near a given azimuth
 _NEAR = 2.5  # degrees within which the shorter of two lattice directions is preferred
-_REACH = 24  # shifts along each axis that are summed one by one, or three times the longest lag
+REACH = 24  # shifts along each axis that are summed one by one, or three times the longest lag
 _MOST = 3.0  # largest factor on it for an anisotropic surface
 _BEYOND = 1.4  # shifts beyond are about this many times as long
-_LONG = 32  # lags beyond which shifts and lags are taken on a coarser lattice
+LONG = 32  # lags beyond which shifts and lags are taken on a coarser lattice
 _TILE, _TILES = 64, 32  # edge of the tiles in which pairs are counted, and their largest number
 _SMALLEST = 1e-6  # of the largest eigenvalue of a covariance: less is an artefact of counting
 
@@ -154,14 +154,14 @@ class MiddlePairs:
     def of(cls, heights: Array, is_complete: bool, vectors: Array, numbers: Array) -> MiddlePairs:
         """Count the pairs of a surface for lag vectors (k, 2) with `numbers` of differences each."""
         shape = (heights.shape[0], heights.shape[1])
-        if is_complete or np.abs(vectors).max(initial=0) > _LONG:
+        if is_complete or np.abs(vectors).max(initial=0) > LONG:
             return cls(shape, numbers)
         return cls(shape, numbers, _counted(np.isfinite(heights), vectors, numbers))
 
 
 def _reach(vectors: Array, ratio: float = 1.0) -> Array:
     """Return how many shifts along y and x are summed one by one; more at a large anisotropy ratio."""
-    near = np.maximum(_REACH, 3 * np.abs(vectors).max(axis=0))
+    near = np.maximum(REACH, 3 * np.abs(vectors).max(axis=0))
     return np.asarray(np.ceil(near * min(max(ratio / 2.0, 1.0), _MOST)), dtype=np.int64)
 
 
@@ -219,7 +219,7 @@ def covariance(
         Edge of a cell along y and x.
     """
     # long lags and the shifts between them are taken on a coarser lattice
-    coarse = np.maximum(-(-np.abs(vectors).max(axis=0) // _LONG), 1)
+    coarse = np.maximum(-(-np.abs(vectors).max(axis=0) // LONG), 1)
     sides = (np.array(pairs.shape) - 2.0 * np.abs(vectors)) / coarse
     share_observed = pairs.numbers / np.prod(sides * coarse, axis=1)
     vectors = np.rint(vectors / coarse).astype(np.int64)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.dimensions import _roughness_length
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +31,6 @@ def test_roughness_is_rms_about_plane(rough):
 @pytest.mark.parametrize("hurst", [0.2, 0.8])
 def test_expected_roughness_of_window(hurst, steps):
     """The mean square about a plane, over exact surfaces of the size of a window."""
-    from fractalcontact.dimensions._roughness_length import expected_roughness
-
     shape = (5, 8)
     surfaces = fc.surfaces.fbm(
         shape, steps, hurst=hurst, rms_increment=1.0, lag=1.0, members=4000, rng=40
@@ -41,7 +40,8 @@ def test_expected_roughness_of_window(hurst, steps):
     flat = surfaces.reshape(len(surfaces), -1)
     rest = flat - (flat @ plane) @ plane.T
     result = np.sqrt(np.mean(rest**2))
-    assert expected_roughness(np.array([shape]), steps, hurst)[0] == pytest.approx(result, rel=0.015)
+    expected = _roughness_length.expected_roughness(np.array([shape]), steps, hurst)[0]
+    assert expected == pytest.approx(result, rel=0.015)
 
 
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import fractalcontact as fc
-from fractalcontact.dimensions import _anisotropy, _second_differences
-from fractalcontact.dimensions._surface_input import read_surfaces
+from fractalcontact.dimensions import _second_differences
 
 SPACING = 1e-4
 
@@ -23,8 +23,8 @@ def _pairs(shape, vectors):
 def test_covariance_equals_scatter(hurst, missing):
     """A variance from a thousand small surfaces has a standard error of 4.5 %."""
     n = 40
-    rays = _second_differences.lattice_directions(None, (1.0, 1.0))[:4]
-    vectors = np.array([(m * ray.dy, m * ray.dx) for ray in rays for m in (1, 2)])
+    directions = _second_differences.lattice_directions(None, (1.0, 1.0))[:4]
+    vectors = np.array([(m * direction.dy, m * direction.dx) for direction in directions for m in (1, 2)])
     is_missing = np.random.default_rng(19).random((n, n)) < missing
     logs = []
     for heights in brownian(n, hurst, 18, members=1000).values:
@@ -34,11 +34,15 @@ def test_covariance_equals_scatter(hurst, missing):
             middle, far = heights[dy : n - dy, dx : n - dx], heights[2 * dy :, 2 * dx :]
             means.append(np.nanmean((heights[: n - 2 * dy, : n - 2 * dx] - 2 * middle + far) ** 2))
         logs.append(np.log(means))
-    surface = fc.surfaces.from_array(np.where(is_missing, np.nan, 0.0) + np.arange(n) ** 2, SPACING)
-    means, _ = _second_differences.SecondDifferences.of(read_surfaces(surface)[0], rays, (0.0, 5e-4))
-    own = means.part([np.flatnonzero((means.vectors == vector).all(axis=1))[0] for vector in vectors])
-    pairs = _second_differences.MiddlePairs.of(surface.values, missing == 0, own.vectors, own.numbers)
-    expected = _second_differences.covariance(own.vectors, pairs, hurst, np.eye(2))
+    seen = ~is_missing
+    numbers = [
+        np.count_nonzero(
+            seen[: n - 2 * dy, : n - 2 * dx] & seen[dy : n - dy, dx : n - dx] & seen[2 * dy :, 2 * dx :]
+        )
+        for dy, dx in vectors
+    ]
+    pairs = _second_differences.MiddlePairs.of(heights, missing == 0, vectors, np.array(numbers, float))
+    expected = _second_differences.covariance(vectors, pairs, hurst, np.eye(2))
     result = np.cov(np.transpose(logs))
     assert np.diag(result) == pytest.approx(np.diag(expected), rel=0.17)
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -48,19 +52,19 @@ def test_covariance_equals_scatter(hurst, missing):
 def test_covariance_does_not_depend_on_reach():
     """Shifts beyond those summed one by one, and the coarse lattice of long lags, against a longer sum."""
     vectors = np.array([(0, 2), (3, 4), (8, 0), (6, -6)])
-    shape, form = (300, 200), _anisotropy.metric_of(0.3, -0.2)
+    shape, metric = (300, 200), expm([[0.3, 0.2], [0.2, -0.3]])
     line = np.stack([np.ones(3), np.arange(3)], axis=1)  # a slope along one direction
     for hurst, error in ((0.1, 1e-3), (0.6, 5e-3), (0.95, 0.02)):
-        result = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, form)
+        result = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, metric)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_second_differences, "_REACH", 120)
-            longer = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, form)
+            patch.setattr(_second_differences, "REACH", 120)
+            longer = _second_differences.covariance(vectors, _pairs(shape, vectors), hurst, metric)
         assert result == pytest.approx(longer, rel=error, abs=error * longer.max())
         far = np.array([(0, 12), (0, 24), (0, 48)])
-        coarse = _second_differences.covariance(far, _pairs(shape, far), hurst, form)
+        coarse = _second_differences.covariance(far, _pairs(shape, far), hurst, metric)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(_second_differences, "_LONG", 48)
-            fine = _second_differences.covariance(far, _pairs(shape, far), hurst, form)
+            patch.setattr(_second_differences, "LONG", 48)
+            fine = _second_differences.covariance(far, _pairs(shape, far), hurst, metric)
         errors = [np.linalg.inv(line.T @ np.linalg.solve(spread, line))[1, 1] for spread in (coarse, fine)]
         assert errors[0] == pytest.approx(errors[1], rel=0.06)
 
