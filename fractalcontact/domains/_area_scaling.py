@@ -20,7 +20,7 @@ from fractalcontact.domains._mask_input import (
     mask_grid,
     read_mask,
 )
-from fractalcontact.domains._scaling_fit import ROUNDING, fit_line
+from fractalcontact.domains._scaling_fit import ROUNDING, fit_line, interval_notes
 
 # share of a cell by which each side on the boundary makes the area too large (Yastrebov et al. 2017)
 EXCESS_PER_SIDE = (np.pi - 1.0 + np.log(2.0)) / 24.0
@@ -133,10 +133,8 @@ def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
 
 
 def _notes(slope: Array) -> dict[str, dict[str, Any]]:
-    interval = "dimension by area (two standard deviations of the local slopes)"
     notes = {
-        "ci_low": {"long_name": f"lower end of the interval of the {interval}"},
-        "ci_high": {"long_name": f"upper end of the interval of the {interval}"},
+        **interval_notes("interval of the dimension by area (two standard deviations of the local slopes)"),
         "local_slope": {"long_name": "local dimension, 2 - d ln(area)/d ln(resolution)"},
     }
     if np.isnan(slope).any():

@@ -20,11 +20,13 @@ from fractalcontact.domains._mask_input import (
     parallel_map,
     read_mask,
 )
+from fractalcontact.domains._scaling_fit import dimension_variables, interval_notes, window_notes
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev. Lett. 53:596 (1984)"
 
 # pairs along the axes and along the diagonals, at a lag of one step and of two
 OFFSETS = np.array([(0, 1), (1, 0), (0, 2), (2, 0), (1, 1), (1, -1), (2, 2), (2, -2)], np.int64)
+LAGS = np.hypot(*OFFSETS.T)  # in cells
 SINGLE_LAG, DOUBLE_LAG = [0, 1, 4, 5], [2, 3, 6, 7]
 BLOCKS = 4  # along each axis, for the jackknife
 FEWEST_SIDES = 200  # of cells on the boundary, below which no interval is given
@@ -92,17 +94,12 @@ def analyse(planes: Planes) -> xr.Dataset:
     )
     fits = [fit_boundary_dimension(pairs, differing) for pairs, differing in counts]
     dimension, half_width = np.array(fits, float).reshape(-1, 2).T
-    has_value = np.isfinite(dimension)
     sides = np.array([differing[:, :2].sum() for _, differing in counts], np.int64)
     variables = {
-        "boundary_dimension": planes.variable(dimension),
-        "ci_low": planes.variable(dimension - half_width),
-        "ci_high": planes.variable(dimension + half_width),
-        "scale_min": planes.variable(np.where(has_value, 1.0, np.nan)),
-        "scale_max": planes.variable(np.where(has_value, np.sqrt(8.0), np.nan)),
+        **dimension_variables(planes, "boundary_dimension", dimension, half_width, LAGS),
         "boundary_sides": planes.variable(sides),
     }
-    return build_dataset(planes, variables, notes=_notes(has_value, half_width, planes.grid.shape))
+    return build_dataset(planes, variables, notes=_notes(dimension, half_width, planes.grid.shape))
 
 
 def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, Array]:
@@ -165,13 +162,12 @@ def fit_boundary_dimension(pairs: Array, differing: Array) -> tuple[float, float
     return 2.0 - slope, float(np.hypot(stdtrit(freedom, 0.975) * error, 1.5 * bend))
 
 
-def _notes(has_value: Array, half_width: Array, shape: tuple[int, ...]) -> dict[str, dict[str, str]]:
+def _notes(dimension: Array, half_width: Array, shape: tuple[int, ...]) -> dict[str, dict[str, str]]:
     notes = {
-        "ci_low": {"long_name": "lower end of the 95 % interval of the dimension of the boundary"},
-        "ci_high": {"long_name": "upper end of the 95 % interval of the dimension of the boundary"},
-        "scale_min": {"units": "1", "long_name": "shortest lag, in cells"},
-        "scale_max": {"units": "1", "long_name": "longest lag, in cells"},
+        **interval_notes("95 % interval of the dimension of the boundary"),
+        **window_notes("shortest lag", "longest lag"),
     }
+    has_value = np.isfinite(dimension)
     if not has_value.all():
         count = int((~has_value).sum())
         reason = "there is no boundary" if min(shape) > 2 else "no boundary can be compared at two steps"

@@ -25,7 +25,14 @@ from fractalcontact.domains._mask_input import (
     read_box_sizes,
     read_mask,
 )
-from fractalcontact.domains._scaling_fit import ROUNDING, default_sizes, fit_line
+from fractalcontact.domains._scaling_fit import (
+    ROUNDING,
+    default_sizes,
+    dimension_variables,
+    fit_line,
+    interval_notes,
+    window_notes,
+)
 
 SOURCE = (
     "Falconer, Fractal Geometry (1990), ch. 3 (box dimension); Borri-Brunetto, Carpinteri and Chiaia, "
@@ -183,13 +190,8 @@ def analyse(planes: Planes, *, scales: Any = None, cover: str = "minimum") -> xr
     curve = cover_curve(planes, sizes, cover)
     dimension, half_width = _fit(planes, sizes, curve, cover, by_regression=by_regression)
     null = _null(planes, sizes, by_regression=by_regression)
-    has_value = np.isfinite(dimension)
     variables = {
-        "box_dimension": planes.variable(dimension),
-        "ci_low": planes.variable(dimension - half_width),
-        "ci_high": planes.variable(dimension + half_width),
-        "scale_min": planes.variable(np.where(has_value, sizes.min(), np.nan)),
-        "scale_max": planes.variable(np.where(has_value, sizes.max(), np.nan)),
+        **dimension_variables(planes, "box_dimension", dimension, half_width, sizes),
         "coverage": planes.variable(planes.coverage),
         **{name: planes.variable(values) for name, values in null.items() if name != "null_count"},
         "box_count": planes.variable(curve.count, "box_size"),
@@ -197,7 +199,7 @@ def analyse(planes: Planes, *, scales: Any = None, cover: str = "minimum") -> xr
         "local_slope": planes.variable(0.0 - local_slope(sizes, curve.measure), "box_size"),
         "null_count": planes.variable(null["null_count"], "box_size"),
     }
-    notes = _notes(has_value, sizes, by_regression=by_regression)
+    notes = _notes(dimension, sizes, by_regression=by_regression)
     return build_dataset(planes, variables, _size_coords(sizes, planes), notes=notes)
 
 
@@ -358,20 +360,18 @@ def _null_deviation(
     return _random_null.fit_deviation(cells, observed, sizes, boxes, null, fit.weights)
 
 
-def _notes(has_value: Array, sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:
+def _notes(dimension: Array, sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:
     interval = "two standard deviations" if by_regression else "from the spread"
     interval = f"interval of the box dimension ({interval} of the local slopes)"
     notes = {
-        "ci_low": {"long_name": f"lower end of the {interval}"},
-        "ci_high": {"long_name": f"upper end of the {interval}"},
-        "scale_min": {"units": "1", "long_name": "smallest box of the fit, in cells"},
-        "scale_max": {"units": "1", "long_name": "largest box of the fit, in cells"},
+        **interval_notes(interval),
+        **window_notes("smallest box of the fit", "largest box of the fit"),
         "local_slope": {"long_name": "local dimension, -d ln(box_measure)/d ln(box_size)"},
     }
     if sizes.size < 2:
         reason = "" if by_regression else "; the mask is too narrow"
         notes["box_dimension"] = {"comment": f"NaN: one size of box gives no slope{reason}"}
-    elif not has_value.all():
-        count = int((~has_value).sum())
+    elif np.isnan(dimension).any():
+        count = int(np.isnan(dimension).sum())
         notes["box_dimension"] = {"comment": f"NaN where the set is empty ({count} planes)"}
     return notes

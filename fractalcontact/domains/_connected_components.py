@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
-from fractalcontact.domains._mask_input import Array, Planes, parallel_map
+from fractalcontact.base.validation import Problems
+from fractalcontact.domains._mask_input import Array, Planes, check_mask, parallel_map
 
 STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
 BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept
@@ -109,6 +111,12 @@ class Components:
             return bool(self.wraps[:, axis].any())
         first, last = (np.unique(self.number(end[end > 0])) for end in self.ends[2 * axis : 2 * axis + 2])
         return bool(np.intersect1d(first, last).size)
+
+
+def check_connected(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
+    """Check a mask and the neighbours by which its cells are connected."""
+    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
+    check_mask(problems, mask, valid=valid, periodic=periodic)
 
 
 def label_planes(

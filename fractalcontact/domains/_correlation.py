@@ -22,7 +22,7 @@ from fractalcontact.domains._mask_input import (
     read_box_sizes,
     read_mask,
 )
-from fractalcontact.domains._scaling_fit import default_sizes, fit_notes, fit_power_law
+from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
 SOURCE = (
     "Grassberger and Procaccia, Physica D 9:189 (1983); Ohser, Math. Operationsforsch. Statist. 14:63 (1983) "
@@ -102,13 +102,8 @@ def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:
     numbers = zip(planes.occupied, planes.observed, strict=True)
     null = np.array([null_mass(cells, observed, sizes) for cells, observed in numbers])
     dimension, half_width = fit_power_law(sizes, mass, 1.0)
-    has_value = np.isfinite(dimension)
     variables = {
-        "correlation_dimension": planes.variable(dimension),
-        "ci_low": planes.variable(dimension - half_width),
-        "ci_high": planes.variable(dimension + half_width),
-        "scale_min": planes.variable(np.where(has_value, sizes.min(), np.nan)),
-        "scale_max": planes.variable(np.where(has_value, sizes.max(), np.nan)),
+        **dimension_variables(planes, "correlation_dimension", dimension, half_width, sizes),
         "coverage": planes.variable(planes.coverage),
         "null_dimension": planes.variable(fit_power_law(sizes, null, 1.0)[0]),
         "mean_mass": planes.variable(mass, "box_size"),
@@ -116,7 +111,7 @@ def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:
         "null_mass": planes.variable(null, "box_size"),
     }
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
-    notes = fit_notes("correlation_dimension", has_value, sizes.size, "square")
+    notes = fit_notes("correlation_dimension", dimension, sizes.size, "square")
     notes["local_slope"] = {"long_name": "local dimension, d ln(mean_mass)/d ln(box_size)"}
     return build_dataset(planes, variables, coords, notes=notes)
 

@@ -10,11 +10,10 @@ import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _boundary, _box_counting, _correlation, _lacunarity, _minkowski
-from fractalcontact.domains._connected_components import Components, label_planes
+from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._islands import island_scalars
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_mask, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
 from fractalcontact.domains._percolation import AXES, crossings, percolation_name
 
 ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
@@ -31,12 +30,7 @@ LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 Variable = tuple[tuple[str, ...], Array]
 
 
-def _check(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
-    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-
-
-@public_result(title="Description of a set", check=_check)
+@public_result(title="Description of a set", check=check_connected)
 def describe(
     mask: xr.DataArray,
     *,

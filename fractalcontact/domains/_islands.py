@@ -14,11 +14,12 @@ from fractalcontact.domains._connected_components import (
     COLUMNS,
     PLAIN_COLUMNS,
     Components,
+    check_connected,
     component_table,
     euler_number,
     label_planes,
 )
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_mask, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
@@ -26,11 +27,10 @@ SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); sci
 def _check(
     problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, keep: Any, table: Any
 ) -> None:
-    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
     problems.choices("keep", keep, ("label",))
     if table is not None:
         problems.choices("table", table, COLUMNS)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
+    check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
 
 
 @public_result(title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check)

@@ -10,8 +10,8 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains._connected_components import Components, label_planes
-from fractalcontact.domains._mask_input import Array, build_dataset, check_mask, plane_shape, read_mask
+from fractalcontact.domains._connected_components import Components, check_connected, label_planes
+from fractalcontact.domains._mask_input import Array, build_dataset, plane_shape, read_mask
 
 SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998)"
 CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flags of `event` in the schema
@@ -19,8 +19,7 @@ CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flag
 
 def check_path(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
     """Check a mask with a leading dim along which its planes follow each other."""
-    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
+    check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
     if plane_shape(mask) is not None:
         expected = "at least one leading dim for the path, as in (step, y, x)"
         problems.require(mask.ndim > 2, "mask.dims", expected, "(y, x)")

@@ -23,7 +23,7 @@ from fractalcontact.domains._mask_input import (
     read_mask,
 )
 from fractalcontact.domains._random_null import miss_probability
-from fractalcontact.domains._scaling_fit import default_sizes, fit_notes, fit_power_law
+from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (Minkowski content); Felzenszwalb and Huttenlocher (2012)"
 SHORT_REACH = 2**14  # cells; distances up to it are kept as int16
@@ -103,14 +103,9 @@ def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:
     numbers = zip(planes.occupied, planes.observed, strict=True)
     null = np.array([null_area(cells, observed, planes.grid, r) for cells, observed in numbers])
     dimension, half_width = fit_power_law(r, area, -1.0)
-    has_value = np.isfinite(dimension)
     observed = np.maximum(planes.observed, 1)[:, None]
     variables = {
-        "minkowski_dimension": planes.variable(dimension),
-        "ci_low": planes.variable(dimension - half_width),
-        "ci_high": planes.variable(dimension + half_width),
-        "scale_min": planes.variable(np.where(has_value, r.min(), np.nan)),
-        "scale_max": planes.variable(np.where(has_value, r.max(), np.nan)),
+        **dimension_variables(planes, "minkowski_dimension", dimension, half_width, r),
         "coverage": planes.variable(planes.coverage),
         "null_dimension": planes.variable(fit_power_law(r, null, -1.0)[0]),
         "grown_fraction": planes.variable(area / observed, "radius"),
@@ -118,7 +113,7 @@ def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:
         "null_fraction": planes.variable(null / observed, "radius"),
     }
     coords = {"radius": ("radius", r), "radius_length": ("radius", r * planes.side)}
-    notes = fit_notes("minkowski_dimension", has_value, r.size, "radius")
+    notes = fit_notes("minkowski_dimension", dimension, r.size, "radius")
     notes["local_slope"] = {"long_name": "local dimension, 2 - d ln(area)/d ln(radius)"}
     return build_dataset(planes, variables, coords, notes=notes)
 

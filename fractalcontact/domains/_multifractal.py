@@ -20,7 +20,13 @@ from fractalcontact.domains._mask_input import (
     read_box_sizes,
     read_mask,
 )
-from fractalcontact.domains._scaling_fit import ROUNDING, default_sizes, fit_line
+from fractalcontact.domains._scaling_fit import (
+    ROUNDING,
+    default_sizes,
+    fit_line,
+    interval_notes,
+    window_notes,
+)
 
 ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)
 LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
@@ -193,12 +199,10 @@ def _moments(log_mu: Array, weight: Array, orders: Array) -> tuple[Array, Array]
 
 
 def _notes(has_value: Array, sizes: Array) -> dict[str, dict[str, str]]:
-    interval = "generalised dimension (two standard deviations of the local slopes)"
+    interval = "interval of the generalised dimension (two standard deviations of the local slopes)"
     notes = {
-        "ci_low": {"long_name": f"lower end of the interval of the {interval}"},
-        "ci_high": {"long_name": f"upper end of the interval of the {interval}"},
-        "scale_min": {"units": "1", "long_name": "smallest box of the fit, in cells"},
-        "scale_max": {"units": "1", "long_name": "largest box of the fit, in cells"},
+        **interval_notes(interval),
+        **window_notes("smallest box of the fit", "largest box of the fit"),
     }
     if not has_value.all():
         reason = "one size of box gives no slope" if sizes.size < 2 else "where the plane is empty"

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
-from fractalcontact.domains._connected_components import Components, label_planes
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_mask, read_mask
+from fractalcontact.domains._connected_components import Components, check_connected, label_planes
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
 
 AXES = ("x", "y")
 SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (1994)"
 
 
-def _check(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
-    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-
-
-@public_result(title="Percolation of a set", references=SOURCE, achieved_error="exact", check=_check)
+@public_result(title="Percolation of a set", references=SOURCE, achieved_error="exact", check=check_connected)
 def percolation(
     mask: xr.DataArray,
     *,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from fractalcontact.domains._mask_input import Array
+from fractalcontact.domains._mask_input import Array, Planes
 
 DEVIATIONS = 2.5  # of the local slopes, to either side of a dimension
 ROUNDING = 1e-14  # smallest half-width of an interval
@@ -54,19 +55,47 @@ def fit_power_law(scales: Array, curves: Array, sign: float) -> tuple[Array, Arr
     return np.asarray((0.0 if sign > 0 else 2.0) + sign * slope), DEVIATIONS * spread + ROUNDING
 
 
-def fit_notes(name: str, has_value: Array, scales: int, scale_name: str) -> dict[str, dict[str, str]]:
+def dimension_variables(
+    planes: Planes, name: str, dimension: Array, half_width: Array, scales: Array
+) -> dict[str, Any]:
+    """Return a dimension, its interval and its window of scales; NaN in planes without a dimension."""
+    has_value = np.isfinite(dimension)
+    return {
+        name: planes.variable(dimension),
+        "ci_low": planes.variable(dimension - half_width),
+        "ci_high": planes.variable(dimension + half_width),
+        "scale_min": planes.variable(np.where(has_value, scales.min(), np.nan)),
+        "scale_max": planes.variable(np.where(has_value, scales.max(), np.nan)),
+    }
+
+
+def interval_notes(interval: str) -> dict[str, dict[str, str]]:
+    """Return the attributes of the ends of an interval."""
+    return {
+        "ci_low": {"long_name": f"lower end of the {interval}"},
+        "ci_high": {"long_name": f"upper end of the {interval}"},
+    }
+
+
+def window_notes(smallest: str, largest: str) -> dict[str, dict[str, str]]:
+    """Return the attributes of a window of scales, which are in cells and not in metres."""
+    return {
+        "scale_min": {"units": "1", "long_name": f"{smallest}, in cells"},
+        "scale_max": {"units": "1", "long_name": f"{largest}, in cells"},
+    }
+
+
+def fit_notes(name: str, dimension: Array, scales: int, scale_name: str) -> dict[str, dict[str, str]]:
     """Return the attributes of a dimension from `fit_power_law` and of the variables beside it."""
     words = name.replace("_", " ").capitalize().replace("Correlation", "correlation")
     interval = f"interval of the {words} ({DEVIATIONS:g} standard deviations of the local slopes)"
     notes = {
-        "ci_low": {"long_name": f"lower end of the {interval}"},
-        "ci_high": {"long_name": f"upper end of the {interval}"},
-        "scale_min": {"units": "1", "long_name": f"smallest {scale_name} of the fit, in cells"},
-        "scale_max": {"units": "1", "long_name": f"largest {scale_name} of the fit, in cells"},
+        **interval_notes(interval),
+        **window_notes(f"smallest {scale_name} of the fit", f"largest {scale_name} of the fit"),
         "null_dimension": {"long_name": f"{words} of the random null of equal coverage"},
     }
     if scales < 2:
         notes[name] = {"comment": "NaN: one scale gives no slope"}
-    elif not has_value.all():
-        notes[name] = {"comment": f"NaN where the set is empty ({int((~has_value).sum())} planes)"}
+    elif np.isnan(dimension).any():
+        notes[name] = {"comment": f"NaN where the set is empty ({int(np.isnan(dimension).sum())} planes)"}
     return notes
