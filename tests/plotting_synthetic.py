@@ -203,7 +203,7 @@ def accuracy():
 
 
 def study():
-    """Return a whole study as a tree, with the groups that a scene gives."""
+    """Return a complete study as a tree, with the groups of a scene."""
     surface = heights()
     shears = (8e-4, 1.6e-3, 8e-3)
     under = delta(surface, shears=shears)

@@ -108,13 +108,13 @@ def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
     for row, name in enumerate(words(data["method"])):
         finite = np.isfinite(errors[row]) & np.isfinite(cost[row])
         best = finite & on_front[row]
-        look = _method_style(row)
-        ax.plot(cost[row][finite], errors[row][finite], **look, markerfacecolor="white")
-        ax.plot(cost[row][best], errors[row][best], **look, ls="")
-        entries.append(_style.legend_line(name.replace("_", " "), **look))
+        style = _method_style(row)
+        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor="white")
+        ax.plot(cost[row][best], errors[row][best], **style, ls="")
+        entries.append(_style.legend_line(name.replace("_", " "), **style))
     _style.log_scale(ax, x=cost, y=errors)
     least, most = np.nanmin(cost), np.nanmax(cost)
-    if least > 0 and most < NARROW * least:  # nearly equal costs must not look different
+    if least > 0 and most < NARROW * least:  # nearly equal costs must not style different
         ax.set_xlim(least / NARROW, most * NARROW)
     _style.plain_ticks(ax)
     return entries
@@ -171,7 +171,7 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
         sheet.subplots(2, len(cases), squeeze=False, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
     )
     names = words(data["method"])
-    looks = [
+    styles = [
         _method_style(number) | {"ls": "-" if number < len(_style.CYCLE) else "--"}
         for number in range(len(names))
     ]
@@ -179,7 +179,7 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
         case = data.sel(family=family, size=size)
         for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
             _style.style_axes(ax)
-            _curves_against_hurst(ax, case, quantity, looks)
+            _curves_against_hurst(ax, case, quantity, styles)
         upper.set_yscale("log")
         upper.axhline(1.0, color=_style.BLACK, lw=0.9, ls=":")
         lower.axhline(0.95, color=_style.BLACK, lw=0.9, ls=":")
@@ -189,21 +189,21 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
     axes[0, 0].set_ylabel("rms error / Cramér-Rao bound")
     axes[1, 0].set_ylabel("interval coverage")
     entries = [
-        _style.legend_line(name.replace("_", " "), **look) for name, look in zip(names, looks, strict=True)
+        _style.legend_line(name.replace("_", " "), **style) for name, style in zip(names, styles, strict=True)
     ]
     _style.side_legend(axes[0, -1], entries)
     return _style.root_figure(sheet)
 
 
-def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, looks: list[dict[str, Any]]) -> None:
+def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: list[dict[str, Any]]) -> None:
     dims = ("method", "hurst")
     hurst = np.asarray(case["hurst"].values, float)
     values = table(case, quantity, dims)
-    for row, look in enumerate(looks):
+    for row, style in enumerate(styles):
         finite = np.isfinite(values[row])
         if not finite.any():
             continue
-        ax.plot(hurst[finite], values[row][finite], **look)
+        ax.plot(hurst[finite], values[row][finite], **style)
         if f"{quantity}_low" in case:
             low, high = (table(case, f"{quantity}_{end}", dims)[row][finite] for end in ("low", "high"))
-            ax.vlines(hurst[finite], low, high, color=look["color"], lw=0.8)
+            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8)

@@ -150,8 +150,8 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
     colours = _style.sequence_colours(len(loads))
     dot = "o" if loads.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
-        look = RAW_LINE if corrected else {}
-        ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **look)
+        style = RAW_LINE if corrected else {}
+        ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **style)
         if corrected:
             fraction = table(data, "corrected_contact_fraction", ("shear", "step"))[i]
             ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)

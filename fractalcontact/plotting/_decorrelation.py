@@ -58,14 +58,14 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     lengths = data.isel(shear=0)
     ends = [table(lengths, f"decorrelation_length{end}", ("direction",)) for end in ("_low", "", "_high")]
     entries = []
-    for i, (name, look) in enumerate(direction_styles(data)):
-        ax.plot(along(data["shear"].values), values[i], **look)
+    for i, (name, style) in enumerate(direction_styles(data)):
+        ax.plot(along(data["shear"].values), values[i], **style)
         low, length, high = (float(end[i]) for end in ends)
         if np.isfinite(length):
-            ax.axvline(float(along(length)), color=look["color"], lw=0.7, ls=":")
+            ax.axvline(float(along(length)), color=style["color"], lw=0.7, ls=":")
         if np.isfinite(low) and np.isfinite(high):
-            ax.axvspan(float(along(low)), float(along(high)), color=look["color"], alpha=0.12, lw=0)
-        entries.append(_style.legend_line(name, **look))
+            ax.axvspan(float(along(low)), float(along(high)), color=style["color"], alpha=0.12, lw=0)
+        entries.append(_style.legend_line(name, **style))
     ax.axhline(0.0, color="0.6", lw=0.6)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("correlation of the faces")
@@ -109,9 +109,9 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     along = scale_of(data["shear"])
     entries = []
     for i, name in enumerate(DIMENSIONS):
-        look: dict[str, Any] = {"color": _style.CYCLE[i], "marker": "osD"[i], "ms": 3.5}
-        ax.plot(along(data["shear"].values), table(data, name, ("shear",)), **look)
-        entries.append(_style.legend_line(name.split("_")[0], **look))
+        style: dict[str, Any] = {"color": _style.CYCLE[i], "marker": "osD"[i], "ms": 3.5}
+        ax.plot(along(data["shear"].values), table(data, name, ("shear",)), **style)
+        entries.append(_style.legend_line(name.split("_")[0], **style))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
         ax.set_xscale("log")
     ax.set_xlabel(axis_label(data["shear"], along))

@@ -61,13 +61,13 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
     across, along = scale_of(data["rigid_dilatancy"]), scale_of(data["shear"])
     entries, styles = [], direction_styles(data)
     dot = "o" if shear.size == 1 else ""
-    for i, (name, look) in enumerate(styles):
-        ax.plot(along(shear), across(opening[i]), marker=dot, **look)
-        entries.append(_style.legend_line(name, **look))
+    for i, (name, style) in enumerate(styles):
+        ax.plot(along(shear), across(opening[i]), marker=dot, **style)
+        entries.append(_style.legend_line(name, **style))
         if "mean_slope" in data:
             slope = float(table(data, "mean_slope", ("direction",))[i])
             ends = np.array([0.0, np.nanmax(shear)])
-            ax.plot(along(ends), across(slope * ends), color=look["color"], **MEAN_SLOPE_LINE)
+            ax.plot(along(ends), across(slope * ends), color=style["color"], **MEAN_SLOPE_LINE)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel(axis_label(data["rigid_dilatancy"], across))
     if any(name for name, _ in styles):

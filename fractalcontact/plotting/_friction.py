@@ -82,9 +82,9 @@ def friction(
         _draw_curves(ax, data, name, over, entries)
     if "basic_friction_angle" in data:
         basic_angle = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
-        look: dict[str, Any] = {"color": _style.BLACK, "lw": 0.8, "ls": ":"}
-        axes[0].axhline(basic_angle, **look)
-        entries = [*entries, _style.legend_line("basic angle", **look)]
+        style: dict[str, Any] = {"color": _style.BLACK, "lw": 0.8, "ls": ":"}
+        axes[0].axhline(basic_angle, **style)
+        entries = [*entries, _style.legend_line("basic angle", **style)]
     remarks = []
     if over == "step" and "direction" in data.coords:
         remarks.append(f"block slides {direction_name(words(data['direction'])[0])}")
@@ -116,4 +116,4 @@ def _curve_legend(data: xr.Dataset, over: str) -> tuple[list[Any], str]:
         title, labels = load_words(data)
         colours = _style.sequence_colours(len(labels))
         return [_style.legend_line(t, color=c) for t, c in zip(labels, colours, strict=True)], title
-    return [_style.legend_line(name, **look) for name, look in direction_styles(data)], "block slides"
+    return [_style.legend_line(name, **style) for name, style in direction_styles(data)], "block slides"

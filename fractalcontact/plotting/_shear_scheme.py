@@ -127,14 +127,14 @@ def _draw_direction(
     ax: Axes, length: Any, centre: Array, reach: float, direction: str, azimuth: float, *, bold: bool
 ) -> None:
     unit = np.array([np.cos(np.deg2rad(azimuth)), np.sin(np.deg2rad(azimuth))])
-    look = {
+    arrow = {
         "arrowstyle": "-|>",
         "color": "white",
         "lw": 1.8 if bold else 0.8,
         "shrinkA": 0,
         "shrinkB": 0,
     }
-    ax.annotate("", tuple(length(centre + reach * unit)), tuple(length(centre)), arrowprops=look)
+    ax.annotate("", tuple(length(centre + reach * unit)), tuple(length(centre)), arrowprops=arrow)
     x, y = length(centre + 1.25 * reach * unit)
     weight = "bold" if bold else "normal"
     ax.text(float(x), float(y), direction, color="white", ha="center", va="center", weight=weight)
@@ -179,23 +179,29 @@ def _draw_dimensions(
 ) -> None:
     """Draw dimension lines of the shear above the block and of the lift at its trailing edge."""
     (along, up), (edge, foot, level) = scales, corner
-    look: dict[str, Any] = {"arrowstyle": "<|-|>", "lw": 1.1, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
+    arrow: dict[str, Any] = {
+        "arrowstyle": "<|-|>",
+        "lw": 1.1,
+        "shrinkA": 0,
+        "shrinkB": 0,
+        "mutation_scale": 8,
+    }
     start, end = float(along(edge)), float(along(edge + step.shear))
     if step.shear > 0:
         for x, y in ((start, foot), (end, foot + step.lift)):
             ax.plot([x, x], [float(up(y)), float(up(level))], color=_style.RED, lw=0.7, ls=":")
         ax.annotate(
-            "", (start, float(up(level))), (end, float(up(level))), arrowprops=look | {"color": _style.RED}
+            "", (start, float(up(level))), (end, float(up(level))), arrowprops=arrow | {"color": _style.RED}
         )
         ax.annotate(f"$v$ = {quantity_text(step.shear, 'm')}", ((start + end) / 2, float(up(level))), (0, 4),
                     textcoords="offset points", color=_style.RED, ha="center", va="bottom")  # fmt: skip
     if step.lift > 0:
         low, high = float(up(foot)), float(up(foot + step.lift))
         low_x, high_x = ax.get_xlim()
-        # the label goes over the shear if that is wide enough, else in front of the block if there is room
+        # the label goes over the shear if that is wide enough, else in front of the block if there is space
         right = end - start > LABEL_WIDTH * (high_x - low_x) or start - low_x < LABEL_WIDTH * (high_x - low_x)
         ax.plot([start, end], [high, high], color=_style.BLUE, lw=0.7, ls=":")
-        ax.annotate("", (start, low), (start, high), arrowprops=look | {"color": _style.BLUE})
+        ax.annotate("", (start, low), (start, high), arrowprops=arrow | {"color": _style.BLUE})
         away, side = (6, "left") if right else (-6, "right")
         ax.annotate(f"{lift_name} = {quantity_text(step.lift, 'm')}", (start, (low + high) / 2), (away, 0),
                     textcoords="offset points", color=_style.BLUE, ha=side, va="center",

@@ -146,5 +146,5 @@ def draw_outline(ax: Axes, extent: tuple[float, float, float, float], length: Sc
     from matplotlib.patches import Rectangle
 
     left, right, bottom, top = (float(v) for v in length(extent))
-    look: dict[str, Any] = {"fill": False, "edgecolor": "white", "linewidth": 1.2} | style
-    ax.add_patch(Rectangle((left, bottom), right - left, top - bottom, **look))
+    appearance: dict[str, Any] = {"fill": False, "edgecolor": "white", "linewidth": 1.2} | style
+    ax.add_patch(Rectangle((left, bottom), right - left, top - bottom, **appearance))

@@ -30,7 +30,7 @@ def test_distinct_styles_and_narrow_cost_axis():
     expected["method"] = [f"method {k}" for k in range(10)]
     expected["memory"] = expected["memory"] * 0 + 1e6 * (1 + 1e-5 * np.arange(expected.sizes["setting"]))
     _, right = plotting.error_against_time(expected).axes
-    looks = {(line.get_color(), line.get_marker()) for line in right.lines[::2]}
-    assert len(looks) == 10
+    styles = {(line.get_color(), line.get_marker()) for line in right.lines[::2]}
+    assert len(styles) == 10
     low, high = right.get_xlim()
     assert high > 2 * low

@@ -26,7 +26,7 @@ def test_null_and_interval(closed):
         for v in result.shear:
             assert holds(lines(by_load), result.normal_force, result[name].sel(shear=v))
         assert holds(lines(by_shear), result.shear, result[name].isel(step=-1))
-    assert not by_load.collections  # six bands on each other would tell nothing
+    assert not by_load.collections  # six overlapping bands would be illegible
     low, high = (result[name].isel(step=-1) for name in ("ci_low", "ci_high"))
     band = by_shear.collections[0].get_paths()[0].vertices[:, 1]
     assert band.min() == pytest.approx(float(low.min()))
@@ -70,12 +70,12 @@ def test_minkowski_dimension():
 def test_local_slopes_and_null():
     sizes = np.array([1, 2, 4, 8])
     count = 64.0 * sizes[None, :] ** -np.array([[1.2], [1.5]])
-    dust = 64.0 * sizes[None, :] ** -np.array([[0.5], [1.0]])
+    null = 64.0 * sizes[None, :] ** -np.array([[0.5], [1.0]])
     result = xr.Dataset(
         {
             "local_slope": (("step", "box_size"), np.array([[1.2] * 4, [1.5] * 4])),
             "box_count": (("step", "box_size"), count),
-            "null_count": (("step", "box_size"), dust),
+            "null_count": (("step", "box_size"), null),
         },
         coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
     )

@@ -38,8 +38,8 @@ def test_direction_names_and_styles():
     ax = plotting.rigid_dilatancy(opening).axes[0]
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert named[:4] == ["East", "NE", "30°", "33.5°"]
-    looks = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:8:2]]
-    assert len(set(looks)) == 4
+    styles = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:8:2]]
+    assert len(set(styles)) == 4
     render(ax.figure)
 
 

@@ -12,14 +12,14 @@ from fractalcontact.base.schema import label
 
 def test_map_and_area_distribution():
     state = synthetic.closure(synthetic.delta(synthetic.heights())).state.isel(shear=0, step=-1)
-    found = synthetic.islands(state)
-    map_, areas = plotting.islands(found).axes
+    result = synthetic.islands(state)
+    map_, areas = plotting.islands(result).axes
     image = colours(map_)
-    assert np.array_equal(np.all(image == OPEN, axis=-1), found.label.values == 0)
-    assert map_.get_title(loc="left") == f"{int(found.n_islands)} islands"
+    assert np.array_equal(np.all(image == OPEN, axis=-1), result.label.values == 0)
+    assert map_.get_title(loc="left") == f"{int(result.n_islands)} islands"
     shown = np.asarray(areas.lines[0].get_xdata()) * 1e-6
-    assert shown == pytest.approx(np.sort(found.area.values)[::-1])
-    assert np.array_equal(areas.lines[0].get_ydata(), np.arange(1, found.sizes["island"] + 1))
+    assert shown == pytest.approx(np.sort(result.area.values)[::-1])
+    assert np.array_equal(areas.lines[0].get_ydata(), np.arange(1, result.sizes["island"] + 1))
 
 
 def test_several_masks():
