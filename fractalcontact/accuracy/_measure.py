@@ -22,13 +22,14 @@ from fractalcontact.base.validation import Problems, word_tuple
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.accuracy.measure"
-REPEATS = 3
+REPEATS, LATE_REPEATS = 3, 2
+LATE_SHARE = 0.25  # of the budget, for timing all settings a second time
 GROWTH, LARGEST_GROWTH = 2.0, 8.0  # of the time from one setting to the next, before it is known and at most
 
 RESAMPLES = 1000  # of the bootstrap over the replicates of a random error
 CONFIDENCE = 0.95
 EQUAL_ERRORS = 1.01  # ratio of two errors that is no difference
-LEAST_SCATTER = 0.1  # of the logarithm of a run time, also where repeats agree: they follow each other
+LEAST_SCATTER = 0.1  # of the logarithm of a run time, also where the two timings agree
 
 MEASURED = ("error", "run_time", "first_run_time", "memory")
 ALONE, OPTIMAL, DOMINATED, UNDECIDED = "alone", "Pareto optimal", "dominated", "undecided"
@@ -44,11 +45,13 @@ class Setting:
     times: list[float]  # of the repeated calls, without the first
     first_run_time: float
     memory: float
+    late_time: float | None = None  # shortest call after all methods were measured
 
     @property
     def run_time(self) -> float:
         """Return the shortest time of all calls."""
-        return min(self.first_run_time, *self.times)
+        late = [] if self.late_time is None else [self.late_time]
+        return min([self.first_run_time, *self.times, *late])
 
 
 @dataclass
@@ -96,7 +99,7 @@ def measure(
         `first_run_time` (s, with compilation), `memory` (byte, peak of one call), `parameter`, and
         `on_pareto_front`: no other method of the benchmark is clearly better in both error and time. Over
         `method`: `benchmark`, `parameter_name`, `error_meaning`, `truth`, `share_on_pareto_front` and
-        `verdict` (see Notes). `run_time_scatter`: scatter of the logarithm of repeated run times.
+        `verdict` (see Notes). `run_time_scatter`: standard deviation of the logarithm of a run time.
 
     Raises
     ------
@@ -106,10 +109,12 @@ def measure(
     Notes
     -----
     "Clearly" means at 95 %. Random errors are compared by a bootstrap over their surfaces or masks, which
-    are the same for all methods; run times by their scatter in this run. A method is "dominated" if it was
-    measured at all its settings and at each another method is clearly better in both error and time. It is
-    "Pareto optimal" if at one setting all others are clearly worse in one of the two, and none has a setting
-    left that could be better. Otherwise the verdict is "undecided": a larger budget can decide it.
+    are the same for all methods. Run times are compared by the scatter between two timings of each setting;
+    the second follows when all methods were measured, and takes up to a quarter of the budget. A method is
+    "dominated" if it was measured at all its settings, and at each another method is clearly better in both
+    error and time. It is "Pareto optimal" if at one setting all others are clearly worse in one of the two,
+    and none has a setting left that could be better. Otherwise the verdict is "undecided": a larger budget
+    or an idle machine can decide it.
 
     Examples
     --------
@@ -120,41 +125,68 @@ def measure(
     alone True
     """
     with Problems(WHERE) as problems:
-        if isinstance(parts, Mapping):
-            valid = all(isinstance(item, Benchmark) for part in parts.values() for item in part)
-            problems.require(valid, "parts", "sequences of Benchmark in a mapping", parts)
-        elif parts is not None:
-            problems.choices("parts", parts, SUBPACKAGES)
+        _check_parts(problems, parts)
         problems.number("budget", budget, above=0)
     if not isinstance(parts, Mapping):
-        parts = {name: benchmarks(name) for name in word_tuple(parts) or SUBPACKAGES}
-    measured: dict[str, list[Curve]] = {name: [] for name in parts}
-    pending = [
+        parts = {name: benchmarks(name) for name in (SUBPACKAGES if parts is None else word_tuple(parts))}
+    curves = [
         (name, Curve(benchmark, method))
         for name, part in parts.items()
         for benchmark in part
         for method in benchmark.methods
     ]
-    end = time.perf_counter() + budget
-    missing = [curve.method.name for _, curve in pending]
-    for name, curve in track(pending, progress, "accuracy", unit="method"):
-        if stop:
-            break
-        start = time.perf_counter()
-        share = (end - start) / len(missing)
-        compile_time = _measure_curve(curve, share, stop)
-        end += min(compile_time, time.perf_counter() - start)
-        measured[name].append(curve)
-        del missing[0]
+    _measure_curves([curve for _, curve in curves], (1.0 - LATE_SHARE) * budget, progress, stop)
+    _time_again([curve for _, curve in curves], stop)
     tree = xr.DataTree()
-    for name, curves in measured.items():
-        if curves:
-            tree[name] = xr.DataTree(_dataset(name, curves))
+    for name in parts:
+        measured = [curve for part, curve in curves if part == name and curve.settings]
+        if measured:
+            tree[name] = xr.DataTree(_dataset(name, measured))
     parameters = {"parts": list(parts), "budget": budget}
     tree.attrs = stamp(xr.Dataset(), WHERE, parameters, title="Error against run time").attrs
+    missing = "; ".join(curve.method.name for _, curve in curves if not curve.settings)
     if missing:
-        tree.attrs["completeness"] = f"partial: the run was stopped; missing: {'; '.join(missing)}"
+        tree.attrs["completeness"] = f"partial: the run was stopped; missing: {missing}"
     return tree
+
+
+def _check_parts(problems: Problems, parts: Any) -> None:
+    if isinstance(parts, Mapping):
+        valid = all(
+            isinstance(part, Sequence) and all(isinstance(item, Benchmark) for item in part)
+            for part in parts.values()
+        )
+        problems.require(valid, "parts", "sequences of Benchmark in a mapping", parts)
+    elif parts is not None:
+        problems.choices("parts", parts, SUBPACKAGES)
+
+
+def _measure_curves(curves: Sequence[Curve], budget: float, progress: bool, stop: Stop | None) -> None:
+    """Measure one curve after another; each has an even share of the time that is left."""
+    end = time.perf_counter() + budget
+    for number, curve in enumerate(track(curves, progress, "accuracy", unit="method")):
+        if stop:
+            return
+        start = time.perf_counter()
+        compile_time = _measure_curve(curve, (end - start) / (len(curves) - number), stop)
+        end += min(compile_time, time.perf_counter() - start)
+
+
+def _time_again(curves: Sequence[Curve], stop: Stop | None) -> None:
+    """Time the settings that are compared once more, so that their scatter includes a change of the load."""
+    for curve in curves:
+        if len(curve.benchmark.methods) == 1:
+            continue
+        for setting in curve.settings:
+            if stop:
+                return
+            problem = curve.method.prepare(setting.parameter)
+            times = []
+            for _ in range(LATE_REPEATS):
+                start = time.perf_counter()
+                curve.method.solve(problem)
+                times.append(time.perf_counter() - start)
+            setting.late_time = min(times)
 
 
 def _measure_curve(curve: Curve, share: float, stop: Stop | None) -> float:
@@ -246,6 +278,7 @@ def _dataset(name: str, curves: list[Curve]) -> xr.Dataset:
             | {key: ("method", values) for key, values in words.items()},
         )
     )
+    dataset["run_time_scatter"].attrs["reason"] = "NaN: no setting was timed a second time"
     for key in columns:
         dataset[key].attrs["reason"] = (
             "NaN: the method has no such setting, or its share of the budget was spent"
@@ -260,15 +293,21 @@ def _rows_by_benchmark(curves: list[Curve]) -> Iterator[list[int]]:
 
 
 def _run_time_scatter(curves: list[Curve]) -> float:
-    """Return the standard deviation of the logarithm of a repeated run time, the median over all settings.
+    """Return the standard deviation of the logarithm of a shortest run time, from a second timing of each.
 
-    The median, because a burst of other load on the machine disturbs a few settings by a large factor. On two
-    cores with seven busy processes it was .1 to .4; the shortest times of three runs differed by .19 to .26.
+    A second timing some time later differs by more than a repeated call, because the load of the machine
+    changes. The median over all settings leaves out bursts that disturb a few of them by a large factor.
     """
-    repeated = [setting.times for curve in curves for setting in curve.settings if len(setting.times) > 1]
-    if not repeated:
-        return math.nan  # no time was repeated: no two times can be called different
-    return max(LEAST_SCATTER, float(np.median([np.std(np.log(times), ddof=1) for times in repeated])))
+    settings = [setting for curve in curves for setting in curve.settings]
+    differences = [
+        abs(math.log(setting.late_time / min(setting.times)))
+        for setting in settings
+        if setting.late_time is not None
+    ]
+    if not differences:
+        return math.nan  # nothing was timed twice: no two times can be called different
+    # the median of |difference| of two normal numbers is .6745 sqrt(2) standard deviations
+    return max(LEAST_SCATTER, float(np.median(differences)) / (0.6745 * math.sqrt(2.0)))
 
 
 class Comparison:

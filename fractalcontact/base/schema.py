@@ -352,7 +352,7 @@ QUANTITIES: dict[str, Quantity] = {
     "share_on_pareto_front": Quantity("1", "share of the settings on the Pareto front"),
     "verdict": Quantity(None, "Pareto optimal, dominated, undecided, or alone in its benchmark"),
     "run_time_scatter": Quantity(
-        "1", "standard deviation of the logarithm of repeated run times, median over the settings"
+        "1", "standard deviation of the logarithm of a run time between two timings"
     ),
     "result": Quantity("1", "number of the result"),
     "case": Quantity(None, "extreme case"),

@@ -230,3 +230,6 @@ def test_unknown_parts_and_budgets_are_refused():
         fc.accuracy.measure("magic")
     with pytest.raises(InvalidInput, match="budget"):
         fc.accuracy.measure("contact", budget=0)
+    for parts in ({"mine": 3}, {"mine": ["sphere"]}):
+        with pytest.raises(InvalidInput, match="sequences of Benchmark"):
+            fc.accuracy.measure(parts)
