@@ -51,13 +51,13 @@ def test_empty_masks_are_nan_with_a_reason():
 
 
 def test_incompatible_masks_are_refused():
-    one = as_mask(np.ones((9, 9)), (1.0, 1.0))
+    first = as_mask(np.ones((9, 9)), (1.0, 1.0))
     for others, words in (
-        ([one], "two masks or more"),
-        ([one, one], "a spacing of its own"),
-        ([one, as_mask(np.ones((9, 9)), (2.0, 2.0))], "extent"),
-        ([one, as_mask(np.ones((2, 3, 3)), (3.0, 3.0))], "leading dims"),
-        ([one, one.drop_vars(["x", "y"])], "coordinates"),
+        ([first], "two masks or more"),
+        ([first, first], "a spacing of its own"),
+        ([first, as_mask(np.ones((9, 9)), (2.0, 2.0))], "extent"),
+        ([first, as_mask(np.ones((2, 3, 3)), (3.0, 3.0))], "leading dims"),
+        ([first, first.drop_vars(["x", "y"])], "coordinates"),
     ):
         with pytest.raises(ValueError, match=words):
             fc.domains.area_dimension(others)

@@ -251,17 +251,17 @@ def test_stack_equals_its_planes():
 
 def test_transposed_and_mirrored_masks_have_the_same_counts():
     cells = level_set(60, 0.5, 0.2, np.random.default_rng(8))
-    want = fc.domains.box_dimension(as_mask(cells)).box_measure.values
+    expected = fc.domains.box_dimension(as_mask(cells)).box_measure.values
     for other in (cells.T, cells[::-1], cells[:, ::-1]):
-        assert np.array_equal(fc.domains.box_dimension(as_mask(other)).box_measure.values, want)
+        assert np.array_equal(fc.domains.box_dimension(as_mask(other)).box_measure.values, expected)
 
 
 def test_unit_of_length_changes_only_box_length():
     cells = level_set(48, 0.5, 0.2, np.random.default_rng(9))
-    one, other = (fc.domains.box_dimension(as_mask(cells, (s, 4 * s))) for s in (1.0, 2.0**-30))
-    assert np.array_equal(one.box_dimension, other.box_dimension)
-    assert np.array_equal(one.box_length, other.box_length * 2.0**30)
-    assert float(one.box_length[0]) == 2.0  # the side of a square as large as a cell of 1 m x 4 m
+    first, other = (fc.domains.box_dimension(as_mask(cells, (s, 4 * s))) for s in (1.0, 2.0**-30))
+    assert np.array_equal(first.box_dimension, other.box_dimension)
+    assert np.array_equal(first.box_length, other.box_length * 2.0**30)
+    assert float(first.box_length[0]) == 2.0  # the side of a square as large as a cell of 1 m x 4 m
 
 
 def test_result_is_independent_of_the_number_of_threads():
@@ -286,9 +286,9 @@ def test_unobserved_cells_keep_a_full_plane_full():
         assert float(full.coverage) == 1.0
         assert float(full.null_dimension) == pytest.approx(2.0, abs=1e-12)
     cells = level_set(60, 0.8, 0.3, rng)
-    one = fc.domains.box_dimension(as_mask(cells), valid=observed)
+    first = fc.domains.box_dimension(as_mask(cells), valid=observed)
     other = fc.domains.box_dimension(as_mask(cells | ~valid), valid=observed)
-    assert one.box_measure.identical(other.box_measure)
+    assert first.box_measure.identical(other.box_measure)
 
 
 def test_unobserved_cells_change_the_dimension_little():

@@ -59,8 +59,8 @@ def test_hausdorff_distance_matches_distance_maps(wraps):
         planes = rng.random((2, 23, 17)) < rng.uniform(0.005, 0.2)
         planes[:, 3, 3] = True
         result = fc.domains.evolution(as_mask(planes, spacing, wraps))
-        want = slow_hausdorff(planes[0], planes[1], spacing, wraps)
-        assert float(result.hausdorff_distance[1]) == pytest.approx(want, rel=1e-14)
+        expected = slow_hausdorff(planes[0], planes[1], spacing, wraps)
+        assert float(result.hausdorff_distance[1]) == pytest.approx(expected, rel=1e-14)
 
 
 def test_overlap_of_nested_sets_is_their_area_ratio():
@@ -108,7 +108,7 @@ def test_evolution_repeats_all_scalars_and_curves():
     result = fc.domains.evolution(mask)
     boxes, gaps = fc.domains.box_dimension(mask), fc.domains.lacunarity(mask)
     grown, pairs = fc.domains.minkowski_dimension(mask), fc.domains.correlation_dimension(mask)
-    for name, want in {
+    for name, expected in {
         "box_dimension": boxes.box_dimension,
         "box_dimension_low": boxes.ci_low,
         "null_dimension": boxes.null_dimension,
@@ -122,7 +122,7 @@ def test_evolution_repeats_all_scalars_and_curves():
         "percolates": fc.domains.percolation(mask).percolates,
     }.items():
         assert result[name].dims[:2] == ("shear", "step")
-        assert np.array_equal(result[name], want, equal_nan=True), name
+        assert np.array_equal(result[name], expected, equal_nan=True), name
     for name, own in (("box_local_slope", boxes), ("lacunarity", gaps), ("correlation_local_slope", pairs)):
         source = own["lacunarity" if name == "lacunarity" else "local_slope"]
         chosen = result[name].sel(box_size=own.box_size.values)

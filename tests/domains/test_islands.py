@@ -134,9 +134,9 @@ def test_chunked_masks_give_the_same_results():
     mask = as_mask(np.random.default_rng(7).random((2, 30, 20)) < 0.4)
     valid = as_mask(np.random.default_rng(8).random((30, 20)) < 0.9)
     for function in (fc.domains.islands, fc.domains.box_dimension, fc.domains.lacunarity):
-        one = function(mask, valid=valid).drop_vars("run_time")
-        other = function(mask.chunk(step=1, y=7, x=9), valid=valid.chunk(y=11)).drop_vars("run_time")
-        assert one.identical(other.assign_attrs(one.attrs))
+        complete = function(mask, valid=valid).drop_vars("run_time")
+        chunked = function(mask.chunk(step=1, y=7, x=9), valid=valid.chunk(y=11)).drop_vars("run_time")
+        assert complete.identical(chunked.assign_attrs(complete.attrs))
 
 
 def test_centroid_and_box_of_an_island_across_the_edges():

@@ -52,8 +52,8 @@ def test_chequerboard():
 
 def test_carpet_and_cantor_dust():
     carpet = fc.domains.lacunarity(as_mask(lattice_set("carpet", 5)), [1, 3, 9, 27, 81])
-    want = [1.80203247, 1.43750747, 1.28133107, 1.16769101, 1.07433212]
-    assert carpet.lacunarity.values == pytest.approx(want, abs=6e-9)
+    expected = [1.80203247, 1.43750747, 1.28133107, 1.16769101, 1.07433212]
+    assert carpet.lacunarity.values == pytest.approx(expected, abs=6e-9)
     assert float(carpet.lacunarity[0]) == pytest.approx((9 / 8) ** 5, rel=1e-15)
     cantor = fc.domains.lacunarity(as_mask(lattice_set("cantor_dust", 5), periodic=ROUND), [1, 3, 9, 27])
     assert cantor.lacunarity.values == pytest.approx(
@@ -66,8 +66,8 @@ def test_bernoulli_cells_and_their_null():
     result = fc.domains.lacunarity(as_mask(cells), [1, 2, 4, 8, 16, 32])
     assert result.lacunarity.values == pytest.approx([20, 5.75, 2.1875, 1.2969, 1.0742, 1.0186], rel=0.02)
     p = cells.mean()
-    want = [1 + (1 - p) / (p * r**2) for r in (1, 2, 4, 8, 16, 32)]
-    assert result.null_lacunarity.values == pytest.approx(want, rel=1e-12)
+    expected = [1 + (1 - p) / (p * r**2) for r in (1, 2, 4, 8, 16, 32)]
+    assert result.null_lacunarity.values == pytest.approx(expected, rel=1e-12)
 
 
 def test_unit_box_gives_inverse_coverage_and_full_plane_one():
@@ -88,8 +88,8 @@ def test_covariance_identity_on_the_torus():
         u = np.arange(-r + 1, r)
         weight = np.outer(r - np.abs(u), r - np.abs(u))
         pairs = covariance[np.ix_(u % 48, u % 40)]
-        want = (weight * pairs).sum() / (cells.mean() * r**2) ** 2
-        assert float(fc.domains.lacunarity(mask, [r]).lacunarity[0]) == pytest.approx(want, rel=1e-13)
+        expected = (weight * pairs).sum() / (cells.mean() * r**2) ** 2
+        assert float(fc.domains.lacunarity(mask, [r]).lacunarity[0]) == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.mark.parametrize("library", ["scipy", "default"])
@@ -130,8 +130,8 @@ def test_only_fully_observed_boxes_count():
         windows = np.lib.stride_tricks.sliding_window_view
         mass = windows((cells & valid).astype(float), (r, r)).sum((-1, -2))
         seen = windows(valid, (r, r)).all((-1, -2))
-        want = (mass[seen] ** 2).mean() / mass[seen].mean() ** 2
-        assert float(result.lacunarity[place]) == pytest.approx(want, rel=1e-14)
+        expected = (mass[seen] ** 2).mean() / mass[seen].mean() ** 2
+        assert float(result.lacunarity[place]) == pytest.approx(expected, rel=1e-14)
     assert np.isnan(result.lacunarity[3])
     assert "wholly observed" in result.lacunarity.attrs["comment"]
     assert float(result.coverage) == pytest.approx(cells[valid].mean())
@@ -141,8 +141,8 @@ def test_valid_everywhere_changes_nothing():
     cells = np.random.default_rng(8).random((2, 20, 24)) < 0.3
     mask = as_mask(cells, periodic=ROUND)
     everywhere = as_mask(np.ones((20, 24)), periodic=ROUND)
-    one, other = fc.domains.lacunarity(mask), fc.domains.lacunarity(mask, valid=everywhere)
-    assert one.lacunarity.identical(other.lacunarity)
+    default, everywhere_valid = fc.domains.lacunarity(mask), fc.domains.lacunarity(mask, valid=everywhere)
+    assert default.lacunarity.identical(everywhere_valid.lacunarity)
 
 
 def test_empty_planes_are_nan_with_a_reason():
@@ -178,8 +178,8 @@ def test_fixed_grid_lacunarity_of_lattice_sets():
         ratio = ratio_of(name)
         sizes = ratio ** np.arange(level + 1)
         result = fc.domains.lacunarity(as_mask(lattice_set(name, level)), sizes, boxes="fixed")
-        want = (ratio**level / sizes) ** (2 - DIMENSION[name])
-        assert result.lacunarity.values == pytest.approx(want, rel=1e-12)
+        expected = (ratio**level / sizes) ** (2 - DIMENSION[name])
+        assert result.lacunarity.values == pytest.approx(expected, rel=1e-12)
         assert float(result.lacunarity_slope) == pytest.approx(DIMENSION[name] - 2, abs=1e-12)
         assert "fixed grid" in result.lacunarity.attrs["long_name"]
 
@@ -187,10 +187,10 @@ def test_fixed_grid_lacunarity_of_lattice_sets():
 def test_fixed_grid_counts_fully_observed_boxes():
     rng = np.random.default_rng(20)
     cells, valid = rng.random((11, 14)) < 0.4, rng.random((11, 14)) < 0.95
-    found = fc.domains.lacunarity(as_mask(cells), [3], boxes="fixed", valid=as_mask(valid))
+    result = fc.domains.lacunarity(as_mask(cells), [3], boxes="fixed", valid=as_mask(valid))
     boxes = [(slice(i, i + 3), slice(j, j + 3)) for i in range(0, 9, 3) for j in range(0, 12, 3)]
     mass = np.array([cells[box].sum() for box in boxes if valid[box].all()])
-    assert float(found.lacunarity[0]) == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-13)
+    assert float(result.lacunarity[0]) == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-13)
 
 
 def test_slope_area_and_normalisation():
@@ -230,10 +230,10 @@ def test_median_level_sets_of_gaussian_surfaces():
     values = fc.domains.lacunarity(as_mask(np.array(planes), periodic=ROUND), [2, 5, 12]).lacunarity.values
     for place, r in enumerate((2, 5, 12)):
         # the bivariate normal orthant gives the second moment of the set
-        want = box_variance(lambda v, u: 0.25 + np.arcsin(rho[v % n, u % n]) / (2 * np.pi), r) / 0.25
+        expected = box_variance(lambda v, u: 0.25 + np.arcsin(rho[v % n, u % n]) / (2 * np.pi), r) / 0.25
         error = values[:, place].std() / np.sqrt(24)
-        assert values[:, place].mean() == pytest.approx(want, abs=4 * error)
-        assert error < 0.02 * (want - 1)
+        assert values[:, place].mean() == pytest.approx(expected, abs=4 * error)
+        assert error < 0.02 * (expected - 1)
 
 
 def test_random_discs():
@@ -272,9 +272,9 @@ def test_stripes(width, period):
     for k in range(3):
         cells[k * period : k * period + width] = True
     sizes = np.arange(1, 2 * period + 1)
-    found = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), sizes[sizes <= 24]).lacunarity.values
-    for r, value in zip(sizes, found, strict=False):
+    values = fc.domains.lacunarity(as_mask(cells, periodic=ROUND), sizes[sizes <= 24]).lacunarity.values
+    for r, value in zip(sizes, values, strict=False):
         # rows of the stripe seen by a window of r rows that starts anywhere in a period
         rows = [sum((start + k) % period < width for k in range(r)) for start in range(period)]
-        want = period * sum(row**2 for row in rows) / sum(rows) ** 2
-        assert value == pytest.approx(want, rel=1e-13)
+        expected = period * sum(row**2 for row in rows) / sum(rows) ** 2
+        assert value == pytest.approx(expected, rel=1e-13)

@@ -46,11 +46,11 @@ def test_all_public_functions_are_tested_here():
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_flags_and_booleans_give_the_same(name, mask):
-    want = FUNCTIONS[name](mask).drop_vars("run_time")
+    expected = FUNCTIONS[name](mask).drop_vars("run_time")
     yielded = xr.where(mask, 2, 0).astype(np.int8).assign_coords(mask.coords)
     for other in (mask.astype(np.int8), mask.astype(np.uint8), mask.astype(np.int64), yielded):
         got = FUNCTIONS[name](other).drop_vars("run_time")
-        assert want.identical(got.assign_attrs(want.attrs))
+        assert expected.identical(got.assign_attrs(expected.attrs))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -102,11 +102,11 @@ def test_invalid_masks_are_refused(name, mask):
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_unobserved_cells_make_no_difference(name, mask):
     valid = as_mask(np.random.default_rng(2).random((32, 32)) < 0.9, periodic=(True, False))
-    one = FUNCTIONS[name](mask & valid, valid=valid).drop_vars("run_time")
+    first = FUNCTIONS[name](mask & valid, valid=valid).drop_vars("run_time")
     other = FUNCTIONS[name](mask | ~valid, valid=valid).drop_vars("run_time")
-    assert one.identical(other.assign_attrs(one.attrs))
+    assert first.identical(other.assign_attrs(first.attrs))
     each = FUNCTIONS[name](mask, valid=valid.expand_dims(step=mask.step)).drop_vars("run_time")
-    assert one.identical(each.assign_attrs(one.attrs))
+    assert first.identical(each.assign_attrs(first.attrs))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -196,7 +196,7 @@ def test_coordinates_of_any_leading_dim_are_kept(mask, tmp_path):
 def test_reasons_of_nan_and_of_refusals():
     strip = as_mask(np.arange(40).reshape(2, 20) % 3 == 0)
     assert "two steps" in fc.domains.boundary_dimension(strip).boundary_dimension.comment
-    one = fc.domains.box_dimension(as_mask(np.eye(30, dtype=bool)), scales=4).box_dimension
-    assert one.comment == "NaN: one size of box gives no slope"
+    single_size = fc.domains.box_dimension(as_mask(np.eye(30, dtype=bool)), scales=4).box_dimension
+    assert single_size.comment == "NaN: one size of box gives no slope"
     with pytest.raises(ValueError, match="keep: expected a sequence out of 'label'"):
         fc.domains.islands(strip, keep=None)

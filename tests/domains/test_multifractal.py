@@ -27,8 +27,8 @@ def test_cascade_of_four_weights_is_exact():
     for order, value in published.items():
         assert float(result.mass_exponent.sel(moment_order=order)) == pytest.approx(value, abs=1e-11)
     plain = Q != 1
-    want = tau[plain] / (Q[plain] - 1)
-    assert result.generalised_dimension.values[plain] == pytest.approx(want, abs=1e-12)
+    expected = tau[plain] / (Q[plain] - 1)
+    assert result.generalised_dimension.values[plain] == pytest.approx(expected, abs=1e-12)
     assert float(result.generalised_dimension.sel(moment_order=1)) == pytest.approx(1.846439344671, abs=1e-12)
     alpha = -((weights**Q) * np.log2(weights)).sum(0) / (weights**Q).sum(0)
     assert result.singularity_strength.values == pytest.approx(alpha, abs=1e-11)
@@ -90,10 +90,10 @@ def test_empty_planes_and_stacks():
     assert result.generalised_dimension.dims == ("step", "moment_order")
 
 
-@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
-def test_invalid_measures_are_refused(bad):
+@pytest.mark.parametrize("invalid", [-1.0, np.nan, np.inf])
+def test_invalid_measures_are_refused(invalid):
     values = cascade(3).copy()
-    values[2, 3] = bad
+    values[2, 3] = invalid
     with pytest.raises(ValueError, match="1 of 64 NaN, infinite or negative"):
         fc.domains.generalised_dimensions(values)
 
