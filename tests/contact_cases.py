@@ -159,7 +159,7 @@ def long_table(case, radius):
     return np.asarray(total / (long(np.pi) * modulus), dtype=float)
 
 
-def settle(case, pressure, radius):
+def displacement_under(case, pressure, radius):
     """Displacement (m) of every node under `pressure` (Pa)."""
     ny, nx = pressure.shape
     if case.periodic:
@@ -212,7 +212,7 @@ def judge(case, result):
             blame(f"pressures carry {p.sum() * cell:.12g} of {force:.12g}")
         if not np.isclose(float(here[control]), value, rtol=1e-13, atol=0):
             blame(f"{control} {float(here[control]):.17g} instead of {value:.17g}")
-        u = settle(case, p, radius)
+        u = displacement_under(case, p, radius)
         g = top + plastic + u - closure
         flat = p.max() * max(case.spacing) * max(p.shape) / case.options["contact_modulus"]
         noise = max(noise, NOISE * (top.max() + plastic.max() + abs(closure) + abs(u).max() + 1e-2 * flat))

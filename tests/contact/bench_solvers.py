@@ -1,27 +1,28 @@
-"""The contact solver beside every rival that is installed, in one run.
+"""Benchmark of the contact solver against the other solvers that are installed.
 
     python tests/contact/bench_solvers.py                       # a minute or two
     python tests/contact/bench_solvers.py --sizes 256,512,1024,2048,4096 --seeds 1,2,3 --threads 1,2
     python tests/contact/bench_solvers.py --only cold --boundaries free --sizes 512 --without tamaas
     python tests/contact/bench_solvers.py --only memory --sizes 2048
 
-Rivals are Tamaas, ContactMechanics (with its own solver and with NuMPI's) and ASPHER (preconditioned,
-and nested in two precisions); none is needed. Surfaces are periodic self-affine, H = .8, waves 4 to n/4, rms
-slope .1; pressures are .001, .01 and .03 of the modulus, or a path of 20 from .0005 to .05.
+The others are Tamaas, ContactMechanics (with its own solver and with NuMPI's) and ASPHER (preconditioned,
+and nested in two precisions); none is required. Surfaces are periodic self-affine, H = 0.8, wavelengths 4 to
+n/4, rms slope 0.1; pressures are 0.001, 0.01 and 0.03 of the modulus, or a path of 20 from 0.0005 to 0.05.
 
-Every solver is run down a ladder of its own tolerance, and what counts is the error that is computed here,
-from its pressure alone and in the same way for all:
+Every solver is run with ever smaller tolerances of its own. What counts is the error computed here from its
+pressure alone, in the same way for all:
 
     complementarity = sum of p (g - min g) / (sum of p * standard deviation of the heights),
 
-g being the settlement of p less the heights. The time of a solver is that of the first tolerance whose error
-is at most `--target`, and along a path the greatest error counts. Then all solvers run in turn, `--repeats`
-times, and the ratio to this solver is formed within each turn. The clock covers the solve: for the rivals
-without their set-up (but ASPHER's nested mode sets up inside), for this solver all of `press`, labels too.
+where g is the displacement under p less the heights. The time of a solver is that of its first tolerance with
+an error of at most `--target`; along a path the greatest error counts. Then all solvers run in turn,
+`--repeats` times, and the ratio to this solver is formed within each turn. The clock covers the solution: for
+the other solvers without their set-up (but ASPHER's nested mode sets up inside), for this solver all of
+`press`, labels included.
 
-Each number of threads is a process of its own, held to as many processors; memory is the peak of a process
-that does nothing else, less what it had before. Transforms are pairs on the finest grid, as far as a solver
-tells. Writes `solvers.csv` (every run), `solvers.png` and the table `solvers.txt` into `--out`.
+Each number of threads is a process of its own, bound to as many processors. Memory is the peak of a process
+that does nothing else, less what it had before. Transforms are pairs on the finest grid, where a solver
+reports them. Writes `solvers.csv` (every run), `solvers.png` and the table `solvers.txt` into `--out`.
 """
 
 from __future__ import annotations
@@ -169,7 +170,7 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
         topography = Topography(heights, (1.0, 1.0), periodic=periodic)
         size, std = heights.size, float(heights.std())
 
-        def settle(force: np.ndarray) -> np.ndarray:
+        def displacement(force: np.ndarray) -> np.ndarray:
             padded = np.zeros(half_space.nb_subdomain_grid_pts)
             padded[: shape[0], : shape[1]] = -force.reshape(shape)
             return half_space.evaluate_disp(padded)[: shape[0], : shape[1]]
@@ -195,8 +196,8 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
         def kept(load: float, tolerance: float, before: np.ndarray | None) -> tuple[np.ndarray, float]:
             start = np.full(size, load / size) if before is None else before.ravel() * (load / before.sum())
             result = CCGWithoutRestart.constrained_conjugate_gradients(
-                lambda force: (0.0, (settle(force) - heights).ravel()),
-                lambda force: settle(force).ravel(),
+                lambda force: (0.0, (displacement(force) - heights).ravel()),
+                lambda force: displacement(force).ravel(),
                 x0=start,
                 mean_val=load / size,
                 gtol=tolerance * std,
@@ -228,7 +229,7 @@ SOLVERS: dict[str, tuple[str, Callable[[Case, np.ndarray], Callable[[float], Ans
 
 
 class Judge:
-    """Complementarity of a pressure: one settlement in plain numpy, the same for all."""
+    """Complementarity of a pressure: one displacement in plain numpy, the same for all solvers."""
 
     def __init__(self, case: Case, heights: np.ndarray) -> None:
         self.heights, self.std, n = heights, float(heights.std()), case.n

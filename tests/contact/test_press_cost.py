@@ -175,7 +175,7 @@ def test_pair_sums_only_for_light_contact(grids, influence):
     result = press(surface, nominal_pressure=MODULUS, influence=influence)
     assert min(shape[0] for shape in grids) > 1
     least = float(result["normal_force"][0]) / (MODULUS * np.hypot(*(n * 1e-4 for n in surface.shape)))
-    assert float(result["closure"][0]) > least  # a round flat punch of that diameter settles by that much
+    assert float(result["closure"][0]) > least  # closure of a round flat punch of that diameter
     light = press(surface, nominal_pressure=MODULUS * 1e-7, influence=influence)
     assert grids[-1][0] == 1
     assert bool(light["converged"].all())

@@ -60,9 +60,9 @@ def contact_mechanics(heights, pressure, boundary):
 
 
 def aspher(heights, pressure, boundary):
-    rival = pytest.importorskip("aspher")
+    library = pytest.importorskip("aspher")
     backend = "periodic" if boundary == "periodic" else "fft"
-    solver = rival.ContactSolver(grid_size=N, domain_size=N * SPACING, E_star=MODULUS, backend=backend)
+    solver = library.ContactSolver(grid_size=N, domain_size=N * SPACING, E_star=MODULUS, backend=backend)
     gap = np.ascontiguousarray(heights.max() - heights).ravel()
     result = solver.solve(gap, pressure, tol=TOLERANCE, max_iter=5000, precond="fourier-fft")
     assert result.converged
@@ -71,8 +71,8 @@ def aspher(heights, pressure, boundary):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-@pytest.mark.parametrize("rival", [tamaas, contact_mechanics, aspher])
-def test_pressure_and_area_match_other_solvers(rival, boundary):
+@pytest.mark.parametrize("other_solver", [tamaas, contact_mechanics, aspher])
+def test_pressure_and_area_match_other_solvers(other_solver, boundary):
     surface = rough_surface(boundary)
     influence = "spectral" if boundary == "periodic" else "square"
     for share in SHARES:
@@ -85,7 +85,7 @@ def test_pressure_and_area_match_other_solvers(rival, boundary):
             tolerance=TOLERANCE,
             keep=("pressure",),
         )
-        theirs = rival(surface.values, pressure, boundary)
+        theirs = other_solver(surface.values, pressure, boundary)
         assert float(ours["contact_fraction"][0]) == pytest.approx(np.mean(theirs > 0), abs=1e-12)
         missed = np.linalg.norm(ours["pressure"][0] - theirs) / np.linalg.norm(theirs)
         assert missed < 1e-8
