@@ -1,13 +1,12 @@
-"""The command `fractalcontact`: run a scene, list the methods, tell what a file holds.
+"""The command `fractalcontact`: run a scene, measure accuracy, list the methods, show the contents of a file.
 
-Exit codes: 0 done, 2 the input is wrong (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM (a run
-finishes its part and keeps what is done; a second signal ends it at once).
+Exit codes: 0 success, 2 invalid input (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT
+finishes the current task and keeps the results; a second SIGINT stops at once.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import gc
 import os
 import sys
@@ -21,16 +20,16 @@ from fractalcontact.base.memory import block_dask_import
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
-MADE = 10_000  # objects between two searches for cycles; with Python's 700 they take a twentieth of a study
+# allocations between two garbage collections: with Python's 700 they take 5 % of the run time of a study
+GC_THRESHOLD = 10_000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     if arguments is None:
-        gc.set_threshold(MADE)
-    options = _parser().parse_args(arguments)
-    if arguments is None and not getattr(options, "workers", 0):
+        gc.set_threshold(GC_THRESHOLD)
         block_dask_import()
+    options = _parser().parse_args(arguments)
     warnings.showwarning = _say_warning
     try:
         with leaving(_leave):
@@ -51,22 +50,23 @@ def _parser() -> argparse.ArgumentParser:
     from fractalcontact import __version__
 
     parser = argparse.ArgumentParser(
-        prog="fractalcontact", description="Rough surfaces in contact: a study declared in one file, run."
+        prog="fractalcontact",
+        description="Rough surfaces in contact: roughness, contact, closure, dilatancy and shear strength.",
     )
     parser.add_argument("--version", action="version", version=f"fractalcontact {__version__}")
     commands = parser.add_subparsers(required=True, metavar="command")
 
-    run = commands.add_parser("run", help="run a scene: one NetCDF, the figures, a summary")
-    run.add_argument("scene", help="a scene file (TOML), or the name of a shipped one")
-    run.add_argument("-o", "--out", help="folder for result.nc and the figures")
-    run.add_argument("--plan", action="store_true", help="print the stages that would run, and why; run none")
+    run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
+    run.add_argument("scene", help="a scene file (TOML), or the name of a shipped scene")
+    run.add_argument("-o", "--out", help="folder for result.nc and the figures; a stopped run resumes there")
+    run.add_argument("--plan", action="store_true", help="print the stages and their reasons; run nothing")
     run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
     run.add_argument(
         "--workers",
         type=int,
         default=0,
         metavar="N",
-        help="share the work between N processes (extra `dask`); for ensembles, shears, directions",
+        help="share members, shears and directions between N processes (0: none)",
     )
     run.set_defaults(action=_run)
 
@@ -106,33 +106,26 @@ def _parser() -> argparse.ArgumentParser:
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
     methods.set_defaults(action=_methods)
 
-    info = commands.add_parser("info", help="tell what a result file holds, its errors and its run times")
+    info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
     info.add_argument("file", help="a NetCDF file that this package wrote")
     info.set_defaults(action=_info)
     return parser
 
 
 def _run(options: argparse.Namespace) -> int:
-    scene = _checked_scene(options.scene)
-    if options.plan:
-        from fractalcontact.scenes.checking import preflight
-        from fractalcontact.scenes.planning import plan
+    from fractalcontact import scenes
+    from fractalcontact.base.output import RESULT
 
-        preflight(scene)
-        print(plan(scene))
+    if options.plan:
+        print(scenes.plan(scenes.validate(options.scene)))
         return 0
     if options.out is None:
         raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
     if options.workers < 0:
         raise InvalidInput("fractalcontact run", [f"--workers: expected at least 0, got {options.workers}"])
-    from fractalcontact.scenes.reporting import summary
-    from fractalcontact.scenes.running import RESULT, run
-    from fractalcontact.scenes.working import hired
-
-    with hired(options.workers) as client:
-        tree = run(scene, out=options.out, progress=not options.quiet, client=client)
+    tree = scenes.run(options.scene, out=options.out, progress=not options.quiet, workers=options.workers)
     if not options.quiet:
-        print(summary(tree))
+        print(scenes.summary(tree))
         figures = len(list(Path(options.out).glob("*.png")))
         size = (Path(options.out) / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""
@@ -141,45 +134,20 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _memory() -> str:
-    """Return the most memory that this process has held, where the system tells."""
+    """Return the peak memory of this process, where the system reports it."""
     from fractalcontact.base.memory import peak_memory
 
-    most = peak_memory()
-    return f"; at most {most / 1e6:.0f} MB of memory" if most else ""
-
-
-def _checked_scene(path: str) -> Any:
-    """Return the scene, or raise everything that is wrong with it and with its faces at once."""
-    from fractalcontact.scenes.checking import preflight
-    from fractalcontact.scenes.reading import parse
-
-    scene, problems = parse(path)
-    if problems:
-        # what a scene with faults gives its faces may fail in any way: only clear words are added to the list
-        with contextlib.suppress(Exception):
-            try:
-                preflight(scene)
-            except InvalidInput as error:
-                problems += [line for line in error.problems if not _told(line, problems)]
-        raise InvalidInput(f"scene {scene.name}", problems)
-    return scene
-
-
-def _told(line: str, problems: Sequence[str]) -> bool:
-    """Whether a problem of a face or of the joint is already listed under its key in the scene."""
-    key, _, rest = line.partition(": expected")
-    return any(
-        other.partition(": expected")[0].endswith(key.rpartition(" ")[2]) for other in problems if rest
-    )
+    peak = peak_memory()
+    return f"; peak memory {peak / 1e6:.0f} MB" if peak else ""
 
 
 def _accuracy(options: argparse.Namespace) -> int:
     if options.large and not options.extreme:
         raise InvalidInput("fractalcontact accuracy", ["--large: expected only with --extreme"])
     if options.out is not None:
-        from fractalcontact.scenes.running import writable
+        from fractalcontact.base.output import output_folder
 
-        writable(options.out)  # before the measurement, not after it
+        output_folder(options.out)  # before the measuring, not after it
     if options.extreme:
         return _extremes(options)
     if options.names == ["estimators"]:
@@ -207,11 +175,11 @@ def _error_against_time(options: argparse.Namespace) -> int:
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
     """Save a result and return the name of the file, which is another one where the run was stopped."""
     from fractalcontact.base.netcdf import save
-    from fractalcontact.scenes.running import UNFINISHED
+    from fractalcontact.base.output import PARTIAL_RESULT
 
     if stop:
-        return save(result, target.with_name(UNFINISHED)).name
-    target.with_name(UNFINISHED).unlink(missing_ok=True)
+        return save(result, target.with_name(PARTIAL_RESULT)).name
+    target.with_name(PARTIAL_RESULT).unlink(missing_ok=True)
     return save(result, target).name
 
 
@@ -260,7 +228,7 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from fractalcontact.scenes.reporting import contents
+    from fractalcontact.scenes import contents
 
     print(contents(options.file))
     return 0
@@ -271,7 +239,7 @@ def _say_warning(message: Any, category: Any, *_: Any, **__: Any) -> None:
 
 
 def _leave(number: int, _: object) -> None:
-    """End at once, whatever the threads are doing: nothing half written stands under a final name."""
+    """End at once, whatever the threads do: no incomplete file has a final name."""
     os.write(2, b"stopped\n")
     os._exit(STOPPED + number)
 

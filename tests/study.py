@@ -1,5 +1,7 @@
 """A small sound scene, and the command run as a user runs it."""
 
+import functools
+import importlib
 import os
 import subprocess
 import sys
@@ -35,3 +37,37 @@ def command(*words):
         check=False,
         env=environment,
     )
+
+
+# the public functions that the stages of a study call
+FUNCTIONS = {
+    "surfaces": ("describe",),
+    "dimensions": ("estimate", "spectrum", "variogram", "cube_counts"),
+    "contact": ("press",),
+    "joints": (
+        "delta_surface",
+        "closure",
+        "dilatancy",
+        "friction",
+        "decorrelation_length",
+        "transmissivity",
+    ),
+    "domains": ("box_dimension", "lacunarity", "islands", "evolution"),
+}
+
+
+def watch_calls(monkeypatch, before):
+    """Call `before(name)` before each computation of a public function that a study calls."""
+    for subpackage, names in FUNCTIONS.items():
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
+        for name in names:
+            monkeypatch.setattr(module, name, _watched(getattr(module, name), before))
+
+
+def _watched(function, before):
+    @functools.wraps(function)
+    def call(*arguments, **options):
+        before(function.__name__)
+        return function(*arguments, **options)
+
+    return call

@@ -8,7 +8,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.scenes.reporting import contents
+from fractalcontact.scenes import contents
 
 ROOMS = ("surfaces", "dimensions", "contact", "domains", "joints")
 # these give no labelled data: an object, a number, a table of words, the named laws of the handbooks

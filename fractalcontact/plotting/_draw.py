@@ -28,9 +28,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAPER = {1: "face", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
+# the same figures of a study that is not compared with the paper
+JOINT = {
+    1: "surface",
+    2: "sliding_scheme",
+    3: "joint_closure",
+    4: "joint_contact_domains",
+    5: "joint_dilatancy",
+}
 
 
-def draw(tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = False) -> list[Path]:
+def draw(
+    tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = False, paper: bool = True
+) -> list[Path]:
     """Draw every figure that a study has data for and write each one as a PNG file.
 
     Parameters
@@ -42,6 +52,8 @@ def draw(tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = 
         complete.
     progress : bool
         Show a progress bar.
+    paper : bool
+        Name the figures of a joint after those of the 1998 paper.
 
     Returns
     -------
@@ -62,18 +74,18 @@ def draw(tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, drawing in track(list(_drawings(tree)), progress, "figures", unit="figure"):
+    for name, drawing in track(list(_drawings(tree, paper)), progress, "figures", unit="figure"):
         figure = drawing()
         written.append(_write(figure, folder / f"{name}.png"))
         figure.clear()
     return written
 
 
-def _drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yield file name (without suffix) and drawing function of every figure with data."""
     for number, name in PAPER.items():
         if has_figure(tree, number):
-            yield f"figure_{number}_{name}", _later(paper_figure, tree, number)
+            yield f"figure_{number}_{name}" if paper else JOINT[number], _later(paper_figure, tree, number)
     estimates = group(tree, "dimensions")
     if estimates is not None and "method" in estimates.dims:
         yield "dimensions", _later(dimensions, estimates)

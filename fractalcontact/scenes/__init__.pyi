@@ -1,13 +1,19 @@
-from .planning import plan as plan
-from .reading import load as load
-from .running import run as run
-from .scene import Scene as Scene
-from .statements import paper_table as paper_table
+from ._contents import contents as contents
+from ._paper import paper_table as paper_table
+from ._plan import plan as plan
+from ._report import summary as summary
+from ._run import run as run
+from ._scene import Scene as Scene
+from ._scene_file import load as load
+from ._validation import validate as validate
 
 __all__ = [
     "Scene",
+    "contents",
     "load",
     "paper_table",
     "plan",
     "run",
+    "summary",
+    "validate",
 ]

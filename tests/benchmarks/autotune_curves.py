@@ -19,7 +19,7 @@ import fractalcontact as fc
 
 PARTS = ("contact", "dimensions", "domains")
 # key of the file, variable of `fractalcontact.accuracy.measure`
-COLUMNS = {"knob": "parameter", "error": "error", "seconds": "run_time"}
+COLUMNS = {"parameter": "parameter", "error": "error", "seconds": "run_time"}
 
 
 def curves(measured):

@@ -14,7 +14,6 @@ import pytest
 from study import SOUND
 
 import fractalcontact as fc
-from fractalcontact.scenes import stages
 
 SHIPPED = Path(__file__).parents[2] / "datasets" / "concrete_crack.nc"
 HEAVY = ("numba", "matplotlib", "skimage", "dask", "xarray", "netCDF4", "scipy", "tqdm")
@@ -149,7 +148,7 @@ domains = ["percolation"]
 
 
 def test_memory_of_scalar_results_is_independent_of_path_length(tmp_path, monkeypatch):
-    monkeypatch.setattr(stages, "CHUNK", 10 * 64 * 64)
+    monkeypatch.setattr("fractalcontact.scenes._parts.PART_SIZE", 10 * 64 * 64)
     peaks = []
     for count in (10, 20, 160):  # the first loads and compiles
         path = scene(tmp_path, LONG.replace("COUNT", str(count)))

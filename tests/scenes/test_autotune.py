@@ -1,13 +1,12 @@
-"""Methods and tolerances picked for an error or a time: the error is kept, and asking for less costs less."""
+"""Methods and tolerances selected for an error or a run time: the error is met, a looser one is faster."""
 
 import numpy as np
 import pytest
 from study import SOUND, command
 
 import fractalcontact as fc
-from fractalcontact.accuracy import curves
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.scenes.choosing import choose
+from fractalcontact.scenes import _autotune
 
 PRESSED = """
 {top}
@@ -43,14 +42,14 @@ FACES = {
 
 
 @pytest.mark.parametrize("kind", list(FACES))
-def test_the_error_asked_for_is_kept_and_less_costs_less(tmp_path, kind):
+def test_error_is_met_and_a_looser_one_is_faster(tmp_path, kind):
     exact = pressed(tmp_path, "", FACES[kind][0], FACES[kind][1], FACES[kind][2] + "\ntolerance = 1e-13")[
         "contact"
     ]
     transforms, errors = [], []
     for error in (1e-1, 1e-2, 1e-3, 1e-4):
         found = pressed(tmp_path, f"error = {error}", *FACES[kind])
-        assert "contact.tolerance" in found.attrs["picked"]
+        assert "contact.tolerance" in found.attrs["selected"]
         difference = (found["contact/pressure"] - exact["pressure"]).values
         errors.append(np.sqrt((difference**2).mean() / (exact["pressure"].values ** 2).mean()))
         assert errors[-1] <= error
@@ -61,14 +60,19 @@ def test_the_error_asked_for_is_kept_and_less_costs_less(tmp_path, kind):
 
 
 @pytest.mark.parametrize(("load", "contest"), [("nominal_pressure", ""), ("closure", ", closure imposed")])
-def test_the_curve_is_that_of_the_load(tmp_path, load, contest):
+def test_tolerance_follows_the_curve_of_the_load(tmp_path, load, contest):
     text = PRESSED.format(top="error = 1e-4", generator=FACES["free"][0], amplitude=FACES["free"][1],
                           boundary='boundary = "free"').replace("nominal_pressure", load)  # fmt: skip
     (tmp_path / "pressed.toml").write_text(text, encoding="utf-8")
-    _, (picked,) = choose(fc.scenes.load(tmp_path / "pressed.toml"))
-    (curve,) = curves.shipped()[f"rough, free body{contest}"].values()
-    at = curve.knob.index(picked.option.value)
+    (picked,) = selected(fc.scenes.load(tmp_path / "pressed.toml"))
+    (curve,) = _autotune.measured_curves()[f"rough, free body{contest}"].values()
+    at = curve.parameter.index(picked.option.value)
     assert picked.option.error == pytest.approx(3 * max(curve.error[at:]))
+
+
+def selected(study):
+    """Return the choices of the plan of a scene."""
+    return fc.scenes.plan(study).choices
 
 
 def scene(tmp_path, top, **changes):
@@ -81,23 +85,26 @@ def scene(tmp_path, top, **changes):
     return fc.scenes.load(tmp_path / "study.toml")
 
 
-def test_the_plan_says_what_was_picked(tmp_path):
-    with pytest.warns(FractalContactWarning, match="out of reach: want.dimensions comes to 0.0"):
+def test_plan_lists_the_selection(tmp_path):
+    with pytest.warns(FractalContactWarning, match="out of reach: want.dimensions reaches 0.0"):
         told = str(fc.scenes.plan(scene(tmp_path, "error = 1e-3\n")))
     for key in ("joint.tolerance", "want.dimensions", "domains.box_dimension.cover"):
-        assert f"picked: {key} = " in told
-    assert "the least there is" in told  # no estimator comes within .001 on a face of 48 x 48
-    assert "picked" not in str(fc.scenes.plan(scene(tmp_path, "")))
+        assert f"selected: {key} = " in told
+    assert "the smallest error available" in told  # no estimator comes within .001 on a face of 48 x 48
+    assert "selected" not in str(fc.scenes.plan(scene(tmp_path, "")))
 
 
 @pytest.mark.filterwarnings("ignore:an error of")
-def test_a_looser_error_picks_the_quicker_estimator(tmp_path):
+def test_looser_error_selects_a_faster_estimator(tmp_path):
     picked = {}
     for error in (0.3, 1e-4):
-        found, _ = choose(scene(tmp_path, f"error = {error}\n"))
-        picked[error] = found.wanted("dimensions")[0]
-        assert set(found.wanted("dimensions")) >= {"spectrum"}
-    seconds = {name: curve.at(48.0)[1] for name, curve in curves.shipped()["Hurst exponent"].items()}
+        choices = selected(scene(tmp_path, f"error = {error}\n"))
+        (methods,) = (choice.option.value for choice in choices if choice.key == "want.dimensions")
+        picked[error] = methods[0]
+        assert set(methods) >= {"spectrum"}
+    seconds = {
+        name: curve.at(48.0)[1] for name, curve in _autotune.measured_curves()["Hurst exponent"].items()
+    }
     assert seconds[picked[0.3]] < seconds[picked[1e-4]]
 
 
@@ -105,10 +112,10 @@ def test_a_looser_error_picks_the_quicker_estimator(tmp_path):
 @pytest.mark.parametrize(
     ("key", "wishes"), [("error", 10.0 ** -np.arange(1, 13)), ("budget", 10.0 ** np.arange(-2, 5))]
 )
-def test_asking_for_more_never_costs_less_and_never_errs_more(tmp_path, key, wishes):
+def test_tighter_requests_cost_more_and_err_less(tmp_path, key, wishes):
     costs, errors = [], []
     for wish in wishes:
-        _, choices = choose(scene(tmp_path, f"{key} = {wish}\n"))
+        choices = selected(scene(tmp_path, f"{key} = {wish}\n"))
         costs.append(sum(choice.option.seconds for choice in choices))
         errors.append(max(choice.option.error for choice in choices if choice.key.endswith("tolerance")))
     assert costs == sorted(costs)
@@ -116,62 +123,61 @@ def test_asking_for_more_never_costs_less_and_never_errs_more(tmp_path, key, wis
     assert errors[-1] < 1e-9  # the largest budget buys the least error that there is
 
 
-def test_a_scene_without_a_choice_says_so(tmp_path):
+def test_scene_with_nothing_to_select_warns(tmp_path):
     text = "budget = 3\n" + SOUND.replace('"closure", ', "")
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    with pytest.warns(FractalContactWarning, match="nothing is left to be picked"):
-        assert choose(fc.scenes.load(tmp_path / "study.toml"))[1] == ()
+    with pytest.warns(FractalContactWarning, match="nothing to select"):
+        assert selected(fc.scenes.load(tmp_path / "study.toml")) == ()
 
 
 @pytest.mark.filterwarnings("ignore:an error of")
-def test_what_the_scene_states_is_left(tmp_path):
+def test_explicit_values_are_never_changed(tmp_path):
     stated = scene(tmp_path, "error = 1e-2\n", **{"block = 2.4e-3": "block = 2.4e-3\ntolerance = 1e-7"})
-    found, choices = choose(stated)
-    assert found.table("joint")["tolerance"] == 1e-7
-    assert "joint.tolerance" not in [choice.key for choice in choices]
+    assert "joint.tolerance" not in [choice.key for choice in selected(stated)]
+    assert stated.table("joint")["tolerance"] == 1e-7
     assert "tolerance" not in scene(tmp_path, "error = 1e-2\n").table("joint")
 
 
-def test_a_budget_is_kept_by_the_curves_and_more_buys_more(tmp_path):
-    least = sum(one.option.seconds for one in choose(scene(tmp_path, "error = 0.9\n"))[1])
+def test_budget_is_kept_and_a_larger_one_reduces_the_error(tmp_path):
+    least = sum(one.option.seconds for one in selected(scene(tmp_path, "error = 0.9\n")))
     errors = []
     for budget in (1.01 * least, 2 * least, 100 * least):
-        _, choices = choose(scene(tmp_path, f"budget = {budget}\n"))
+        choices = selected(scene(tmp_path, f"budget = {budget}\n"))
         assert sum(choice.option.seconds for choice in choices) <= budget
         errors.append(sum(choice.option.error for choice in choices))
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.5 * errors[0]
-    with pytest.warns(FractalContactWarning, match="at the least"):
-        choose(scene(tmp_path, f"budget = {0.5 * least}\n"))
+    with pytest.warns(FractalContactWarning, match="at least"):
+        selected(scene(tmp_path, f"budget = {0.5 * least}\n"))
 
 
 @pytest.mark.parametrize(
     "top", ["error = 2\n", "error = 0\n", "budget = -1\n", "error = 1e-2\nbudget = 3\n", 'error = "small"\n']
 )
-def test_wrong_wishes_are_refused(tmp_path, top):
+def test_invalid_error_or_budget_is_refused(tmp_path, top):
     with pytest.raises(InvalidInput, match="error|budget"):
         scene(tmp_path, top)
 
 
-def test_the_command_tells_it_in_the_plan_the_summary_and_the_file(tmp_path):
+def test_selection_is_in_the_summary_and_in_the_file(tmp_path):
     scene(tmp_path, "error = 0.05\n")
     done = command("run", tmp_path / "study.toml", "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert "picked: joint.tolerance" in done.stdout
+    assert "selected: joint.tolerance" in done.stdout
     assert "joint.tolerance" in command("info", tmp_path / "out" / "result.nc").stdout
 
 
-def test_the_shipped_curves_are_those_of_the_methods_that_exist():
-    found = curves.shipped()
+def test_shipped_curves_cover_the_methods():
+    found = _autotune.measured_curves()
     assert set(found["Hurst exponent"]) == set(fc.dimensions.methods())
     for contest in found.values():
         for curve in contest.values():
-            assert len(curve.knob) == len(curve.error) == len(curve.seconds) >= 1
-    assert curves.FILE.stat().st_size < 20_000
+            assert len(curve.parameter) == len(curve.error) == len(curve.seconds) >= 1
+    assert _autotune.CURVES_FILE.stat().st_size < 20_000
 
 
-def test_a_curve_is_a_power_law_between_its_knobs():
-    curve = curves.Curve((10.0, 40.0), (0.1, 0.025), (1.0, 16.0))
+def test_curve_is_a_power_law_between_its_points():
+    curve = _autotune.Curve((10.0, 40.0), (0.1, 0.025), (1.0, 16.0))
     error, seconds = curve.at(20.0)
     assert error == pytest.approx(0.05)
     assert seconds == pytest.approx(4.0)

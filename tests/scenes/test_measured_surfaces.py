@@ -1,13 +1,13 @@
-"""The shipped scenes on measured faces, cut to what a test can wait for."""
+"""The shipped scenes on measured surfaces, reduced to the time of a test."""
 
 import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.scenes.scene import Scene
+from fractalcontact.scenes import Scene
 
 
-def test_a_land_surface_is_described_without_a_download():
+def test_land_surface_needs_no_download():
     scene = fc.scenes.load("jacksboro_fault")
     tables = {**scene.tables, "want": {**scene.tables["want"], "figures": False}}
     tree = fc.scenes.run(Scene(scene.name, tables, scene.folder), progress=False)
@@ -36,7 +36,7 @@ def gneiss(measured):
         )
 
 
-def test_the_mated_pair_runs_through_the_whole_study(gneiss):
+def test_mated_pair_runs_through_the_whole_study(gneiss):
     assert set(gneiss.children) == {"surfaces", "dimensions", "joints", "domains"}
     closure = gneiss["joints/closure"].to_dataset()
     for name in ("closure", "interface_closure", "contact_fraction", "mean_gap"):
@@ -49,7 +49,7 @@ def test_the_mated_pair_runs_through_the_whole_study(gneiss):
     assert (flow["hydraulic_aperture"].diff("step") < 0).all()
 
 
-def test_the_pair_is_brought_into_mated_position(gneiss):
+def test_pair_is_brought_into_mated_position(gneiss):
     faces = gneiss["joints/faces"].to_dataset()
     assert abs(float(faces["shift_x"])) < 1e-3
     opening = (faces["height"] - gneiss["surfaces/height"]).mean()
@@ -57,7 +57,7 @@ def test_the_pair_is_brought_into_mated_position(gneiss):
     assert float(opening) == pytest.approx(0.637e-3, rel=0.1)
 
 
-def test_the_dimension_is_that_of_the_published_exponent(gneiss):
+def test_hurst_exponent_is_the_published_one(gneiss):
     # of the face as scanned: without its spikes it is smoother
     found = gneiss["dimensions"].to_dataset().sel({"method": "default"})
     assert float(found["hurst"]) == pytest.approx(0.71, abs=0.03)

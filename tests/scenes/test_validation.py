@@ -1,10 +1,10 @@
-"""What a stranger does to a scene and its folder: other editors, slips of the pen, two runs at once."""
+"""Scenes as users write them: other editors, spelling mistakes, values that a late stage refuses."""
 
 import os
 import re
 
 import pytest
-from study import SOUND, command
+from study import SOUND, command, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -13,7 +13,7 @@ from fractalcontact.base.errors import InvalidInput
 @pytest.mark.parametrize(
     ("encoding", "newline"), [("utf-8-sig", "\r\n"), ("utf-8-sig", "\n"), ("utf-8", "\r\n")]
 )
-def test_scenes_of_other_editors_are_read(tmp_path, encoding, newline):
+def test_scene_with_other_line_ends_is_read(tmp_path, encoding, newline):
     (tmp_path / "study.toml").write_text(SOUND, encoding=encoding, newline=newline)
     (tmp_path / "plain.toml").write_text(SOUND, encoding="utf-8")
     ours, theirs = (fc.scenes.load(tmp_path / f"{name}.toml") for name in ("plain", "study"))
@@ -29,14 +29,14 @@ def test_scenes_of_other_editors_are_read(tmp_path, encoding, newline):
         ("[material]", "[materials]", "'material'"),
     ],
 )
-def test_a_slip_of_the_pen_is_met_with_the_word_that_was_meant(tmp_path, old, new, meant):
+def test_misspelt_word_gets_a_suggestion(tmp_path, old, new, meant):
     (tmp_path / "study.toml").write_text(SOUND.replace(old, new), encoding="utf-8")
     with pytest.raises(InvalidInput) as told:
         fc.scenes.load(tmp_path / "study.toml")
     assert f"did you mean {meant}?" in str(told.value)
 
 
-def test_all_that_should_be_tables_are_named_at_once(tmp_path):
+def test_values_in_place_of_tables_are_listed_at_once(tmp_path):
     (tmp_path / "study.toml").write_text("surface = 3\njoint = [1]\nmaterial = 'x'\nwant = 4\n")
     with pytest.raises(InvalidInput) as told:
         fc.scenes.load(tmp_path / "study.toml")
@@ -48,7 +48,7 @@ def test_all_that_should_be_tables_are_named_at_once(tmp_path):
     }
 
 
-def test_a_folder_in_which_another_run_writes_is_refused(tmp_path):
+def test_folder_of_another_run_is_refused(tmp_path):
     fcntl = pytest.importorskip("fcntl")  # of Unix alone
     (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
     scene, out = fc.scenes.load(tmp_path / "study.toml"), tmp_path / "out"
@@ -63,23 +63,23 @@ def test_a_folder_in_which_another_run_writes_is_refused(tmp_path):
     assert [path.name for path in out.iterdir()] == ["result.nc"]
 
 
-def test_what_is_no_client_is_refused():
+def test_invalid_client_is_refused():
     with pytest.raises(InvalidInput, match="client: expected a distributed.Client"):
         fc.scenes.run("pressed_face", progress=False, client="tcp://there")
 
 
-def test_what_cannot_be_written_is_told_before_it_is_measured(tmp_path):
+def test_accuracy_refuses_an_unwritable_folder_first(tmp_path):
     (tmp_path / "out").write_text("a file")
     done = command("accuracy", "-o", tmp_path / "out")
     assert done.returncode == 2
     assert "expected a folder" in done.stderr
 
 
-def test_the_command_tells_what_it_wrote_and_held(tmp_path):
+def test_command_reports_file_size_and_peak_memory(tmp_path):
     (tmp_path / "study.toml").write_text(SOUND.replace('"closure", ', ""), encoding="utf-8")
     last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-1]
     size = (tmp_path / "out" / "result.nc").stat().st_size
-    told = re.search(r"result\.nc \((\S+) MB\); at most (\d+) MB of memory", last)
+    told = re.search(r"result\.nc \((\S+) MB\); peak memory (\d+) MB", last)
     assert told, last
     assert float(told[1]) == pytest.approx(size / 1e6, rel=0.1)
     assert 50 < int(told[2]) < 1000
@@ -101,9 +101,7 @@ def test_the_command_tells_what_it_wrote_and_held(tmp_path):
         ("[dimensions]\nmethods = ['spectrum']", "dimensions.methods"),
     ],
 )
-def test_what_a_late_stage_would_refuse_is_told_before_the_first_one_runs(tmp_path, monkeypatch, table, told):
-    from fractalcontact.scenes import stages
-
+def test_values_refused_by_a_late_stage_are_reported_first(tmp_path, monkeypatch, table, told):
     wanted = """[want]
 joints = ["closure", "elastic_dilatancy", "decorrelation_length", "transmissivity"]
 domains = ["lacunarity", "box_dimension", "evolution"]
@@ -111,15 +109,17 @@ dimensions = ["default"]
 """
     shears = "shear = [0.0, 1e-4, 4e-4]"
     scene = SOUND.partition("[want]")[0].replace("shear = [1e-4, 4e-4]", shears)
-    monkeypatch.setattr(stages, "_call", None)
+    computed = []
+    watch_calls(monkeypatch, computed.append)
     (tmp_path / "study.toml").write_text(f"{scene}\n{table}\n{wanted}", encoding="utf-8")
     with pytest.raises(InvalidInput, match=told):
         fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert not (tmp_path / "out").exists()
+    assert computed == []
 
 
 @pytest.mark.parametrize("members", ['"x"', "[]", "0", "2.5"])
-def test_members_are_a_whole_number(tmp_path, members):
+def test_members_must_be_a_positive_integer(tmp_path, members):
     text = SOUND.replace("rng = 5", f"rng = 5\nmembers = {members}")
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InvalidInput, match="surface.members"):
@@ -127,7 +127,7 @@ def test_members_are_a_whole_number(tmp_path, members):
 
 
 @pytest.mark.parametrize("shape", ['"x"', "[]", '[1, "a"]', "nan", "[3, 2, 1]", "1e300"])
-def test_a_wrong_shape_is_refused_in_words(tmp_path, shape):
+def test_invalid_shape_is_refused(tmp_path, shape):
     (tmp_path / "study.toml").write_text(SOUND.replace("[48, 48]", shape), encoding="utf-8")
     with pytest.raises(InvalidInput, match="shape"):
         fc.scenes.run(tmp_path / "study.toml", progress=False)

@@ -1,4 +1,4 @@
-"""Nothing is lost: a scene stopped by a signal, a full disk or a damaged file, and what comes after."""
+"""Finished parts are kept: a study stopped by a signal, a full disk or a damaged file resumes."""
 
 import os
 import signal
@@ -9,12 +9,11 @@ import time
 import netCDF4
 import numpy as np
 import pytest
-from study import SOUND
+from study import SOUND, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, UnreadableFile
 from fractalcontact.base.signals import Stopped
-from fractalcontact.scenes import stages
 
 resource = pytest.importorskip("resource")  # signals and limits as Unix has them
 
@@ -52,18 +51,17 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_stopped_at_every_part_it_goes_on_to_the_same_bytes(whole, tmp_path, monkeypatch, number):
+def test_study_stopped_at_every_part_gives_the_same_bytes(whole, tmp_path, monkeypatch, number):
     scene, expected = whole
-    original, asked, numbers, runs = stages._call, [], [], 0
+    asked, numbers, runs = [], [], 0
 
-    def once_more(*arguments, **options):
-        """Ask for a stop in the first part that is computed in each run."""
+    def stop_in_first_part(name):
+        """Request a stop in the first part that is computed in each run."""
         if not asked:
             asked.append(True)
             signal.raise_signal(number)
-        return original(*arguments, **options)
 
-    monkeypatch.setattr(stages, "_call", once_more)
+    watch_calls(monkeypatch, stop_in_first_part)
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     while True:
         asked.clear()
@@ -84,15 +82,12 @@ def test_stopped_at_every_part_it_goes_on_to_the_same_bytes(whole, tmp_path, mon
     assert variables(tmp_path / "result.nc") == expected
 
 
-def test_a_partial_file_holds_the_finished_part_of_a_stage(whole, tmp_path, monkeypatch):
-    original = stages._call
-
-    def stop_in_closure(*arguments, **options):
-        if arguments[1] == "closure":
+def test_partial_file_has_the_finished_part_of_a_stage(whole, tmp_path, monkeypatch):
+    def stop_in_closure(name):
+        if name == "closure":
             signal.raise_signal(signal.SIGTERM)
-        return original(*arguments, **options)
 
-    monkeypatch.setattr(stages, "_call", stop_in_closure)
+    watch_calls(monkeypatch, stop_in_closure)
     with pytest.raises(Stopped, match="SIGTERM"):
         fc.scenes.run(whole[0], out=tmp_path, progress=False)
     partial = fc.open(tmp_path / "partial.nc")
@@ -101,7 +96,7 @@ def test_a_partial_file_holds_the_finished_part_of_a_stage(whole, tmp_path, monk
     assert "domains/islands" in partial.attrs["completeness"]
 
 
-def test_a_second_signal_is_obeyed_at_once(tmp_path, monkeypatch):
+def test_second_signal_stops_at_once(tmp_path, monkeypatch):
     from fractalcontact.base import signals
 
     monkeypatch.setattr(signals, "ECHO", 0.0)
@@ -115,7 +110,7 @@ def test_a_second_signal_is_obeyed_at_once(tmp_path, monkeypatch):
     assert not isinstance(caught.value, Stopped)
 
 
-def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
+def test_repeated_signal_within_half_a_second_counts_once(tmp_path):
     from fractalcontact.base import signals
 
     with signals.noted() as stop:
@@ -125,17 +120,17 @@ def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_killed_there_is_no_half_file(whole, tmp_path, number):
+def test_killed_study_leaves_no_incomplete_file(whole, tmp_path, number):
     words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob(".stages/*.nc")) and time.monotonic() < deadline:
+    while not list(tmp_path.glob(".stages/*.npz")) and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(process.pid, number)
     _, told = process.communicate(timeout=60)
     if number != signal.SIGKILL:
         assert process.returncode == 128 + number
-        assert "goes on" in told
+        assert "resumes" in told
         assert fc.open(tmp_path / "partial.nc").attrs["completeness"].startswith("partial")
     assert not (tmp_path / "result.nc").exists()
     tree = fc.scenes.run(whole[0], out=tmp_path, progress=False)
@@ -145,47 +140,47 @@ def test_killed_there_is_no_half_file(whole, tmp_path, number):
 
 
 def damaged(folder, how):
-    for path in (folder / ".stages").glob("*.nc"):
+    parts = list((folder / ".stages").glob("*.npz"))
+    assert parts
+    for path in parts:
         if how == "truncated":
             path.write_bytes(path.read_bytes()[:-200])
         elif how == "foreign":
-            fc.save(fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1), path)
+            np.savez(path, height=np.zeros((8, 8)))
+        elif how == "NetCDF":
+            surface = fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1)
+            fc.save(surface, path.with_suffix(".nc")).replace(path)
         elif how == "changed":
-            with netCDF4.Dataset(path, "a") as file:
-                for variable in file.variables.values():
-                    if variable.dtype == float and variable.size:
-                        variable[...] = np.nextafter(np.asarray(variable[...]), np.inf)
+            with np.load(path) as file:
+                arrays = dict(file)
+            for name, values in arrays.items():
+                if values.dtype == float and values.size:
+                    arrays[name] = np.nextafter(values, np.inf)
+            np.savez(path, **arrays)
         else:
-            path.write_text("not a NetCDF file", encoding="utf-8")
+            path.write_text("not an archive", encoding="utf-8")
 
 
-def test_a_face_that_is_only_read_is_not_kept_beside_its_file(whole, tmp_path, monkeypatch):
+def test_surface_read_from_a_file_is_not_kept_again(whole, tmp_path, monkeypatch):
     face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
     fc.save(face, tmp_path / "face.nc")
     text = SOUND.partition("[material]")[2]
     (tmp_path / "read.toml").write_text(f'[surface]\nread = "face.nc"\n[material]{text}', encoding="utf-8")
-    original, kept = stages._call, []
+    kept = []
 
-    def told(*arguments, **options):
-        kept.extend(path.name for path in (tmp_path / "out" / ".stages").glob("*.nc"))
-        return original(*arguments, **options)
+    def list_kept(name):
+        kept.extend(path.name for path in (tmp_path / "out" / ".stages").glob("*.npz"))
 
-    monkeypatch.setattr(stages, "_call", told)
+    watch_calls(monkeypatch, list_kept)
     fc.scenes.run(tmp_path / "read.toml", out=tmp_path / "out", progress=False)
     assert kept
     assert not [name for name in kept if name.startswith("surfaces")]
 
 
-@pytest.mark.parametrize("how", ["truncated", "foreign", "changed", "text"])
-def test_a_damaged_kept_part_is_told_and_computed_again(whole, tmp_path, monkeypatch, how):
-    original = stages._call
-
-    def stop(*arguments, **options):
-        signal.raise_signal(signal.SIGINT)
-        return original(*arguments, **options)
-
+@pytest.mark.parametrize("how", ["truncated", "foreign", "NetCDF", "changed", "text"])
+def test_damaged_part_is_reported_and_computed_again(whole, tmp_path, monkeypatch, how):
     with monkeypatch.context() as patch:
-        patch.setattr(stages, "_call", stop)
+        watch_calls(patch, lambda name: signal.raise_signal(signal.SIGINT))
         with pytest.raises(Stopped):
             fc.scenes.run(whole[0], out=tmp_path, progress=False)
     damaged(tmp_path, how)
@@ -195,37 +190,33 @@ def test_a_damaged_kept_part_is_told_and_computed_again(whole, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("cut", [0, 10, 1000, -1])
-def test_a_truncated_file_is_refused(whole, tmp_path, cut):
+def test_truncated_result_file_is_refused(whole, tmp_path, cut):
     path = tmp_path / "cut.nc"
     path.write_bytes((whole[0].parent / "result.nc").read_bytes()[:cut])
     with pytest.raises(UnreadableFile, match=r"cut\.nc"):
         fc.open(path)
 
 
-def test_a_file_of_another_origin_is_told_for_what_it_is(tmp_path):
-    from fractalcontact.scenes.reporting import contents
-
+def test_contents_of_a_foreign_file(tmp_path):
     with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
         file.createDimension("t", 3)
         file.createVariable("temperature", "f8", ("t",))[:] = 1.0
         file.provenance = "from a boat"
     assert "temperature" in fc.open(tmp_path / "other.nc")
-    assert "temperature" in contents(tmp_path / "other.nc")
+    assert "temperature" in fc.scenes.contents(tmp_path / "other.nc")
 
 
 @pytest.mark.parametrize(
     "told", ['{"stages": {"a": 3}}', '{"stages": {"a": {"residual": null}}}', '{"stages": [1]}', "[1]", "3"]
 )
-def test_a_provenance_of_another_kind_is_let_be(tmp_path, told):
-    from fractalcontact.scenes.reporting import contents
-
+def test_contents_of_a_file_with_foreign_provenance(tmp_path, told):
     with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
         file.createDimension("t", 2)
         file.createVariable("temperature", "f8", ("t",))[:] = 1.0
         file.createVariable("ragged", file.createVLType("f8", "list"), ("t",))
         file.createVariable("word", str, ("t",))[:] = np.array(["a", "b"], dtype=object)
         file.provenance = told
-    assert "temperature" in contents(tmp_path / "other.nc")
+    assert "temperature" in fc.scenes.contents(tmp_path / "other.nc")
     assert list(fc.open(tmp_path / "other.nc")["word"].values) == ["a", "b"]
 
 
@@ -237,7 +228,7 @@ def limited(size):
     return limit
 
 
-def test_a_full_disk_is_a_clear_error_and_loses_nothing(whole, tmp_path):
+def test_full_disk_is_a_clear_error_and_the_study_resumes(whole, tmp_path):
     words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
     done = subprocess.run(words, preexec_fn=limited(40_000), capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr
@@ -248,7 +239,7 @@ def test_a_full_disk_is_a_clear_error_and_loses_nothing(whole, tmp_path):
     assert variables(tmp_path / "result.nc") == whole[1]
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_anything_runs(whole, tmp_path):
+def test_folder_without_write_access_is_refused_first(whole, tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     for out in (tmp_path / "file", tmp_path / "file" / "below", "/proc/nowhere"):
         with pytest.raises(InvalidInput, match="folder"):

@@ -1,4 +1,4 @@
-"""A result file holds what its scene wants, and nothing else."""
+"""A result file holds the wanted results and nothing else."""
 
 from study import SOUND
 
@@ -10,7 +10,7 @@ def scene(tmp_path, text):
     return tmp_path / "study.toml"
 
 
-def test_the_file_holds_what_was_wanted_and_no_map(tmp_path):
+def test_file_has_the_wanted_results_and_no_map(tmp_path):
     tree = fc.scenes.run(scene(tmp_path, SOUND), out=tmp_path / "out", progress=False)
     assert {node.path for node in tree.subtree if node.has_data} == {
         "/joints/closure",
@@ -20,7 +20,7 @@ def test_the_file_holds_what_was_wanted_and_no_map(tmp_path):
     assert (tmp_path / "out" / "result.nc").stat().st_size < 200_000
 
 
-def test_the_map_of_the_islands_is_stored_only_where_it_is_kept(tmp_path):
+def test_island_map_is_stored_only_where_it_is_kept(tmp_path):
     text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["islands"]')
     plain, kept = (
         fc.scenes.run(scene(tmp_path, text + more), progress=False)["domains/islands"].to_dataset()

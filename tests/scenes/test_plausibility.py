@@ -1,5 +1,6 @@
-"""What is hardly meant is told, and the plan finds what is wrong with the faces."""
+"""Values that suggest a unit mistake are reported, and a plan finds the problems of the surfaces."""
 
+import inspect
 import warnings
 
 import pytest
@@ -7,8 +8,6 @@ from study import SOUND, command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, ScaleWarning
-from fractalcontact.scenes import checking, given
-from fractalcontact.scenes.checking import preflight
 
 CHANGES = {
     "mean pressure": ("young = 30e9", "young = 30e3"),  # MPa taken for Pa
@@ -22,15 +21,15 @@ def written(tmp_path, text):
 
 
 @pytest.mark.parametrize("word", list(CHANGES))
-def test_units_that_are_hardly_meant_are_told_before_anything_runs(tmp_path, word):
+def test_implausible_units_warn_before_anything_runs(tmp_path, word):
     scene = fc.scenes.load(
         written(tmp_path, SOUND.replace(*CHANGES[word]).replace("[1.0, 10.0]", "[1.0, 1e3]"))
     )
     with pytest.warns(ScaleWarning, match=word):
-        preflight(scene)
+        fc.scenes.validate(scene)
 
 
-def test_a_closure_deeper_than_the_block_is_told(tmp_path):
+def test_closure_deeper_than_the_block_warns(tmp_path):
     text = SOUND.replace("young = 30e9", "young = 30e3").replace("[1.0, 10.0]", "[1.0, 1e3]")
     with pytest.warns(ScaleWarning) as told:
         fc.scenes.run(written(tmp_path, text), progress=False)
@@ -38,10 +37,10 @@ def test_a_closure_deeper_than_the_block_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "pressed_face"])
-def test_sound_scenes_are_not_doubted(name):
+def test_plausible_scenes_do_not_warn(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        preflight(fc.scenes.load(name))
+        fc.scenes.validate(fc.scenes.load(name))
 
 
 @pytest.mark.parametrize(
@@ -53,21 +52,28 @@ def test_sound_scenes_are_not_doubted(name):
         ("shape = [48, 48]", "shape = [1, 1]", "shape"),
     ],
 )
-def test_the_plan_finds_what_is_wrong_with_a_face(tmp_path, old, new, word):
+def test_validation_finds_the_problems_of_a_surface(tmp_path, old, new, word):
     with pytest.raises(InvalidInput, match=word):
-        preflight(fc.scenes.load(written(tmp_path, SOUND.replace(old, new))))
+        fc.scenes.validate(fc.scenes.load(written(tmp_path, SOUND.replace(old, new))))
 
 
-def test_the_command_says_so_and_plans_nothing(tmp_path):
+def test_command_reports_problems_and_prints_no_plan(tmp_path):
     done = command("run", "--plan", written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0")))
     assert done.returncode == 2
     assert "block" in done.stderr
     assert not done.stdout
 
 
-def test_a_large_face_is_not_made_to_be_checked(tmp_path, monkeypatch):
-    monkeypatch.setattr(given, "LARGE", 1000)
-    monkeypatch.setattr(checking, "read_surface", None)
-    preflight(fc.scenes.load(written(tmp_path, SOUND)))
+def test_large_surface_is_not_generated_for_validation(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise AssertionError("the surface is generated")
+
+    fail.validate = fc.surfaces.fbm.validate
+    fail.__signature__ = inspect.signature(fc.surfaces.fbm)
+    monkeypatch.setattr(fc.surfaces, "fbm", fail)
+    large = SOUND.replace("shape = [48, 48]", "shape = [512, 512]")
+    fc.scenes.validate(fc.scenes.load(written(tmp_path, large)))
     with pytest.raises(InvalidInput, match="block"):
-        preflight(fc.scenes.load(written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0"))))
+        fc.scenes.validate(fc.scenes.load(written(tmp_path, large.replace("block = 2.4e-3", "block = 5.0"))))
+    with pytest.raises(InvalidInput, match="hurst"):
+        fc.scenes.validate(fc.scenes.load(written(tmp_path, large.replace("hurst = 0.8", "hurst = 1.8"))))

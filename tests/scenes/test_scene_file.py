@@ -1,4 +1,4 @@
-"""Scenes: what is right is read, what is wrong is named, all at once."""
+"""Scene files: valid ones are read, and all problems of others are listed at once."""
 
 import pytest
 from study import SOUND, command
@@ -17,7 +17,7 @@ def write(tmp_path):
     return to_file
 
 
-def test_a_sound_scene_is_read_and_planned(write):
+def test_valid_scene_is_read_and_planned(write):
     scene = fc.scenes.load(write(SOUND))
     assert scene.name == "study"
     names = [stage.name for stage in fc.scenes.plan(scene)]
@@ -25,14 +25,14 @@ def test_a_sound_scene_is_read_and_planned(write):
     assert "closure is wanted" in str(fc.scenes.plan(scene))
 
 
-def test_ranges_are_spelled_out(write):
+def test_ranges_are_expanded(write):
     text = SOUND.replace("[1e-4, 4e-4]", "{ start = 0.0, stop = 3e-4, step = 1e-4 }")
     scene = fc.scenes.load(write(text.replace("[1.0, 10.0]", "{ first = 1.0, last = 100.0, count = 3 }")))
     assert scene.table("joint")["shear"] == pytest.approx([0, 1e-4, 2e-4, 3e-4])
     assert scene.table("joint")["normal_force"] == pytest.approx([1, 10, 100])
 
 
-def test_everything_wrong_is_listed_at_once(write):
+def test_all_problems_are_listed_at_once(write):
     text = SOUND.replace("hurst", "hirst").replace("30e9", "-30e9").replace("poisson = 0.2", "poisson = 0.7")
     text = text.replace('"closure"', '"closing"').replace('"W"', '"Q"').replace("block", "blok")
     with pytest.raises(InvalidInput) as caught:
@@ -74,13 +74,13 @@ def test_everything_wrong_is_listed_at_once(write):
         ('generate = "fbm"', "read = 3", "surface.read"),
     ],
 )
-def test_each_fault_is_named(write, old, new, word):
+def test_each_problem_is_named(write, old, new, word):
     assert old in SOUND
     with pytest.raises(InvalidInput, match=word):
         fc.scenes.load(write(SOUND.replace(old, new)))
 
 
-def test_what_is_no_scene_says_so(write, tmp_path):
+def test_unreadable_scene_is_refused(write, tmp_path):
     with pytest.raises(UnreadableFile, match="not a TOML file"):
         fc.scenes.load(write("[surface"))
     with pytest.raises(UnreadableFile, match="concrete_crack"):
@@ -88,7 +88,7 @@ def test_what_is_no_scene_says_so(write, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "jacksboro_fault", "freiberg_gneiss"])
-def test_the_shipped_scenes_are_found_by_name_and_are_sound(name, tmp_path, monkeypatch):
+def test_shipped_scenes_are_found_by_name_and_valid(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for way in (name, f"{name}.toml", f"datasets/{name}.toml"):
         assert len(fc.scenes.plan(fc.scenes.load(way)))
@@ -108,7 +108,7 @@ def test_the_shipped_scenes_are_found_by_name_and_are_sound(name, tmp_path, monk
         ("shear = [1e-4, 4e-4]", 'shear = "1e-4"', ("joint.shear",)),
     ],
 )
-def test_the_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, new, words):
+def test_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, new, words):
     path = write(SOUND.replace(old, new))
     done = command("run", path, "-o", tmp_path / "out")
     assert done.returncode == 2, done.stderr
@@ -118,7 +118,7 @@ def test_the_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old
     assert not (tmp_path / "out").exists()
 
 
-def test_an_unset_variable_and_a_missing_file_are_named(write, tmp_path):
+def test_unset_variable_and_missing_file_are_named(write, tmp_path):
     for name in ("${NO_SUCH_VARIABLE}/a.npy", "nothing.npy"):
         text = f"[surface]\nread = '{name}'\nspacing = 1e-4\n[want]\nsurfaces = ['describe']\n"
         done = command("run", write(text), "-o", tmp_path / "out")
@@ -126,20 +126,20 @@ def test_an_unset_variable_and_a_missing_file_are_named(write, tmp_path):
         assert name.removeprefix("${").partition("}")[0] in done.stderr
 
 
-def test_the_plan_is_printed_and_nothing_runs(write, tmp_path):
+def test_plan_is_printed_and_nothing_runs(write, tmp_path):
     done = command("run", "--plan", write(SOUND), "-o", tmp_path / "out")
     assert done.returncode == 0
     assert "joints/closure" in done.stdout
     assert not (tmp_path / "out").exists()
 
 
-def test_a_load_of_the_whole_joint_may_be_a_closure(write):
+def test_load_of_the_joint_may_be_a_closure(write):
     scene = fc.scenes.load(write(SOUND.replace("normal_force = [1.0, 10.0]", "closure = [1e-7, 1e-6]")))
     closure = fc.scenes.run(scene, progress=False)["joints/closure"]
     assert closure["closure"].values.ravel() == pytest.approx([1e-7, 1e-6] * 2)
 
 
-def test_a_pressed_face_takes_its_modulus_from_the_material(write):
+def test_press_takes_its_modulus_from_the_material(write):
     text = SOUND[: SOUND.index("[joint]")] + "[contact]\nnormal_force = 1.0\n[want]\ncontact = ['press']\n"
     pressed = fc.scenes.run(fc.scenes.load(write(text)), progress=False)["contact"]
     assert float(pressed["contact_modulus"]) == pytest.approx(30e9 / (2 * (1 - 0.2**2)))

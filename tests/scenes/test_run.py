@@ -1,15 +1,16 @@
-"""Scenes carried out: only what is asked, one clean file, resumed where it stopped."""
+"""A scene run from end to end: only the wanted results, one valid file, resumed where it stopped."""
 
+import pickle
 import subprocess
 import sys
+from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
 import xarray as xr
-from study import SOUND, command
+from study import SOUND, command, watch_calls
 
 import fractalcontact as fc
-from fractalcontact.scenes import keeping, stages, studying
 
 WHOLE = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -28,7 +29,7 @@ def study(tmp_path_factory):
     return tree, folder / "out"
 
 
-def test_the_groups_are_those_asked_for(study):
+def test_file_has_the_wanted_groups(study):
     tree, out = study
     assert set(tree.children) == {"surfaces", "dimensions", "joints", "domains"}
     with xr.open_datatree(out / "result.nc") as found:
@@ -42,7 +43,7 @@ def test_the_groups_are_those_asked_for(study):
     assert not list(out.glob(".*"))
 
 
-def test_every_group_alone_is_clean(study, compliance, tmp_path):
+def test_every_group_passes_the_cf_checker(study, compliance, tmp_path):
     tree, _ = study
     for number, node in enumerate(tree.subtree):
         if node.has_data:
@@ -51,7 +52,7 @@ def test_every_group_alone_is_clean(study, compliance, tmp_path):
             assert compliance(path) == [], node.path
 
 
-def test_the_results_are_those_of_the_rooms(study):
+def test_results_equal_those_of_the_public_functions(study):
     tree, _ = study
     face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
     np.testing.assert_array_equal(tree["surfaces/height"], face)
@@ -63,7 +64,7 @@ def test_the_results_are_those_of_the_rooms(study):
         np.testing.assert_array_equal(tree["joints/closure"][name], closure[name])
 
 
-def test_the_record_tells_time_and_error_of_every_stage(study):
+def test_provenance_has_run_time_and_error_of_every_stage(study):
     import json
 
     record = json.loads(study[0].attrs["provenance"])["stages"]
@@ -72,7 +73,7 @@ def test_the_record_tells_time_and_error_of_every_stage(study):
     assert record["joints/closure"]["residual"] <= 1e-8
 
 
-def test_a_map_that_only_the_domains_read_is_not_stored(tmp_path):
+def test_map_read_only_by_other_stages_is_not_stored(tmp_path):
     text = SOUND.replace('["closure", "rigid_dilatancy"]', '["closure"]\ndomains = ["box_dimension"]')
     (tmp_path / "lean.toml").write_text(text, encoding="utf-8")
     tree = fc.scenes.run(tmp_path / "lean.toml", progress=False)
@@ -81,7 +82,7 @@ def test_a_map_that_only_the_domains_read_is_not_stored(tmp_path):
     assert "surfaces" not in tree.children
 
 
-def test_rigid_sliding_runs_no_solver_and_imports_no_compiler(tmp_path):
+def test_rigid_sliding_imports_no_solver_and_no_compiler(tmp_path):
     heavy = ("numba", "matplotlib", "skimage", "fractalcontact.contact", "fractalcontact.plotting")
     code = (
         "import sys; from fractalcontact.cli import main\n"
@@ -93,17 +94,17 @@ def test_rigid_sliding_runs_no_solver_and_imports_no_compiler(tmp_path):
     assert done.stdout.strip() == "[]"
 
 
-def test_a_failed_run_goes_on_from_its_kept_stages(tmp_path, monkeypatch):
+def test_failed_run_resumes_from_kept_stages(tmp_path, monkeypatch):
     text = SOUND.replace('"rigid_dilatancy"]', '"friction"]\ndomains = ["lacunarity"]')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     whole = fc.scenes.run(tmp_path / "study.toml", progress=False)
 
-    def broken(*_):
-        raise RuntimeError("the lights went out")
+    def fail_in_friction(name):
+        if name == "friction":
+            raise RuntimeError("power failure")
 
-    original, last = stages._call, "friction"
     with monkeypatch.context() as patch:
-        patch.setattr(stages, "_call", lambda *a, **k: broken() if a[1] == last else original(*a, **k))
+        watch_calls(patch, fail_in_friction)
         with pytest.raises(RuntimeError):
             fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert not (tmp_path / "out" / "result.nc").exists()
@@ -111,9 +112,9 @@ def test_a_failed_run_goes_on_from_its_kept_stages(tmp_path, monkeypatch):
     assert sum(name.startswith("joints.closure") for name in kept) == 2
 
     calls = []
-    monkeypatch.setattr(stages, "_call", lambda *a, **k: calls.append(a[1]) or original(*a, **k))
+    watch_calls(monkeypatch, calls.append)
     resumed = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
-    assert calls == [last]
+    assert calls == ["friction"]
     for path in ("joints/closure", "domains/lacunarity"):
         ours, theirs = resumed[path].to_dataset(), whole[path].to_dataset()
         xr.testing.assert_identical(
@@ -123,76 +124,99 @@ def test_a_failed_run_goes_on_from_its_kept_stages(tmp_path, monkeypatch):
     assert not (tmp_path / "out" / ".stages").exists()
 
 
-def test_a_changed_scene_does_not_take_stages_of_another(tmp_path):
-    first, second = SOUND, SOUND.replace("young = 30e9", "young = 60e9")
-    keys = []
-    for text in (first, second, first):
-        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-        scene = fc.scenes.load(tmp_path / "study.toml")
-        keys.append(studying.Study(scene, keeping.Store(None), False, None).digests)
-    assert keys[0] == keys[2]
-    assert keys[0]["joints/closure"] != keys[1]["joints/closure"]
-    assert keys[0]["surfaces"] == keys[1]["surfaces"]
+@pytest.mark.parametrize(
+    ("old", "new", "recomputed"),
+    [
+        ("young = 30e9", "young = 60e9", {"closure", "dilatancy"}),
+        ("[want]", "[want]", set()),
+        ("rng = 5", "rng = 6", {"closure", "dilatancy"}),
+        ("normal_force = [1.0, 10.0]", "normal_force = [1.0, 20.0]", {"closure", "dilatancy"}),
+    ],
+)
+def test_kept_stages_of_a_changed_scene_are_not_used(tmp_path, monkeypatch, old, new, recomputed):
+    text = SOUND.replace('"rigid_dilatancy"]', '"rigid_dilatancy", "friction"]')
+    path, calls = tmp_path / "study.toml", []
+    path.write_text(text, encoding="utf-8")
+
+    def fail_in_friction(name):
+        calls.append(name)
+        if name == "friction":
+            raise RuntimeError("power failure")
+
+    watch_calls(monkeypatch, fail_in_friction)
+    for scene in (text, text.replace(old, new)):
+        path.write_text(scene, encoding="utf-8")
+        calls.clear()
+        with pytest.raises(RuntimeError):
+            fc.scenes.run(path, out=tmp_path / "out", progress=False)
+    assert set(calls) & {"closure", "dilatancy"} == recomputed
 
 
-def test_summary_and_info_print_the_main_figures(study, tmp_path):
-    from fractalcontact.scenes.reporting import summary
-
+def test_summary_and_info_print_the_main_results(study, tmp_path):
     tree, out = study
-    text = summary(tree)
+    text = fc.scenes.summary(tree)
     for word in (
         "fractal dimension",
         "closure at shear",
         "rigid dilatancy",
         "contact domain",
+        "random null",
         "joints/closure",
     ):
         assert word in text
     done = command("info", out / "result.nc")
     assert done.returncode == 0
-    for word in ("/joints/closure", "interface_closure", "[m]", "residual", "seconds"):
+    for word in ("/joints/closure", "interface_closure", "[m]", "residual", "run time"):
         assert word in done.stdout
     (tmp_path / "broken.nc").write_text("no")
     assert command("info", tmp_path / "broken.nc").returncode == 2
 
 
-def test_methods_are_listed():
+def test_command_lists_methods():
     done = command("methods")
     assert done.returncode == 0
     for name in ("spectrum", "variogram", "cube_counts"):
         assert name in done.stdout
 
 
-def test_parts_can_run_elsewhere(tmp_path):
-    import pickle
-    from concurrent.futures import Future
-
-    class Worker:
-        """Takes tasks as a cluster does: as bytes."""
+def test_parts_run_on_an_executor(tmp_path):
+    class Cluster(Executor):
+        """Tasks go and come as bytes, as on a cluster."""
 
         sent = 0
 
-        def submit(self):
-            """Stand for what tells a client."""
-
-        def map(self, function, tasks, pure):
-            futures = []
-            for task in tasks:
-                Worker.sent += 1
-                futures.append(Future())
-                futures[-1].set_result(pickle.loads(pickle.dumps(function))(pickle.loads(pickle.dumps(task))))
-            return futures
+        def submit(self, function, *arguments):
+            self.sent += 1
+            function, arguments = pickle.loads(pickle.dumps((function, arguments)))
+            future = Future()
+            future.set_result(pickle.loads(pickle.dumps(function(*arguments))))
+            return future
 
     (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
-    here = fc.scenes.run(tmp_path / "study.toml", progress=False)
-    there = fc.scenes.run(tmp_path / "study.toml", progress=False, client=Worker())
-    assert Worker.sent == 2
+    serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    cluster = Cluster()
+    shared = fc.scenes.run(tmp_path / "study.toml", progress=False, client=cluster)
+    assert cluster.sent == 2
     for name in ("closure", "contact_fraction", "normal_force"):
-        np.testing.assert_array_equal(here["joints/closure"][name], there["joints/closure"][name])
+        np.testing.assert_array_equal(serial["joints/closure"][name], shared["joints/closure"][name])
 
 
-def test_azimuths_strengths_of_rigid_faces_and_springs_from_a_scene(tmp_path):
-    path = tmp_path / "turned.toml"
+@pytest.mark.parametrize("paper", [True, False])
+def test_only_a_scene_of_the_paper_is_compared_with_it(tmp_path, paper):
+    top = "paper = true\n" if paper else ""
+    text = top + SOUND.replace("[want]", "[want]\nfigures = true\nkeep = ['state']")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert ("FRAMCOS" in tree.attrs["references"]) == paper
+    assert ("statement of the paper" in fc.scenes.summary(tree)) == paper
+    names = {path.stem for path in (tmp_path / "out").glob("*.png")}
+    closure, other = ("figure_3_closure", "joint_closure") if paper else ("joint_closure", "figure_3_closure")
+    assert closure in names
+    assert other not in names
+
+
+def test_azimuths_rigid_strength_and_stiffness_from_a_scene(tmp_path):
+    path = tmp_path / "azimuths.toml"
     path.write_text(
         """
 [surface]

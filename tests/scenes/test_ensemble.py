@@ -1,4 +1,6 @@
-"""An ensemble, member by member: as single studies, here or on workers, and few maps at a time."""
+"""Ensembles: each member as a single study, on workers too, with few maps in memory."""
+
+from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
@@ -6,7 +8,6 @@ import xarray as xr
 from study import SOUND
 
 import fractalcontact as fc
-from fractalcontact.scenes import stages
 
 ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 3").replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -23,7 +24,7 @@ def ensemble(tmp_path_factory):
     return fc.scenes.run(folder / "study.toml", out=folder / "out", progress=False), folder
 
 
-def test_each_member_is_what_a_study_of_its_face_gives(ensemble):
+def test_each_member_equals_a_study_of_its_surface(ensemble):
     tree, _ = ensemble
     faces = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5, members=3)
     for number in range(3):
@@ -43,12 +44,10 @@ def test_each_member_is_what_a_study_of_its_face_gives(ensemble):
         np.testing.assert_array_equal(tree["dimensions/hurst"][number], hurst)
 
 
-def test_an_ensemble_is_written_drawn_and_told(ensemble, compliance, tmp_path):
-    from fractalcontact.scenes.reporting import summary
-
+def test_ensemble_is_written_drawn_and_summarised(ensemble, compliance, tmp_path):
     tree, folder = ensemble
     assert list((folder / "out").glob("*.png"))
-    assert "closure at shear" in summary(tree)
+    assert "closure at shear" in fc.scenes.summary(tree)
     for path in ("joints/closure", "joints/friction", "domains/box_dimension", "dimensions"):
         tree[path].to_dataset().to_netcdf(tmp_path / "one.nc")
         assert compliance(tmp_path / "one.nc") == [], path
@@ -75,18 +74,30 @@ domains = ["box_dimension"]
 """
 
 
-def test_a_long_path_is_solved_in_parts_and_keeps_no_map(tmp_path, monkeypatch):
+class Recorder(Executor):
+    """Runs every task at once and keeps the datasets of its result."""
+
+    def __init__(self):
+        self.results = []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        future.set_result(function(*arguments))
+        (datasets, _), _ = future.result()
+        self.results.append(datasets)
+        return future
+
+
+def test_long_path_is_solved_in_sections_and_keeps_no_map(tmp_path, monkeypatch):
     (tmp_path / "path.toml").write_text(PATH, encoding="utf-8")
     whole = fc.scenes.run(tmp_path / "path.toml", progress=False)
-    monkeypatch.setattr(stages, "CHUNK", 8 * 32 * 32)
-    kept = []
-    original = stages.Followed.__call__
-    monkeypatch.setattr(
-        stages.Followed, "__call__", lambda part: kept.append(found := original(part)) or found
-    )
-    parts = fc.scenes.run(tmp_path / "path.toml", progress=False)
-    assert sum(1 for results, _ in kept if "closure" in results[0] and results[0].sizes["step"] <= 8) == 8
-    assert all("y" not in result.dims for results, _ in kept[1:] for result in results)
+    monkeypatch.setattr("fractalcontact.scenes._parts.PART_SIZE", 8 * 32 * 32)
+    recorder = Recorder()
+    parts = fc.scenes.run(tmp_path / "path.toml", progress=False, client=recorder)
+    steps = [results[0].sizes["step"] for results in recorder.results if "closure" in results[0]]
+    assert len(steps) == 8
+    assert max(steps) <= 8
+    assert all("y" not in result.dims for results in recorder.results for result in results)
     assert parts["contact"].sizes["step"] == 60
     np.testing.assert_array_equal(parts["contact/step"], np.arange(60))
     for name in ("closure", "contact_fraction"):
@@ -96,7 +107,7 @@ def test_a_long_path_is_solved_in_parts_and_keeps_no_map(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_workers_give_the_same_bytes(ensemble):
+def test_workers_of_dask_give_the_same_bytes(ensemble):
     distributed = pytest.importorskip("distributed")
     tree, folder = ensemble
     with (
@@ -110,7 +121,7 @@ def test_workers_give_the_same_bytes(ensemble):
                 assert variable.values.tobytes() == there[node.path][name].values.tobytes(), (node.path, name)
 
 
-def test_the_lineage_of_several_shears_is_joined(tmp_path):
+def test_lineage_of_several_shears_is_joined(tmp_path):
     text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["lineage"]')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     found = fc.scenes.run(tmp_path / "study.toml", progress=False)["domains/lineage"]

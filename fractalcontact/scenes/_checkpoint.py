@@ -1,0 +1,212 @@
+"""Results of finished parts, kept in a folder beside the result so that a stopped study resumes.
+
+A part is one NumPy `.npz` file, written under a temporary name and renamed when it is complete, with a
+checksum of its content. It is not NetCDF: on a dask worker every access of a NetCDF file takes a lock of the
+whole cluster (8 members of 128 x 128 points: 3592 acquisitions, 26.6 s instead of 9.8 s).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import shutil
+import warnings
+import zipfile
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+import fractalcontact
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput
+from fractalcontact.base.netcdf import clear_partial, unfinished
+from fractalcontact.base.schema import encoded
+from fractalcontact.scenes._inputs import contact_options, locate
+from fractalcontact.scenes._scene import Scene
+
+if TYPE_CHECKING:
+    from fractalcontact.scenes._plan import Stage
+
+FOLDER = ".stages"
+_HEADER = "header"
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+
+
+class PartStore:
+    """Results of finished parts by name, in the folder of a run; without a folder it keeps nothing."""
+
+    def __init__(self, out: Path | None) -> None:
+        self.folder = None if out is None else out.absolute() / FOLDER
+
+    def get(self, key: str) -> xr.Dataset | None:
+        """Return the result that was kept under a name; None if there is none, or a damaged one."""
+        if self.folder is None or not (path := self.folder / f"{key}.npz").is_file():
+            return None
+        try:
+            return _read_part(path)
+        except _DAMAGED:
+            message = f"{FOLDER}/{path.name} is damaged or of another origin; that part is computed again"
+            warnings.warn(message, FractalContactWarning, stacklevel=2)
+            return None
+
+    def put(self, key: str, result: xr.Dataset) -> None:
+        """Keep a result."""
+        if self.folder is not None:
+            _write_part(result, self.folder / f"{key}.npz")
+
+    def kept(self, digests: Iterable[str]) -> dict[str, xr.Dataset]:
+        """Return what was kept of the stages with these digests, by name."""
+        if self.folder is None:
+            return {}
+        names = [path.stem for digest in digests for path in self.folder.glob(f"*.{digest}.*.npz")]
+        parts = {name: self.get(name) for name in names}
+        return {name: part for name, part in parts.items() if part is not None}
+
+    def clear(self) -> None:
+        """Remove all that is kept."""
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class MemoryStore(PartStore):
+    """The store of a worker that does not see the folder: kept parts are sent to it, new ones return."""
+
+    def __init__(self, kept: Mapping[str, xr.Dataset]) -> None:
+        super().__init__(None)
+        self.before: Mapping[str, xr.Dataset] = kept
+        self.added: dict[str, xr.Dataset] = {}
+
+    def get(self, key: str) -> xr.Dataset | None:
+        """Return the result that was kept under a name, None if there is none."""
+        return self.before.get(key)
+
+    def put(self, key: str, result: xr.Dataset) -> None:
+        """Keep a result."""
+        self.added[key] = result
+
+
+def _write_part(result: xr.Dataset, path: Path) -> None:
+    arrays: dict[str, np.ndarray[Any, Any]] = {}
+    header: dict[str, Any] = {
+        "attrs": _plain_attributes(result.attrs, "", arrays),
+        "coordinates": [str(name) for name in result.coords],
+        "variables": [],
+    }
+    for number, (name, variable) in enumerate(result.variables.items()):
+        values = np.asarray(variable.values)
+        arrays[f"variable{number}"] = values.astype(str) if values.dtype == object else values
+        attributes = _plain_attributes(variable.attrs, f"{number}.", arrays)
+        header["variables"].append([str(name), [str(dim) for dim in variable.dims], attributes])
+    text = json.dumps(header)
+    checksum = _checksum(path.stem, text, arrays)
+    temporary = unfinished(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        clear_partial(path.parent)
+        with temporary.open("wb") as file:
+            np.savez(file, **{_HEADER: np.array([text, checksum])}, **arrays)  # type: ignore[arg-type]
+        temporary.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidInput(
+            "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True) if path.parent.is_dir() else None
+
+
+def _read_part(path: Path) -> xr.Dataset:
+    """Return a part; raise one of `_DAMAGED` if it is not as it was written."""
+    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}
+    text, checksum = map(str, arrays.pop(_HEADER))
+    if checksum != _checksum(path.stem, text, arrays):
+        raise ValueError("the checksum does not match")
+    header = json.loads(text)
+    variables = {
+        name: (dims, arrays[f"variable{number}"], _attributes(attributes, arrays))
+        for number, (name, dims, attributes) in enumerate(header["variables"])
+    }
+    coordinates = {name: variables.pop(name) for name in header["coordinates"]}
+    return encoded(xr.Dataset(variables, coordinates, _attributes(header["attrs"], arrays)))
+
+
+def _plain_attributes(
+    attributes: Mapping[Hashable, Any], prefix: str, arrays: dict[str, np.ndarray[Any, Any]]
+) -> dict[str, Any]:
+    """Return attributes as JSON types; arrays and NumPy numbers go into `arrays`, which keeps their type."""
+    plain = {}
+    for key, value in attributes.items():
+        if isinstance(value, (np.ndarray, np.generic, list, tuple)):
+            name = f"attribute {prefix}{key}"
+            arrays[name], plain[str(key)] = np.asarray(value), {"array": name}
+        else:
+            plain[str(key)] = value
+    return plain
+
+
+def _attributes(plain: Mapping[str, Any], arrays: Mapping[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
+    return {
+        key: arrays[value["array"]][()] if isinstance(value, dict) else value for key, value in plain.items()
+    }
+
+
+def _checksum(key: str, header: str, arrays: Mapping[str, np.ndarray[Any, Any]]) -> str:
+    digest = hashlib.blake2b(f"{key}\0{header}".encode(), digest_size=16)
+    for name, values in sorted(arrays.items()):
+        digest.update(f"{name} {values.shape} {values.dtype.str}".encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def with_seeds(scene: Scene, store: PartStore) -> Scene:
+    """Return the scene with a seed for each surface generated without one; a resumed run takes the same."""
+    names = [
+        name
+        for name in ("surface", "upper")
+        if "generate" in scene.table(name) and "rng" not in scene.table(name)
+    ]
+    if not names:
+        return scene
+    key = f"seeds.{_hash(scene.tables)}"
+    kept = store.get(key)
+    if kept is None:
+        kept = xr.Dataset(attrs={name: str(secrets.randbits(48)) for name in names})
+        store.put(key, kept)
+    tables = {name: {**scene.table(name), "rng": int(kept.attrs[name])} for name in names}
+    return replace(scene, tables={**scene.tables, **tables})
+
+
+def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tuple[str, ...]) -> str:
+    """Return a digest of all that can change the result of a stage, and of nothing else."""
+    subpackage, _, name = stage.name.partition("/")
+    facts: dict[str, Any] = {
+        "version": fractalcontact.__version__,
+        "keep": [word for word in stage.keep if word not in dropped],
+    }
+    if subpackage == "surfaces" or name == "faces":
+        facts["surface"] = table = scene.table("upper" if name == "faces" else "surface")
+        if "read" in table:
+            file = locate(table["read"], scene.folder)
+            facts["file"] = hashlib.sha256(file.read_bytes()).hexdigest()
+    if subpackage == "joints":
+        facts["material"] = scene.table("material")
+        joint = scene.table("joint")
+        facts["joint"] = {key: joint[key] for key in joint if not isinstance(joint[key], dict) or key == name}
+    if subpackage == "dimensions":
+        facts["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
+    if subpackage == "contact":
+        facts["contact"] = contact_options(scene)
+    if subpackage == "domains":
+        facts["domains"] = scene.table("domains").get(name, {})
+    facts["needs"] = [digests[need] for need in stage.needs]
+    return _hash([stage.name, facts])
+
+
+def _hash(facts: Any) -> str:
+    text = json.dumps(facts, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

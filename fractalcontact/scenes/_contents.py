@@ -1,0 +1,186 @@
+"""The contents of a result file as text: groups, variables, achieved errors and run times.
+
+Nothing here needs xarray, so that the command starts fast.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import textwrap
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.outline import Outline, outline
+from fractalcontact.base.tables import table
+
+WIDTH = 110
+REASONS = ("comment", "reason")  # attributes with a reason for each method, as JSON
+
+
+def contents(path: str | os.PathLike[str]) -> str:
+    """Return the contents of a result file: groups and variables, then the stages with errors and run times.
+
+    Parameters
+    ----------
+    path : path-like
+        A NetCDF file that this package wrote.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    UnreadableFile
+        There is no such file, or it is not complete.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = fc.save(surface, f"{folder}/surface.nc")
+    ...     print(fc.scenes.contents(path).splitlines()[4])
+      height  (y 16, x 16)  surface height [m]
+    """
+    groups = outline(path, _is_achieved)
+    root = groups["/"]
+    keys = ("title", "source", "completeness", "selected")
+    lines = [str(root.attrs[key]) for key in keys if key in root.attrs]
+    for place, group in groups.items():
+        if group.variables:
+            lines += ["", place, *_variable_lines(group), *_reason_lines(group), *_achieved_lines(group)]
+    for place, group in groups.items():
+        stages = stage_table(group)
+        if stages and (place == "/" or not root.attrs.get("provenance")):
+            lines += ["", stages]
+    return "\n".join(lines)
+
+
+def stage_table(result: Any) -> str:
+    """Return the stages of a study: run time, achieved accuracy, and origin where it is an earlier run.
+
+    `result` has the attributes of the root of a study, or of a single result.
+    """
+    entry = _provenance(result)
+    stages = entry.get("stages", {})
+    if not stages or not _are_stages(stages):
+        return _single_call(entry)
+    rows = [("stage", "run time (s)", "achieved")]
+    for name, facts in stages.items():
+        achieved = {key: value for key, value in facts.items() if key not in ("run_time", "origin")}
+        origin = "" if facts.get("origin") == "computed" else f" ({facts.get('origin')})"
+        rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_phrases(achieved)) + origin))
+    rows.append(("total", f"{sum(facts['run_time'] for facts in stages.values()):.2f}", ""))
+    return table(rows)
+
+
+def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
+    """Return the reasons in an attribute by method; a reason of several methods is listed once."""
+    try:
+        by_method = json.loads(attributes.get(key, "{}"))
+    except (TypeError, ValueError):
+        return {}
+    methods: dict[str, list[str]] = {}
+    for method, reason in by_method.items() if isinstance(by_method, dict) else ():
+        methods.setdefault(str(reason), []).append(method)
+    return {", ".join(names): reason for reason, names in methods.items() if reason}
+
+
+def note(text: str, indent: int = 2) -> str:
+    """Return a remark below a table, wrapped to the width of the screen."""
+    first, rest = " " * indent, " " * (indent + 2)
+    return textwrap.fill(text, WIDTH, initial_indent=first, subsequent_indent=rest)
+
+
+def _are_stages(stages: Any) -> bool:
+    """Return whether an entry has the form of the stages of a study; other packages use the same name."""
+    return isinstance(stages, dict) and all(
+        isinstance(facts, dict) and isinstance(facts.get("run_time"), (int, float))
+        for facts in stages.values()
+    )
+
+
+def _provenance(result: Any) -> dict[str, Any]:
+    """Return the provenance of a result, empty for a file of another origin."""
+    try:
+        entry = json.loads(result.attrs.get("provenance", "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return entry if isinstance(entry, dict) else {}
+
+
+_NOT_ACHIEVED = ("parameters", "version", "fft", "threads", "random", "stages")
+
+
+def _single_call(entry: dict[str, Any]) -> str:
+    """Return the call of a single result with its run time and its achieved errors."""
+    facts = {key: value for key, value in entry.items() if key not in _NOT_ACHIEVED and value is not None}
+    return ", ".join(f"{key.replace('_', ' ')} {_short(value)}" for key, value in facts.items())
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _phrases(facts: dict[str, Any]) -> Iterable[str]:
+    for key, value in facts.items():
+        word = key.replace("_", " ")
+        if isinstance(value, list):
+            yield f"{word} " + " ".join("-" if v is None or v != v else f"{v:.4f}" for v in value)
+        elif isinstance(value, bool):
+            yield word if value else f"not {word}"
+        elif key == "error":
+            yield str(value)
+        else:
+            yield f"{word} {value:.2g}" if isinstance(value, float) else f"{word} {value}"
+
+
+def _variable_lines(group: Outline) -> Iterable[str]:
+    """Yield name, dims, long name and units of every variable, in columns."""
+    rows = []
+    for name, (sizes, attributes) in group.variables.items():
+        dims = ", ".join(f"{dim} {size}" for dim, size in sizes.items())
+        units = attributes.get("units", "")
+        unit = "" if units in ("", "1") else f" [{units}]"
+        rows.append((name, f"({dims})" if dims else "", f"{attributes.get('long_name', '')}{unit}"))
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for name, dims, words in rows:
+        yield f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
+
+
+def _is_achieved(name: str) -> bool:
+    ends = ("_error", "_low", "_high", "misfit")
+    return name in ("run_time", "residual", "converged") or name.endswith(ends)
+
+
+def _achieved_lines(group: Outline) -> Iterable[str]:
+    """Yield the achieved errors of a group and its run time, each from the smallest to the largest."""
+    for name, numbers in group.numbers.items():
+        values: np.ndarray[Any, Any] = np.ravel(np.ma.filled(np.ma.asarray(numbers, dtype=float), np.nan))
+        finite = values[np.isfinite(values)]
+        word = name.replace("_", " ")
+        if name == "converged":
+            yield f"    converged: {int(finite.sum())} of {values.size}"
+        elif finite.size == 0:
+            yield f"    {word}: not available"
+        elif name == "run_time":
+            yield f"    {word}: {finite.sum():.3g} s"
+        else:
+            ends = dict.fromkeys(f"{value:.3g}" for value in (finite.min(), finite.max()))
+            yield f"    {word}: {' ... '.join(ends)}"
+
+
+def _reason_lines(group: Outline) -> Iterable[str]:
+    """Yield the remarks on single methods, those of several variables once."""
+    variables: dict[str, list[str]] = {}
+    for name, (_, attributes) in group.variables.items():
+        for key in REASONS:
+            for methods, reason in reasons(attributes, key).items():
+                variables.setdefault(f"{methods}: {reason}", []).append(name)
+    for text, names in variables.items():
+        yield note(f"{', '.join(names)}, {text}", indent=4)

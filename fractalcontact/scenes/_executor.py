@@ -1,0 +1,218 @@
+"""Independent tasks, in this process or on the workers of a `concurrent.futures.Executor`.
+
+Local processes, threads and a dask.distributed cluster (`client.get_executor()`) are used alike. A task keeps
+its own finished parts: a worker that sees the folder of the run writes them there; from any other they return
+with the result of the task and are written here.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fractalcontact.base import signals, threads
+from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.scenes._checkpoint import MemoryStore, PartStore
+
+R = TypeVar("R")
+Task = Callable[[PartStore, signals.Stop], R | None]
+
+PAUSE = 0.2  # seconds between two checks whether a stop was requested
+RUNNING, STOPPING = "running", "stopping"
+LOST = "the study on workers did not end; with a folder, finished parts are kept, and the same run resumes"
+
+
+@dataclass(frozen=True)
+class Workers:
+    """An executor and the number of tasks that it runs at a time.
+
+    Attributes
+    ----------
+    executor : Executor
+    count : int
+    local : bool
+        The workers see the folders of this machine.
+    """
+
+    executor: Executor
+    count: int
+    local: bool
+
+
+def workers_of(client: Any) -> Workers | None:
+    """Return the workers of a `distributed.Client` or of a `concurrent.futures.Executor`; None for None.
+
+    Raises
+    ------
+    InvalidInput
+        The client is something else.
+    """
+    if client is None:
+        return None
+    if hasattr(client, "get_executor") and hasattr(client, "nthreads"):
+        return Workers(client.get_executor(pure=False), sum(client.nthreads().values()), local=False)
+    if isinstance(client, Executor):
+        count = getattr(client, "_max_workers", None) or os.cpu_count() or 1
+        return Workers(client, count, local=isinstance(client, (ProcessPoolExecutor, ThreadPoolExecutor)))
+    expected = "a distributed.Client, a concurrent.futures.Executor or None"
+    raise InvalidInput(
+        "fractalcontact.scenes.run", [f"client: expected {expected}, got {type(client).__name__}"]
+    )
+
+
+@contextmanager
+def worker_processes(count: int) -> Iterator[Executor | None]:
+    """Provide an executor of so many processes on this machine; none for 0.
+
+    The processes start from a server that has imported the libraries, and not from a copy of this process,
+    whose threads they would lack.
+    """
+    if count == 0:
+        yield None
+        return
+    methods = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    if "forkserver" in methods:
+        context.set_forkserver_preload(["fractalcontact.scenes._study", "netCDF4", "numba"])
+    executor = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
+    try:
+        for _ in range(count):
+            executor.submit(os.getpid)  # starts a process, while the caller validates the scene
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _start_worker() -> None:
+    """Leave SIGINT to the process that runs the study, and end when it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def run_tasks(
+    tasks: Mapping[int, Task[R]], store: PartStore, stop: signals.Stop, workers: Workers | None = None
+) -> Iterator[tuple[int, R]]:
+    """Yield number and result of every task as it finishes; a task that a stop cut short is left out."""
+    if workers is not None:
+        yield from _run_on_workers(tasks, store, stop, workers)
+        return
+    for number, task in tasks.items():
+        result = task(store, stop)
+        if result is not None:
+            yield number, result
+
+
+def _run_on_workers(
+    tasks: Mapping[int, Task[R]], store: PartStore, stop: signals.Stop, workers: Workers
+) -> Iterator[tuple[int, R]]:
+    """Give every worker one task at a time; after a stop, running ones finish and no other starts."""
+    waiting = iter(tasks.items())
+    running: dict[Future[Any], int] = {}
+    with _mark(store) as mark:
+        try:
+            while True:
+                while not stop and len(running) < workers.count and (entry := next(waiting, None)):
+                    number, task = entry
+                    running[workers.executor.submit(_WorkerTask(task, store, mark, workers.local))] = number
+                if not running:
+                    return
+                if stop and mark is not None:
+                    mark.write_text(STOPPING, encoding="utf-8")
+                done, _ = wait(running, timeout=PAUSE, return_when=FIRST_COMPLETED)
+                for future in [future for future in running if future in done]:
+                    number = running.pop(future)
+                    result, added = _result(future)
+                    for key, part in added.items():
+                        store.put(key, part)
+                    if result is not None:
+                        yield number, result
+        finally:
+            for future in running:
+                future.cancel()
+
+
+@contextmanager
+def _mark(store: PartStore) -> Iterator[Path | None]:
+    """Provide a file that tells workers which see the folder whether the run was stopped."""
+    if store.folder is None:
+        yield None
+        return
+    store.folder.mkdir(parents=True, exist_ok=True)
+    mark = store.folder / f"run-{uuid.uuid4().hex}"
+    mark.write_text(RUNNING, encoding="utf-8")
+    try:
+        yield mark
+    finally:
+        mark.unlink(missing_ok=True)
+
+
+class _WorkerTask:
+    """A task as it is sent to a worker."""
+
+    def __init__(self, task: Task[Any], store: PartStore, mark: Path | None, local: bool) -> None:
+        self.task, self.store, self.mark = task, store, mark
+        self.kept = {} if local else store.kept(getattr(task, "digests", ()))
+
+    def __call__(self) -> tuple[Any, Mapping[str, Any]]:
+        """Return the result, and the new parts where the worker does not see the folder of the run.
+
+        The worker may run as many tasks as it has threads: each uses one, unless the environment says
+        otherwise (`FRACTALCONTACT_THREADS`).
+        """
+        sees_folder = self.mark is None or self.mark.is_file()
+        store = self.store if sees_folder else MemoryStore(self.kept)
+        with threads.limit(threads.requested_count() or 1):
+            result = self.task(store, _MarkedStop(self.mark))
+        return result, store.added if isinstance(store, MemoryStore) else {}
+
+
+class _MarkedStop(signals.Stop):
+    """Whether the process that runs the study has requested a stop."""
+
+    def __init__(self, mark: Path | None) -> None:
+        super().__init__()
+        self.mark = mark
+
+    def __bool__(self) -> bool:
+        if self.mark is None or not self.mark.is_file():
+            return False
+        return self.mark.read_text(encoding="utf-8") == STOPPING
+
+
+def _result(future: Future[Any]) -> Any:
+    """Return the result of a task; the loss of a worker becomes an error of this package."""
+    try:
+        return future.result()
+    except CancelledError as error:
+        raise FractalContactError(f"{LOST}: the scheduler has cancelled the task") from error
+    except BrokenExecutor as error:
+        raise FractalContactError(f"{LOST}: a worker process died (memory?)") from error
+    except Exception as error:
+        if type(error).__name__ == "KilledWorker":  # of dask.distributed, which may not be installed
+            raise FractalContactError(f"{LOST}: workers died at it repeatedly (memory?)") from error
+        raise

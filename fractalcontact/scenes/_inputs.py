@@ -1,0 +1,124 @@
+"""The input of a study: its surfaces, and the arguments of public functions that its tables stand for."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.datasets import datasets_folder
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._stages import STAGES, public_function
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+VARIABLE = re.compile(r"\$\{?(\w+)\}?")
+PRESSING = ("closure", "elastic_dilatancy")  # stages of a joint that solve a contact
+
+
+def read_surface(table: SurfaceTable, folder: Path) -> xr.DataArray:
+    """Return the surface that a table describes; with `member`, this member of its ensemble alone."""
+    from fractalcontact import surfaces
+
+    surface: xr.DataArray
+    if table.generate is not None:
+        surface = public_function(f"surfaces.{table.generate}")(**generator_options(table))
+    elif table.sample is not None:
+        surface = surfaces.sample(table.sample)
+    else:
+        surface = surfaces.read(locate(str(table.read), folder), **table.options)
+    if table.despike:
+        surface = surfaces.despike(surface)
+    if table.fill:
+        surface = surfaces.fill(surface)
+    if table.level is not None:
+        surface = surfaces.level(surface, table.level)
+    return surface
+
+
+def generator_options(table: SurfaceTable) -> dict[str, Any]:
+    """Return the arguments of the generator of a surface, or of one member of an ensemble."""
+    options = dict(table.options)
+    if table.member is not None:
+        options["rng"] = np.random.SeedSequence(options["rng"], spawn_key=(table.member,))
+    return options
+
+
+def surface_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return shape and spacing (y, x; m) of the surface; a generated one is not made for that."""
+    options = scene.surface.options
+    if scene.surface.generate is not None:
+        shape, spacing = np.broadcast_to(options["shape"], 2), np.broadcast_to(options["spacing"], 2)
+        return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
+    surface = read_surface(scene.surface, scene.folder)
+    return (surface.sizes["y"], surface.sizes["x"]), spacing_of(surface)
+
+
+def spacing_of(surface: xr.DataArray) -> tuple[float, float]:
+    """Return the spacing (y, x; m) of a surface."""
+    y, x = (float(surface[dim][1] - surface[dim][0]) for dim in ("y", "x"))
+    return y, x
+
+
+def locate(path: str, folder: Path) -> Path:
+    """Return the file that a scene names.
+
+    Environment variables are expanded; a relative path starts at the scene or at the shipped data.
+
+    Raises
+    ------
+    InvalidInput
+        A variable is not set, or there is no such file.
+    """
+    expanded = os.path.expandvars(path)
+    if "$" in expanded:
+        unset = " and ".join(VARIABLE.findall(expanded))
+        raise InvalidInput(
+            "surface", [f"read: expected {unset} to name a folder, got a variable that is not set"]
+        )
+    for candidate in (folder / expanded, datasets_folder() / expanded):
+        if candidate.is_file():
+            return candidate
+    raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
+
+
+def contact_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
+    from fractalcontact.contact import effective_modulus
+
+    options, material = dict(scene.table("contact")), scene.material
+    if "contact_modulus" not in options and material.young is not None and material.poisson is not None:
+        options["contact_modulus"] = effective_modulus(material.young, material.poisson)
+    if material.hardness is not None:
+        options.setdefault("hardness", material.hardness)
+    return options
+
+
+def crack_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `Crack` but for the surfaces."""
+    material = scene.material
+    options = {
+        "young": material.young,
+        "poisson": material.poisson,
+        "basic_friction_angle": material.basic_friction_angle,
+        "block": scene.joint.block,
+    }
+    return {key: value for key, value in options.items() if value is not None}
+
+
+def joint_options(scene: Scene, name: str) -> dict[str, Any]:
+    """Return the arguments of a stage of the joint but for its crack."""
+    options = scene.stage_options(STAGES[f"joints/{name}"])
+    if name == "closure":  # it has one load
+        load = scene.joint.loads[0]
+        options = {key: value for key, value in options.items() if key not in LOADS or key == load}
+    if name == "friction" and "nominal_pressure" not in scene.joint.stages.get(name, {}):
+        options.pop("nominal_pressure", None)  # in [joint] it is the load of the closure
+    if name in PRESSING and scene.material.hardness is not None:
+        options.setdefault("hardness", scene.material.hardness)
+    return options

@@ -1,0 +1,243 @@
+"""The work of each stage: one call of a public function, or several independent calls (parts).
+
+A part is one shear of a closure law, one direction of a dilatancy, or one section of a long load path. Parts
+may run anywhere and in any order; the joined result is the same.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.netcdf import as_dataset
+from fractalcontact.scenes._inputs import contact_options, crack_options, joint_options, read_surface
+from fractalcontact.scenes._plan import Stage
+from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._stages import public_function
+
+if TYPE_CHECKING:
+    from fractalcontact.joints import Crack
+
+Results = Mapping[str, xr.Dataset]
+Part = Callable[[], xr.Dataset]
+
+PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
+
+
+@dataclass(frozen=True)
+class StageWork:
+    """The parts of one stage, the dims along which their results are joined, and the number along each."""
+
+    parts: tuple[Part, ...]
+    along: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
+
+    def join(self, done: Mapping[int, xr.Dataset]) -> xr.Dataset | None:
+        """Return the joined results of the parts before the first missing one; None if there are none."""
+        count = next((n for n in range(len(self.parts)) if n not in done), len(self.parts))
+        results = [done[n] for n in range(count)]
+        for dim, length in zip(reversed(self.along), reversed(self.shape), strict=True):
+            rows = [results[k : k + length] for k in range(0, len(results), length)]
+            # an incomplete row is left out, unless it is the only one
+            rows = [row for row in rows if len(row) == length] or rows[:1]
+            results = [concatenate(row, dim) for row in rows]
+        return results[0] if results else None
+
+
+@dataclass(frozen=True, repr=False)
+class MapReader:
+    """A public function of one map of a part."""
+
+    function: str
+    variable: str
+    options: Mapping[str, Any]
+
+    def __call__(self, source: xr.Dataset) -> xr.Dataset:
+        """Return the result of the function for the map."""
+        return call(self.function, source[self.variable], **self.options)
+
+
+@dataclass(frozen=True, repr=False)
+class PartWithReaders:
+    """A part and the stages that read its maps; maps that nothing else needs are dropped afterwards."""
+
+    part: Part
+    readers: tuple[MapReader, ...] = ()
+    dropped: tuple[str, ...] = ()
+
+    def __call__(self) -> tuple[list[xr.Dataset], list[float]]:
+        """Return the results and the seconds each took."""
+        start = time.perf_counter()
+        source = self.part()
+        seconds = [time.perf_counter() - start]
+        results = []
+        for reader in self.readers:
+            start = time.perf_counter()
+            results.append(reader(source))
+            seconds.append(time.perf_counter() - start)
+        return [without(source, self.dropped), *results], seconds
+
+
+@dataclass(frozen=True, repr=False)
+class Precomputed:
+    """A part that an earlier run computed."""
+
+    result: xr.Dataset
+
+    def __call__(self) -> xr.Dataset:
+        """Return the result."""
+        return self.result
+
+
+def without(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
+    """Return a result without some of its maps, and without x and y if nothing else has them."""
+    rest = result.drop_vars(list(names), errors="ignore")
+    used = {dim for variable in rest.data_vars.values() for dim in variable.dims}
+    return rest.drop_vars([dim for dim in ("y", "x") if dim in rest.coords and dim not in used])
+
+
+def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
+    """Join results along a dim; their run times are added."""
+    if len(results) == 1:
+        return results[0]
+    joined = xr.concat(
+        results,
+        dim=dim,
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+        combine_attrs="override",
+    )
+    if "run_time" in joined and dim not in joined["run_time"].dims:
+        total = sum(result["run_time"].values for result in results)
+        joined["run_time"] = results[0]["run_time"].copy(data=total)
+    if dim == "step":
+        attributes = dict(joined["step"].attrs)
+        joined = joined.assign_coords(step=("step", np.arange(joined.sizes["step"]), attributes))
+    for name, variable in joined.variables.items():
+        variable.encoding = dict(results[0].variables[name].encoding)
+    return joined
+
+
+def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, StageWork]) -> StageWork:
+    """Return the parts of a stage, from the results and the parts of the stages it needs."""
+    if stage.reads_part:
+        return works[stage.needs[0]]
+    if stage.reads_map:
+        return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
+    subpackage, _, name = stage.name.partition("/")
+    if stage.name == "surfaces":
+        return StageWork((partial(_read_height, scene.surface, scene.folder),))
+    if subpackage == "surfaces":
+        return StageWork((partial(call, stage.row.function, results["surfaces"]["height"]),))
+    if subpackage == "dimensions":
+        return _dimension_work(stage, scene, results)
+    if subpackage == "contact":
+        return _contact_work(stage, scene, results)
+    return _joint_work(name, stage, scene, results)
+
+
+def map_reader(stage: Stage, scene: Scene) -> MapReader:
+    """Return the function of a map that a stage stands for."""
+    options = scene.stage_options(stage.row)
+    if stage.name == "domains/islands":
+        options["keep"] = stage.keep
+    return MapReader(stage.row.function, stage.row.reads, options)
+
+
+def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
+    return as_dataset(read_surface(table, folder).rename("height"))
+
+
+def _dimension_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
+    surface = results["surfaces"]["height"]
+    if scene.surface.despike:
+        # spikes are removed for the contact alone: the roughness is that of the surface as it was scanned
+        surface = read_surface(replace(scene.surface, despike=False), scene.folder)
+    if stage.name != "dimensions":
+        return StageWork((partial(call, stage.row.function, surface),))
+    options, methods = dict(scene.table("dimensions")), list(scene.want.dimensions)
+    return StageWork((partial(call, stage.row.function, surface, methods, **options),))
+
+
+def _contact_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
+    options, height = contact_options(scene), results["surfaces"]["height"]
+    load = next(key for key in LOADS if key in options)
+    paths = _sections(options.pop(load), height.size, has_hardness="hardness" in options)
+    press = partial(call, stage.row.function, height, keep=stage.keep, **options)
+    return StageWork(tuple(partial(press, **{load: path}) for path in paths), ("step",), (len(paths),))
+
+
+def _sections(path: Any, nodes: int, *, has_hardness: bool) -> list[Any]:
+    """Cut a load path into sections; with a hardness the state depends on the load history: one section."""
+    length = max(1, PART_SIZE // nodes)
+    if not isinstance(path, list) or len(path) <= length or has_hardness:
+        return [path]
+    return [path[k : k + length] for k in range(0, len(path), length)]
+
+
+def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> StageWork:
+    if name == "faces":
+        return StageWork((partial(_upper_face, scene, results["surfaces"]),))
+    options = joint_options(scene, name)
+    if name == "friction":
+        return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
+    crack = _crack(scene, results)
+    if name == "delta_surface" and name not in scene.want.joints:
+        options["shear"] = np.max(options["shear"])  # the figures draw the last one
+    if name == "closure":
+        return _closure_work(crack, options, stage)
+    if name == "elastic_dilatancy":
+        directions = _as_list(options.pop("direction", ("E", "N", "W", "S")))
+        shears = _as_list(options.pop("shear"))
+        parts = (
+            partial(call, stage.row.function, crack, direction=[direction], shear=[shear], **options)
+            for direction in directions
+            for shear in shears
+        )
+        return StageWork(tuple(parts), ("direction", "shear"), (len(directions), len(shears)))
+    return StageWork((partial(call, stage.row.function, crack, **options),))
+
+
+def _closure_work(crack: Crack, options: dict[str, Any], stage: Stage) -> StageWork:
+    load = next(key for key in LOADS if key in options)
+    shears, nodes = _as_list(options.pop("shear")), crack.layout.cells[0] * crack.layout.cells[1]
+    paths = _sections(options.pop(load), nodes, has_hardness="hardness" in options)
+    parts = (
+        partial(call, stage.row.function, crack, shear=[shear], keep=stage.keep, **options, **{load: path})
+        for shear in shears
+        for path in paths
+    )
+    return StageWork(tuple(parts), ("shear", "step"), (len(shears), len(paths)))
+
+
+def _as_list(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, (list, tuple)) else [value]
+
+
+def _upper_face(scene: Scene, lower: xr.Dataset) -> xr.Dataset:
+    upper = read_surface(scene.upper or scene.surface, scene.folder)
+    if scene.joint.register:
+        return call("joints.register", lower["height"], upper)
+    return as_dataset(upper.rename("height"))
+
+
+def _crack(scene: Scene, results: Results) -> Crack:
+    from fractalcontact import joints
+
+    upper = results["joints/faces"]["height"] if "joints/faces" in results else None
+    return joints.Crack(results["surfaces"]["height"], upper, **crack_options(scene))
+
+
+def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:
+    """Call a public function by name, so that the call can be sent to another process."""
+    result: xr.Dataset | xr.DataArray = public_function(function)(*arguments, **options)
+    return as_dataset(result) if isinstance(result, xr.DataArray) else result

@@ -1,0 +1,224 @@
+"""The plan of a study: the stages that the wanted results need, each with the reason why it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from fractalcontact.base.tables import table
+from fractalcontact.scenes._autotune import Choice, choose
+from fractalcontact.scenes._scene import LOADS, Scene
+from fractalcontact.scenes._stages import (
+    CONTACT_MAPS,
+    CURVES,
+    FIGURES,
+    ISLAND_MAP,
+    STAGES,
+    StageType,
+)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a plan.
+
+    Attributes
+    ----------
+    name : str
+        Group of its result, "joints/closure" for example.
+    needs : tuple of str
+        Stages that run before it.
+    reason : str
+        Why the plan has it.
+    keep : tuple of str
+        Maps that it has to return.
+    stored : bool
+        False where the result file does not contain it.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    reason: str
+    keep: tuple[str, ...] = ()
+    stored: bool = True
+
+    @property
+    def row(self) -> StageType:
+        """Its row in the table of stages."""
+        return STAGES[self.name]
+
+    @property
+    def reads_map(self) -> bool:
+        """Whether it reads a map of the stage it needs."""
+        return self.name != FIGURES and bool(self.row.reads)
+
+    @property
+    def reads_part(self) -> bool:
+        """Whether it reads that map plane by plane, so that the map does not have to be kept."""
+        return self.reads_map and not self.row.whole_path
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The stages of a scene in an order in which they can run; prints as a table.
+
+    Attributes
+    ----------
+    scene : str
+        Name of the scene.
+    stages : tuple of Stage
+    choices : tuple of Choice
+        Methods and tolerances selected for `error` or `budget`.
+    """
+
+    scene: str
+    stages: tuple[Stage, ...] = field(default=())
+    choices: tuple[Choice, ...] = field(default=())
+
+    def __iter__(self) -> Iterator[Stage]:
+        """Iterate over the stages in order."""
+        return iter(self.stages)
+
+    def __len__(self) -> int:
+        """Return the number of stages."""
+        return len(self.stages)
+
+    def __str__(self) -> str:
+        """Return a table: stage, stages it needs, reason."""
+        rows = [("stage", "needs", "reason")]
+        for stage in self:
+            needs = "all stored results" if stage.name == FIGURES else ", ".join(stage.needs)
+            rows.append((stage.name + ("" if stage.stored else " (not stored)"), needs, stage.reason))
+        return "\n".join([table(rows), *(f"selected: {choice}" for choice in self.choices)])
+
+
+def plan(scene: Scene) -> Plan:
+    """Return the stages that the wanted results of a scene need, and no others.
+
+    With `error` or `budget` in the scene, the plan also has the methods and tolerances selected for it.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `fractalcontact.scenes.load`.
+
+    Returns
+    -------
+    Plan
+        Iterates over its stages; prints as a table.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> for stage in fc.scenes.plan(fc.scenes.load("rigid_sliding")):
+    ...     print(stage.name, "-", stage.reason)
+    surfaces - input
+    joints/rigid_dilatancy - rigid_dilatancy is wanted
+    """
+    scene, choices = choose(scene)
+    return Plan(scene.name, stages_of(scene), choices)
+
+
+def stages_of(scene: Scene) -> tuple[Stage, ...]:
+    """Return the stages of a scene whose methods and tolerances are all set."""
+    reasons = _reasons(scene)
+    stages = [
+        Stage(
+            name,
+            _needs(row, reasons),
+            reasons[name],
+            keep=_kept_maps(scene, row),
+            stored=name != "surfaces" or reasons[name] != "input",
+        )
+        for name, row in STAGES.items()
+        if name in reasons
+    ]
+    if scene.want.figures:
+        stored = tuple(stage.name for stage in stages if stage.stored)
+        stages.append(Stage(FIGURES, stored, "figures are wanted", stored=False))
+    return tuple(stages)
+
+
+def _reasons(scene: Scene) -> dict[str, str]:
+    """Return the names of the stages that the wanted results need, each with the reason."""
+    want = scene.want
+    reasons = {"surfaces": "figures are wanted" if want.figures else "input"}
+    if "height" in want.surfaces:
+        reasons["surfaces"] = "height is wanted"
+    if "describe" in want.surfaces:
+        reasons["surfaces/description"] = "describe is wanted"
+    if want.dimensions:
+        reasons["dimensions"] = f"wanted: {', '.join(want.dimensions)}"
+        if want.figures:
+            curves = [name for name in want.dimensions if name in CURVES]
+            reasons |= {f"dimensions/{name}": "figures are wanted" for name in curves}
+    if want.contact:
+        reasons["contact"] = "press is wanted"
+    reasons |= _joint_reasons(scene)
+    reasons |= {f"domains/{name}": f"{name} is wanted" for name in want.domains}
+    return reasons
+
+
+def _joint_reasons(scene: Scene) -> dict[str, str]:
+    want = scene.want
+    reasons = {name: f"{name} is wanted" for name in want.joints}
+    if want.domains and not want.contact:
+        reasons.setdefault("closure", "the contact set is analysed")
+    if "transmissivity" in reasons:
+        reasons.setdefault("closure", "transmissivity needs the gap")
+    if "friction" in reasons and "elastic_dilatancy" not in reasons:
+        reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
+    if scene.want.figures and reasons:
+        reasons.setdefault("delta_surface", "figures are wanted")
+    if reasons and scene.upper is not None:
+        registered = " and registered" if scene.joint.register else ""
+        reasons["faces"] = f"an upper face is given{registered}"
+    return {f"joints/{name}": reason for name, reason in reasons.items()}
+
+
+def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:
+    """Return the stages that a row needs, as far as the plan has them."""
+    alternatives = (need.split(" or ") for need in row.needs)
+    first = (next((name for name in names if name in planned), None) for names in alternatives)
+    return tuple(name for name in first if name is not None)
+
+
+def stored_maps(scene: Scene) -> set[str]:
+    """Return the maps in the result file: those wanted, and those that its figures show."""
+    return set(scene.want.keep) | ({"state", ISLAND_MAP} if scene.want.figures else set())
+
+
+def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
+    """Return the maps that a stage has to return: those wanted and those that other stages read."""
+    if row.keeps != CONTACT_MAPS:
+        return tuple(name for name in row.keeps if name in stored_maps(scene))
+    is_contact = row.name == "contact"
+    maps = [name for name in scene.want.keep if name in CONTACT_MAPS]
+    reads_state = is_contact == bool(scene.want.contact) and bool(scene.want.domains)
+    if (reads_state or scene.want.figures) and "state" not in maps:
+        maps.append("state")
+    if "transmissivity" in scene.want.joints and not is_contact and "gap" not in maps:
+        maps.append("gap")
+    return tuple(maps)
+
+
+def check_loads(scene: Scene) -> list[str]:
+    """Return what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
+    problems = []
+    for stage in stages_of(scene):
+        name = stage.name.partition("/")[2]
+        if not stage.name.startswith("joints/") or name == "faces":
+            continue
+        given = scene.stage_options(stage.row, ("shear", "direction", *LOADS))
+        if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in given:
+            problems.append(f"joint.shear: expected a value for {name} ({stage.reason}), got none")
+        if name == "elastic_dilatancy" and "normal_force" not in given:
+            problems.append(f"joint.normal_force: expected a value for {name}, got none")
+        direction = given.get("direction", "E")
+        if name in ("closure", "delta_surface", "decorrelation_length") and isinstance(direction, list):
+            problems.append(f"joint.direction: expected one direction for {name}, got {direction}")
+        if name == "closure" and len(loads := scene.joint.loads) != 1:
+            words = "a closure, normal_force or nominal_pressure"
+            got = ", ".join(loads) or "none"
+            problems.append(f"joint.closure: expected one of {words} ({stage.reason}), got {got}")
+    return problems

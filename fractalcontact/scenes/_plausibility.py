@@ -1,0 +1,70 @@
+"""Plausibility checks: valid values that suggest a unit mistake in a modulus, a height or a spacing."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.errors import ScaleWarning
+from fractalcontact.scenes._inputs import contact_options, spacing_of
+from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stages import STAGES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LARGEST_SLOPE = 3.0  # rms slope: cracks, grounds and grinds are below 1
+LARGEST_STRAIN = 0.3  # mean pressure over the contact modulus, where strains are no longer small
+LARGEST_CLOSURE = 0.5  # closure over the edge of the body
+
+
+def warn(messages: Iterable[str]) -> None:
+    """Warn of every implausible value."""
+    for message in messages:
+        warnings.warn(message, ScaleWarning, stacklevel=3)
+
+
+def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
+    """Yield the implausible values of a scene and its surface."""
+    spacing = spacing_of(surface)
+    squares = [np.nanmean((np.diff(surface.values, axis=axis) / spacing[axis]) ** 2) for axis in (0, 1)]
+    slope = float(np.sqrt(np.sum(squares)))
+    if slope > LARGEST_SLOPE:
+        yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
+    edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]
+    if scene.want.contact:
+        options = contact_options(scene)
+        yield from _high_pressures(
+            "contact", options, float(np.prod(edges)), float(options["contact_modulus"])
+        )
+    young, poisson = scene.material.young, scene.material.poisson
+    if scene.want.joints and young is not None and poisson is not None:
+        modulus = 0.5 * young / (1.0 - poisson**2)  # of two bodies of the same material
+        block = edges if scene.joint.block is None else scene.joint.block
+        area = float(np.prod(np.broadcast_to(block, 2)))
+        for name in ("closure", "elastic_dilatancy"):
+            loads = scene.stage_options(STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
+            yield from _high_pressures(f"joint.{name}", loads, area, modulus)
+
+
+def _high_pressures(place: str, loads: Mapping[str, Any], area: float, modulus: float) -> Iterator[str]:
+    for key, scale in (("normal_force", area), ("nominal_pressure", 1.0)):
+        if loads.get(key) is not None:
+            highest = float(np.max(loads[key])) / scale
+            if highest > LARGEST_STRAIN * modulus:
+                yield (
+                    f"{place}: {key} gives a mean pressure of {highest:.3g} Pa on a contact modulus of "
+                    f"{modulus:.3g} Pa; is one of them in another unit?"
+                )
+
+
+def implausible_result(name: str, result: xr.Dataset) -> Iterator[str]:
+    """Yield the implausible values of a closure law."""
+    edge = float(result["nominal_area"].max()) ** 0.5
+    if "closure" in result and np.isfinite(result["closure"].values).any():
+        deepest = float(np.nanmax(result["closure"].values))
+        if deepest > LARGEST_CLOSURE * edge:
+            yield f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"

@@ -1,0 +1,193 @@
+"""Running a scene: validated, studied, drawn, and written as one file."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base import netcdf, provenance, schema, signals
+from fractalcontact.base.output import PARTIAL_RESULT, RESULT, locked, output_folder
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._autotune import Choice, choose
+from fractalcontact.scenes._checkpoint import PartStore, with_seeds
+from fractalcontact.scenes._ensemble import Ensemble
+from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
+from fractalcontact.scenes._plausibility import implausible_result, warn
+from fractalcontact.scenes._report import first_member
+from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stages import FIGURES
+from fractalcontact.scenes._study import Study
+from fractalcontact.scenes._validation import validate
+
+OWN_REFERENCES = "see the references of each group"
+
+
+def run(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    progress: bool = True,
+    workers: int = 0,
+    client: Any = None,
+) -> xr.DataTree:
+    """Run a scene and return its results.
+
+    Parameters
+    ----------
+    scene : Scene or path-like
+    out : path-like, optional
+        Folder for `result.nc` and the figures; nothing is written without it. Finished parts are kept in
+        `out/.stages` until the study is complete: a run that was stopped resumes there.
+    progress : bool, default True
+        Show a bar for stages of several parts.
+    workers : int, default 0
+        Share the study between so many processes on this machine; 0 for none. An ensemble is shared by
+        members, any other study by the parts of a stage. A script needs an ``if __name__ == "__main__"``
+        guard for it.
+    client : distributed.Client or concurrent.futures.Executor, optional
+        Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
+        is set on the worker. Workers need not see `out`; a scene that reads files needs them there.
+
+    Returns
+    -------
+    DataTree
+        Groups named after the subpackages. The root's `provenance` holds the scene, and the run time,
+        achieved error and origin of every stage.
+
+    Raises
+    ------
+    InvalidInput
+        Lists all problems of the scene, its surfaces and the folder, before anything is computed.
+    Stopped
+        A `KeyboardInterrupt`: with `out`, SIGINT or SIGTERM finishes the current part. Finished results are
+        written to `partial.nc`, and the same call resumes. A second signal, half a second later or more,
+        stops at once.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> result = fc.scenes.run("rigid_sliding", progress=False)
+    >>> last = result["joints/rigid_dilatancy/rigid_dilatancy"].isel(shear=-1)
+    >>> print((last.sel(direction=["E", "W"]) * 1e3).round(2).values)  # mm at 10 mm of shear
+    [1.15 0.5 ]
+    """
+    _check_workers(workers, client)
+    with worker_processes(workers) as processes:
+        scene = validate(scene)
+        return _run(scene, out, progress, workers_of(processes if client is None else client))
+
+
+def _run(
+    scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None
+) -> xr.DataTree:
+    folder = None if out is None else output_folder(out)
+    scene, choices = choose(scene)
+    store = PartStore(folder)
+    with locked(folder), signals.noted(folder is not None) as stop:
+        scene = with_seeds(scene, store)
+        study_type = Study if scene.surface.members is None else Ensemble
+        study: Study | Ensemble = study_type(scene, store, progress, workers)
+        missing = study.run(stop)
+        missing += [FIGURES] if stop and scene.want.figures else []
+        groups = study.groups()
+        for name in ("contact", "joints/closure"):
+            if name in groups:
+                warn(implausible_result(name, groups[name]))
+        tree = _assemble(scene, groups, study.seconds, choices, missing)
+        if folder is None:
+            return tree
+        if missing:
+            netcdf.save(tree, folder / PARTIAL_RESULT)
+            raise signals.Stopped(
+                stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
+            )
+        if scene.want.figures:
+            _draw(tree, folder, progress, paper=scene.paper)
+        netcdf.save(tree, folder / RESULT)
+        (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+        store.clear()
+    return tree
+
+
+def _check_workers(workers: int, client: Any) -> None:
+    with Problems("fractalcontact.scenes.run") as problems:
+        if problems.integer("workers", workers, at_least=0) and workers:
+            problems.require(client is None, "workers / client", "one of them", "both")
+        workers_of(client)
+
+
+def _assemble(
+    scene: Scene,
+    results: Mapping[str, xr.Dataset],
+    seconds: Mapping[str, float],
+    choices: Sequence[Choice],
+    missing: list[str],
+) -> xr.DataTree:
+    """Return the finished results as a tree that states what is missing."""
+    groups = {"/": xr.Dataset()} | {f"/{name}": result for name, result in results.items()}
+    description = groups.pop("/surfaces/description", None)
+    if description is not None:
+        heights = groups.get("/surfaces", xr.Dataset())
+        attributes = heights.attrs or description.attrs
+        groups["/surfaces"] = heights.assign(description.data_vars).assign_attrs(attributes)
+    tree = xr.DataTree.from_dict(
+        {path: schema.encoded(dataset) for path, dataset in groups.items()}, name=scene.name
+    )
+    root = xr.Dataset()
+    provenance.stamp(
+        root,
+        "fractalcontact.scenes.run",
+        {"scene": dict(scene.tables)},
+        title=str(scene.tables.get("title", scene.name)),
+        references=provenance.PAPER if scene.paper else OWN_REFERENCES,
+        stages={
+            name: {
+                "run_time": second,
+                "origin": "computed" if second else "kept from an earlier run",
+                **(_achieved(results[name]) if name in results else {}),
+            }
+            for name, second in seconds.items()
+        },
+    )
+    tree.attrs = root.attrs
+    if choices:
+        tree.attrs["selected"] = "; ".join(map(str, choices))
+    if missing:
+        tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
+    return tree
+
+
+def _achieved(result: xr.Dataset) -> dict[str, Any]:
+    """Return the accuracy that a result reports: numbers, or words where it has none."""
+    facts: dict[str, Any] = {}
+    if "residual" in result:
+        facts["residual"] = float(result["residual"].max())
+    if "converged" in result:
+        facts["converged"] = bool(result["converged"].all())
+    if "iterations" in result:
+        facts["iterations"] = int(result["iterations"].sum())
+    if "standard_error" in result:
+        errors = [f"{float(v):.4f}" for v in result["standard_error"].values.ravel() if np.isfinite(v)]
+        facts["standard error of H"] = " ".join(errors) or "none"
+    if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
+        facts["interpolation error (m)"] = float(result["interpolation_error"].max())
+    words = json.loads(result.attrs.get("provenance", "{}")).get("achieved_error")
+    return facts if facts or words is None else {"error": words}
+
+
+def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> None:
+    """Draw the figures and note the time they took."""
+    from fractalcontact import plotting
+
+    start = time.perf_counter()
+    plotting.draw(first_member(tree), folder, progress=progress, paper=paper)
+    entry = json.loads(tree.attrs["provenance"])
+    entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
+    tree.attrs["provenance"] = json.dumps(entry)

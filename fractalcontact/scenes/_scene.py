@@ -1,0 +1,193 @@
+"""A study as its TOML file declares it: typed tables, and the `Scene` that holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fractalcontact.scenes._stages import StageType
+
+Table = Mapping[str, Any]
+LOADS = ("closure", "normal_force", "nominal_pressure")
+
+
+def _number(**bounds: float) -> Any:
+    """Return a field for a number inside bounds (`above`, `at_least`, `below`)."""
+    return field(default=None, metadata={"bounds": bounds})
+
+
+@dataclass(frozen=True)
+class SurfaceTable:
+    """`[surface]` or `[upper]`: the source of the heights and how they are prepared.
+
+    Attributes
+    ----------
+    read, sample, generate : str, optional
+        One of them is given: a file, a shipped surface, or the generator.
+    level, despike, fill
+        Preparation of the heights.
+    members, member : int, optional
+        Size of an ensemble of generated surfaces, or the number of one of its members.
+    options : mapping
+        The other keys: arguments of `surfaces.read` or of the generator.
+    """
+
+    read: str | None = None
+    sample: str | None = None
+    generate: str | None = None
+    level: int | None = None
+    despike: bool = False
+    fill: bool = False
+    members: int | None = None
+    member: int | None = None
+    options: Table = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MaterialTable:
+    """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa)."""
+
+    young: float | None = _number(above=0.0)
+    poisson: float | None = _number(above=-1.0, below=0.5)
+    basic_friction_angle: float | None = _number(at_least=0.0, below=90.0)
+    hardness: float | None = _number(above=0.0)
+
+
+@dataclass(frozen=True)
+class JointTable:
+    """`[joint]`: the block that slides and the arguments of the stages of a joint.
+
+    Attributes
+    ----------
+    block : float or pair of float, optional
+        Edges of the upper block, m.
+    register : bool
+        Bring two measured faces into mated position first.
+    options : mapping
+        Arguments common to all stages.
+    stages : mapping
+        `[joint.closure]` and so on: arguments of one stage, which replace the common ones.
+    """
+
+    block: Any = None
+    register: bool = False
+    options: Table = field(default_factory=dict)
+    stages: Mapping[str, Table] = field(default_factory=dict)
+
+    @property
+    def loads(self) -> list[str]:
+        """The loads of the closure laws: those of `[joint.closure]`, else those of `[joint]`."""
+        own = [key for key in LOADS if key in self.stages.get("closure", {})]
+        return own or [key for key in LOADS if key in self.options]
+
+
+@dataclass(frozen=True)
+class WantTable:
+    """`[want]`: the results to compute, the maps to store, and whether to draw figures."""
+
+    surfaces: tuple[str, ...] = ()
+    dimensions: tuple[str, ...] = ()
+    contact: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    domains: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()
+    figures: bool = False
+
+
+MATERIAL_KEYS = tuple(entry.name for entry in fields(MaterialTable))
+WANT_KEYS = tuple(entry.name for entry in fields(WantTable))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A study as it was declared: the input and the wanted results.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the scene file.
+    tables : mapping
+        The file as parsed; ranges are expanded to lists.
+    folder : Path
+        Relative paths of the scene start here.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> scene = fc.scenes.load("rigid_sliding")
+    >>> scene.name, scene.want.joints
+    ('rigid_sliding', ('rigid_dilatancy',))
+    >>> scene.material.young
+    30000000000.0
+    """
+
+    name: str
+    tables: Table
+    folder: Path
+
+    def table(self, name: str) -> Table:
+        """Return one table as parsed; empty if the scene has none."""
+        return self.tables.get(name) or {}
+
+    @cached_property
+    def surface(self) -> SurfaceTable:
+        """The lower, or only, surface."""
+        return _surface_table(self.table("surface"))
+
+    @cached_property
+    def upper(self) -> SurfaceTable | None:
+        """The upper face of a joint; None where it is the mated copy of the lower one."""
+        return _surface_table(self.table("upper")) if "upper" in self.tables else None
+
+    @cached_property
+    def material(self) -> MaterialTable:
+        """The material of both bodies."""
+        return MaterialTable(**self.table("material"))
+
+    @cached_property
+    def joint(self) -> JointTable:
+        """The joint and its stages."""
+        table = self.table("joint")
+        stages = {key: value for key, value in table.items() if isinstance(value, dict)}
+        options = {key: value for key, value in table.items() if key not in stages}
+        return JointTable(options.pop("block", None), bool(options.pop("register", False)), options, stages)
+
+    @cached_property
+    def want(self) -> WantTable:
+        """The wanted results."""
+        table = self.table("want")
+        words = {key: self.wanted(key) for key in table if key != "figures"}
+        return WantTable(**words, figures=bool(table.get("figures", False)))
+
+    @property
+    def paper(self) -> bool:
+        """Whether the study is compared with the paper of 1998 and draws its figures."""
+        return self.tables.get("paper") is True
+
+    def wanted(self, subpackage: str) -> tuple[str, ...]:
+        """Return the words that `[want]` gives for a subpackage."""
+        words = self.table("want").get(subpackage, ())
+        return (words,) if isinstance(words, str) else tuple(words)
+
+    def stage_options(self, stage: StageType, keys: Iterable[str] | None = None) -> dict[str, Any]:
+        """Return the arguments that the scene gives to a stage.
+
+        Those of its own table (`[joint.closure]`) come before those of the whole table (`[joint]`).
+        """
+        name, _, word = stage.table.partition(".")
+        table = self.table(name)
+        # a stage may have the name of an argument ([joint.closure]), so sub-tables are not values
+        options = {key: value for key, value in table.items() if not isinstance(value, dict)}
+        own = table.get(word)
+        options |= own if isinstance(own, dict) else {}
+        allowed = stage.arguments() if keys is None else tuple(keys)
+        return {key: options[key] for key in allowed if key in options}
+
+
+def _surface_table(table: Table) -> SurfaceTable:
+    typed = {entry.name for entry in fields(SurfaceTable)} - {"options"}
+    own = {key: value for key, value in table.items() if key in typed}
+    return SurfaceTable(**own, options={key: value for key, value in table.items() if key not in typed})

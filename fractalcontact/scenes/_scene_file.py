@@ -1,0 +1,286 @@
+"""Reading a scene file: TOML in, a `Scene` with valid keys and values out."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.datasets import datasets_folder
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.validation import Problems, did_you_mean
+from fractalcontact.scenes._plan import check_loads
+from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, WANT_KEYS, MaterialTable, Scene, Table
+from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, WANTED, arguments_of
+
+GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
+SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
+READING = ("read", "sample", "channel", "units", "spacing", "level", "despike", "fill")
+SETTINGS = ("title", "paper", "error", "budget")
+TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
+EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
+LONGEST_RANGE = 1_000_000
+COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
+
+# bounds of the arguments that several stages share: one number, or one or several
+ONE_NUMBER: dict[str, dict[str, Any]] = {
+    "contact_modulus": {"above": 0.0},
+    "tolerance": {"above": 0.0, "below": 1.0},
+    "smoothing": {"above": 0.0},
+    "viscosity": {"above": 0.0},
+    "hardness": {"above": 0.0},
+}
+NUMBERS: dict[str, dict[str, Any]] = {
+    "block": {"above": 0.0},
+    "spacing": {"above": 0.0},
+    "shear": {"at_least": 0.0},
+    **{load: {"at_least": 0.0} for load in LOADS},
+}
+
+
+def load(path: str | os.PathLike[str]) -> Scene:
+    """Read a scene and check all that can be checked without its surfaces.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file; where no such file exists, the name of a shipped scene ("concrete_crack").
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidInput
+        Lists every unknown key, missing table and invalid value.
+    UnreadableFile
+        There is no such file, or it is not TOML.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> scene = fc.scenes.load("pressed_face")
+    >>> len(scene.table("contact")["nominal_pressure"])  # a range is expanded
+    12
+    """
+    scene, problems = parse(path)
+    if problems:
+        raise InvalidInput(f"scene {scene.name}", problems)
+    return scene
+
+
+def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
+    """Read a scene; return it with a list of its problems."""
+    source = _find(Path(path))
+    try:
+        tables = tomllib.loads(source.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
+    problems = Problems(f"scene {source.stem}")
+    tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
+    scene = Scene(source.stem, tables, source.resolve().parent)
+    _check(scene, problems)
+    if not problems.messages:
+        problems.messages += check_loads(scene)
+    return scene, problems.messages
+
+
+def _find(path: Path) -> Path:
+    if path.is_file():
+        return path
+    shipped = datasets_folder() / f"{path.name.removesuffix('.toml')}.toml"
+    if path.parent.name in ("", "datasets") and shipped.is_file():
+        return shipped
+    names = ", ".join(sorted(scene.stem for scene in datasets_folder().glob("*.toml")))
+    raise UnreadableFile(
+        "scene", [f"path: expected a scene file or one of {names}, got {path.name!r}: no such file"]
+    )
+
+
+def _expand_ranges(value: Any, key: str, problems: Problems) -> Any:
+    """Replace the ranges {start, stop, step} and {first, last, count} (logarithmic) by lists."""
+    if not isinstance(value, dict):
+        return value
+    for words in (EVEN, LOGARITHMIC):
+        if value and set(value) <= set(words):
+            return _range(value, words, key, problems)
+    return {word: _expand_ranges(item, f"{key}.{word}", problems) for word, item in value.items()}
+
+
+def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -> Any:
+    """Return the list of a range; a range with problems stays as it is."""
+    expected = f"a number (a range has {', '.join(words)})"
+    checks = [
+        problems.number(f"{key}.{word}", value[word])
+        if problems.require(word in value, f"{key}.{word}", expected, "none")
+        else False
+        for word in words
+    ]
+    if not all(checks):
+        return value
+    low, high, number = (float(value[word]) for word in words)
+    if words is EVEN:
+        valid = number > 0 and high >= low and (high - low) / number < LONGEST_RANGE
+        expected = "a range with step > 0, stop >= start and at most 10^6 entries"
+        if not problems.require(valid, key, expected, value):
+            return value
+        return [low + number * index for index in range(round((high - low) / number) + 1)]
+    valid = low > 0 and high > 0 and 1 <= number < LONGEST_RANGE and number == int(number)
+    expected = "a logarithmic range with first, last > 0 and an integer count >= 1"
+    if not problems.require(valid, key, expected, value):
+        return value
+    return [float(entry) for entry in np.geomspace(low, high, int(number))]
+
+
+def _check(scene: Scene, problems: Problems) -> None:
+    _check_keys(scene.tables, (*SETTINGS, *TABLES), "", problems)
+    _check_settings(scene.tables, problems)
+    not_tables = [name for name in TABLES if not isinstance(scene.tables.get(name, {}), dict)]
+    for name in not_tables:
+        problems.add(name, "a table", scene.tables[name])
+    if not_tables:
+        return
+    _check_surface(scene.table("surface"), "surface", problems)
+    if "upper" in scene.tables:
+        _check_surface(scene.table("upper"), "upper", problems)
+    _check_material(scene.table("material"), problems)
+    if "contact" in scene.tables:
+        _check_keys(scene.table("contact"), arguments_of("contact.press")[0], "contact", problems)
+        _check_numbers(scene.table("contact"), "contact", problems)
+    if "dimensions" in scene.tables:
+        keys = [key for key in arguments_of("dimensions.estimate")[0] if key != "methods"]  # from [want]
+        _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
+    if "joint" in scene.tables:
+        _check_stages(scene.table("joint"), "joint", _joint_keys(), JOINT_STAGES, problems)
+    if "domains" in scene.tables:
+        _check_stages(scene.table("domains"), "domains", (), DOMAIN_STAGES, problems)
+    _check_want(scene, problems)
+
+
+def _check_settings(tables: Table, problems: Problems) -> None:
+    if "error" in tables and "budget" in tables:
+        problems.add("error / budget", "one of them", "both")
+    if "error" in tables:
+        problems.number("error", tables["error"], above=0, below=1)
+    if "budget" in tables:
+        problems.number("budget", tables["budget"], above=0)
+    problems.boolean("paper", tables.get("paper", False))
+
+
+def _check_surface(table: Table, name: str, problems: Problems) -> None:
+    sources = [source for source in ("read", "sample", "generate") if source in table]
+    if len(sources) != 1:
+        problems.add(name, "one of `read`, `sample` or `generate`", sources or "none")
+    elif sources == ["generate"]:
+        if problems.choice(f"{name}.generate", table["generate"], GENERATORS):
+            generator = table["generate"]
+            keys, required = arguments_of(f"surfaces.{generator}")
+            _check_keys(table, (*keys, "generate", "level"), name, problems)
+            for key in sorted(required - set(table)):
+                problems.add(f"{name}.{key}", f"a value for {generator}", "none")
+        if "members" in table:
+            problems.integer(f"{name}.members", table["members"], at_least=1)
+    else:
+        _check_keys(table, READING, name, problems)
+        if sources == ["read"]:
+            problems.require(isinstance(table["read"], str), f"{name}.read", "a path", table["read"])
+        else:
+            problems.choice(f"{name}.sample", table["sample"], SAMPLES)
+    _check_numbers(table, name, problems)
+
+
+def _check_material(table: Table, problems: Problems) -> None:
+    _check_keys(table, MATERIAL_KEYS, "material", problems)
+    for entry in fields(MaterialTable):
+        if entry.name in table:
+            problems.number(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
+
+
+def _joint_keys() -> tuple[str, ...]:
+    """Return the keys of `[joint]`: the block, `register`, and the arguments of all stages."""
+    stages = (STAGES[f"joints/{name}"] for name in JOINT_STAGES)
+    return tuple(dict.fromkeys(["block", "register", *(key for row in stages for key in row.arguments())]))
+
+
+def _check_stages(
+    table: Table, name: str, common: tuple[str, ...], stages: tuple[str, ...], problems: Problems
+) -> None:
+    """Check a table whose sub-tables are the arguments of single stages."""
+    own = {key: value for key, value in table.items() if isinstance(value, dict) and key in stages}
+    rest = {key: value for key, value in table.items() if key not in own}
+    _check_keys(rest, common, name, problems, similar=stages)
+    _check_numbers(rest, name, problems)
+    subpackage = "joints" if name == "joint" else name
+    for stage, options in own.items():
+        _check_keys(options, STAGES[f"{subpackage}/{stage}"].arguments(), f"{name}.{stage}", problems)
+        _check_numbers(options, f"{name}.{stage}", problems)
+
+
+def _check_want(scene: Scene, problems: Problems) -> None:
+    table = scene.table("want")
+    if not table:
+        problems.add("want", "a table that names at least one result", "none")
+    _check_keys(table, WANT_KEYS, "want", problems)
+    valid = [
+        problems.choices(f"want.{name}", table[name], words)
+        for name, words in WANTED.items()
+        if name in table
+    ]
+    if "dimensions" in table:
+        from fractalcontact import dimensions  # only here: it imports the estimators
+
+        names = ("default", *dimensions.methods())
+        valid.append(problems.choices("want.dimensions", table["dimensions"], names))
+    problems.boolean("want.figures", table.get("figures", False))
+    if all(valid):
+        _check_needed_tables(scene, problems)
+
+
+def _check_needed_tables(scene: Scene, problems: Problems) -> None:
+    """Check that the material and the load are there where a wanted result needs them."""
+    contact, material = scene.table("contact"), scene.table("material")
+    if scene.wanted("joints") or (scene.wanted("domains") and not scene.wanted("contact")):
+        for key in ("young", "poisson"):
+            problems.require(key in material, f"material.{key}", "a value", "none")
+    if scene.wanted("contact"):
+        expected = "a value, or young and poisson in [material]"
+        given = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
+        problems.require(given, "contact.contact_modulus", expected, "none")
+        expected = "exactly one of closure, normal_force, nominal_pressure"
+        one_load = sum(key in contact for key in LOADS) == 1
+        problems.require(one_load, "contact", expected, sorted(contact) or "none")
+
+
+def _check_numbers(table: Table, name: str, problems: Problems) -> None:
+    for key, bounds in ONE_NUMBER.items():
+        if key in table:
+            problems.number(f"{name}.{key}", table[key], **bounds)
+    for key, bounds in NUMBERS.items():
+        if key in table:
+            problems.numbers(f"{name}.{key}", table[key], **bounds)
+    if "direction" in table:
+        _check_direction(table["direction"], f"{name}.direction", problems)
+
+
+def _check_direction(value: Any, place: str, problems: Problems) -> None:
+    for direction in value if isinstance(value, list) else [value]:
+        azimuth = isinstance(direction, (int, float)) and not isinstance(direction, bool)
+        valid = direction in COMPASS or (azimuth and abs(direction) < 1e9)
+        problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", direction)
+
+
+def _check_keys(
+    table: Table, allowed: Iterable[str], name: str, problems: Problems, similar: Iterable[str] = ()
+) -> None:
+    words = tuple(allowed)
+    for key in table:
+        if key not in words:
+            place = f"{name}.{key}" if name else key
+            hint = did_you_mean(key, (*words, *similar))
+            problems.add(place, f"one of the keys {', '.join(words) or 'none'}", f"an unknown key{hint}")

@@ -1,0 +1,154 @@
+"""The stages of a study as one static table: what each needs, its public function, the maps it reads.
+
+The rows stand in an order in which they can run. `_plan` selects the rows that the wanted results of a scene
+need, `_parts` carries them out.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
+FIGURES = "figures"
+
+# arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
+_FROM_SCENE = frozenset(
+    ("surface", "crack", "mask", "valid", "gap", "dilatancy", "keep", "progress", "basic_friction_angle")
+)
+
+
+@dataclass(frozen=True)
+class StageType:
+    """One row of the table of stages.
+
+    Attributes
+    ----------
+    name : str
+        Group of its result, "joints/closure" for example.
+    needs : tuple of str
+        Stages whose results it takes, where the study has them; of "a or b" the first that the study has.
+    function : str
+        The public function that computes it, for example "joints.closure".
+    table : str
+        Table of the scene with the arguments of the function.
+    reads : str
+        The map that it reads from the stage it needs.
+    keeps : tuple of str
+        The maps that it can store.
+    whole_path : bool
+        It follows the contact set along the load path, and reads the maps of all steps at once.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    function: str
+    table: str = ""
+    reads: str = ""
+    keeps: tuple[str, ...] = ()
+    whole_path: bool = False
+
+    @property
+    def subpackage(self) -> str:
+        """The subpackage that holds the function."""
+        return self.name.partition("/")[0]
+
+    @property
+    def word(self) -> str:
+        """The name without its group."""
+        return self.name.partition("/")[2]
+
+    def arguments(self) -> tuple[str, ...]:
+        """Return the arguments of the function that a scene may give."""
+        if self.name == "joints/rigid_dilatancy":
+            return ("shear", "direction")
+        return arguments_of(self.function)[0]
+
+
+_SURFACE = ("surfaces",)
+_FACES = ("surfaces", "joints/faces")
+
+
+def _curve(method: str) -> StageType:
+    return StageType(f"dimensions/{method}", _SURFACE, f"dimensions.{method}")
+
+
+def _joint(name: str, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any) -> StageType:
+    return StageType(f"joints/{name}", needs, f"joints.{function or name}", f"joint.{name}", **more)
+
+
+def _domain(name: str, **more: Any) -> StageType:
+    source = ("contact or joints/closure",)
+    return StageType(f"domains/{name}", source, f"domains.{name}", f"domains.{name}", reads="state", **more)
+
+
+_ROWS = (
+    StageType("surfaces", (), "surfaces.read", "surface"),
+    StageType("surfaces/description", _SURFACE, "surfaces.describe"),
+    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions"),
+    _curve("spectrum"),
+    _curve("variogram"),
+    _curve("madogram"),
+    _curve("second_variogram"),
+    _curve("cube_counts"),
+    _curve("roughness_length"),
+    _curve("variation"),
+    _curve("covering"),
+    StageType("contact", _SURFACE, "contact.press", "contact", keeps=CONTACT_MAPS),
+    StageType("joints/faces", _SURFACE, "joints.register", "upper"),
+    _joint("delta_surface"),
+    _joint("rigid_dilatancy", function="dilatancy"),
+    _joint("closure", keeps=CONTACT_MAPS),
+    _joint("elastic_dilatancy", function="dilatancy"),
+    _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
+    _joint("decorrelation_length"),
+    _joint("transmissivity", ("joints/closure",), reads="gap"),
+    _domain("box_dimension"),
+    _domain("box_counts"),
+    _domain("minkowski_dimension"),
+    _domain("correlation_dimension"),
+    _domain("generalised_dimensions"),
+    _domain("boundary_dimension"),
+    _domain("lacunarity"),
+    _domain("islands", keeps=(ISLAND_MAP,), whole_path=True),
+    _domain("percolation"),
+    _domain("describe"),
+    _domain("evolution", whole_path=True),
+    _domain("lineage", whole_path=True),
+)
+STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
+
+
+def _words(subpackage: str, leave_out: Iterable[str] = ()) -> tuple[str, ...]:
+    rows = (row for row in _ROWS if row.subpackage == subpackage and row.word)
+    return tuple(row.word for row in rows if row.word not in leave_out)
+
+
+CURVES = _words("dimensions")
+JOINT_STAGES = _words("joints", leave_out=("faces",))
+DOMAIN_STAGES = _words("domains")
+# the words of [want]; those of its `dimensions` are the names of the estimators
+WANTED: Mapping[str, tuple[str, ...]] = {
+    "surfaces": ("height", "describe"),
+    "contact": ("press",),
+    "joints": JOINT_STAGES,
+    "domains": DOMAIN_STAGES,
+    "keep": (*CONTACT_MAPS, ISLAND_MAP),
+}
+
+
+def public_function(name: str) -> Callable[..., Any]:
+    """Return a public function by the name under which users call it, "contact.press" for example."""
+    subpackage, _, function = name.partition(".")
+    return getattr(importlib.import_module(f"fractalcontact.{subpackage}"), function)  # type: ignore[no-any-return]
+
+
+def arguments_of(function: str) -> tuple[tuple[str, ...], frozenset[str]]:
+    """Return the arguments of a public function that a scene may give, and those without a default."""
+    parameters = inspect.signature(public_function(function)).parameters
+    allowed = {key: value for key, value in parameters.items() if key not in _FROM_SCENE}
+    required = frozenset(key for key, value in allowed.items() if value.default is value.empty)
+    return tuple(allowed), required

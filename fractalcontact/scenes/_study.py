@@ -1,0 +1,172 @@
+"""One run of a scene with one surface: every stage of its plan, every part once, resumed where it stopped."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import xarray as xr
+
+from fractalcontact.base import signals
+from fractalcontact.base.progress import track
+from fractalcontact.scenes._checkpoint import PartStore, digest
+from fractalcontact.scenes._executor import Workers, run_tasks
+from fractalcontact.scenes._parts import (
+    PartWithReaders,
+    Precomputed,
+    StageWork,
+    map_reader,
+    stage_work,
+    without,
+)
+from fractalcontact.scenes._plan import Stage, stages_of, stored_maps
+from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stages import FIGURES
+
+
+@dataclass(frozen=True, repr=False)
+class _PartTask:
+    """A part of a stage with the stages that read it, and the names under which their results are kept."""
+
+    part: PartWithReaders
+    keys: tuple[str, ...]
+
+    def __call__(self, store: PartStore, stop: signals.Stop) -> tuple[list[xr.Dataset], list[float]] | None:
+        """Return the results and the seconds each took; None if a stop was requested before it began."""
+        if stop:
+            return None
+        results, seconds = self.part()
+        for key, result in zip(self.keys, results, strict=False):
+            store.put(key, result)
+        return results, seconds
+
+
+class Study:
+    """One run of a scene with one surface: the results so far and the time they took.
+
+    Attributes
+    ----------
+    parts : dict
+        Results of the finished parts of each stage, by number.
+    results : dict
+        Joined results of the finished stages.
+    spent : dict
+        Seconds that each stage took in this run.
+    """
+
+    def __init__(self, scene: Scene, store: PartStore, progress: bool, workers: Workers | None) -> None:
+        self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
+        self.plan = stages_of(scene)
+        self.parts: dict[str, dict[int, xr.Dataset]] = {}
+        self.results: dict[str, xr.Dataset] = {}
+        self.spent: dict[str, float] = {}
+        self.digests: dict[str, str] = {}
+        self.works: dict[str, StageWork] = {}
+        for stage in self.plan:
+            self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped_maps(stage))
+
+    def run(self, stop: signals.Stop) -> list[str]:
+        """Run the stages in order; return what is missing if a stop was requested."""
+        stages = [stage for stage in self.plan if stage.name != FIGURES]
+        for number, stage in enumerate(track(stages, self.progress, self.scene.name, unit="stage")):
+            count = self._run_stage(stage, stop)
+            total = len(self.works[stage.name].parts)
+            if stop:
+                rest = [other.name for other in stages[number + 1 :]]
+                part = [f"{stage.name} ({count} of {total} parts done)"] if count < total else []
+                return part + rest
+        return []
+
+    def _run_stage(self, stage: Stage, stop: signals.Stop) -> int:
+        """Run the missing parts of a stage; return the number of finished ones."""
+        readers = self._part_readers(stage)
+        work = self.works[stage.name] = stage_work(stage, self.scene, self.results, self.works)
+        done = self.parts.setdefault(stage.name, {})
+        names = [stage.name, *(reader.name for reader in readers)]
+        for name in names:
+            self._load_kept(name, len(work.parts))
+        missing = [n for n in range(len(work.parts)) if any(n not in self.parts[name] for name in names)]
+        show_parts = self.progress and len(missing) > 1
+        workers = self.workers if len(missing) > 1 else None
+        finished = run_tasks(self._tasks(stage, work, readers, missing), self.store, stop, workers)
+        bar = track(finished, show_parts, stage.name, unit="part", total=len(missing))
+        for number, (results, seconds) in bar:
+            for name, result, spent in zip(names, results, seconds, strict=True):
+                self.parts[name][number] = result
+                self.spent[name] = self.spent.get(name, 0.0) + spent
+        start = time.perf_counter()
+        joined = work.join(done)
+        if joined is not None:
+            self.results[stage.name] = joined
+        self.spent.setdefault(stage.name, 0.0)
+        if missing:
+            self.spent[stage.name] += time.perf_counter() - start
+        return len(done)
+
+    def _load_kept(self, name: str, count: int) -> None:
+        """Load the parts of a stage that an earlier run kept."""
+        parts = self.parts.setdefault(name, {})
+        for number in range(count):
+            kept = None if number in parts else self.store.get(self._key(name, number))
+            if kept is not None:
+                parts[number] = kept
+
+    def _tasks(
+        self, stage: Stage, work: StageWork, readers: list[Stage], missing: list[int]
+    ) -> dict[int, _PartTask]:
+        """Return the missing parts of a stage, each with the stages that read its maps."""
+        dropped = self._dropped_maps(stage)
+        functions = tuple(map_reader(reader, self.scene) for reader in readers)
+        names = [stage.name, *(reader.name for reader in readers)]
+        if _is_fast_to_repeat(stage, self.scene):
+            names = []
+        tasks = {}
+        for number in missing:
+            kept = self.parts[stage.name].get(number)
+            has_maps = kept is not None and all(name in kept for name in stage.keep)
+            part = Precomputed(kept) if kept is not None and has_maps else work.parts[number]
+            keys = tuple(self._key(name, number) for name in names)
+            tasks[number] = _PartTask(PartWithReaders(part, functions, dropped), keys)
+        return tasks
+
+    def _part_readers(self, stage: Stage) -> list[Stage]:
+        """Return the stages that read the maps of this one part by part, before the maps are dropped."""
+        return [other for other in self.plan if stage.name in other.needs and other.reads_part]
+
+    def _dropped_maps(self, stage: Stage) -> tuple[str, ...]:
+        """Return the maps of a stage that nothing needs after the readers of each part."""
+        read = {
+            other.row.reads
+            for other in self.plan
+            if stage.name in other.needs and other.reads_map and not other.reads_part
+        }
+        return tuple(name for name in self._internal_maps(stage) if name not in read)
+
+    def _internal_maps(self, stage: Stage) -> tuple[str, ...]:
+        """Return the maps of a stage that are not stored."""
+        return tuple(name for name in stage.keep if name not in stored_maps(self.scene))
+
+    def _key(self, name: str, number: int) -> str:
+        return f"{name.replace('/', '.')}.{self.digests[name]}.{number:03d}"
+
+    def groups(self) -> dict[str, xr.Dataset]:
+        """Return the wanted results of the finished stages, without the maps that only other stages read."""
+        return {
+            stage.name: without(self.results[stage.name], self._internal_maps(stage))
+            for stage in self.plan
+            if stage.stored and stage.name in self.results
+        }
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds that the finished stages took in this run."""
+        return {name: self.spent[name] for name in self.results}
+
+
+def _is_fast_to_repeat(stage: Stage, scene: Scene) -> bool:
+    """Whether a surface is generated, or read from its own file, as fast as from a kept part."""
+    if stage.name not in ("surfaces", "joints/faces"):
+        return False
+    table = scene.surface if stage.name == "surfaces" else scene.upper
+    registers = stage.name == "joints/faces" and scene.joint.register
+    return not (registers or (table is not None and (table.despike or table.fill)))

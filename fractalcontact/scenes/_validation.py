@@ -1,0 +1,193 @@
+"""Validation of a scene together with its surfaces, before anything is computed or written.
+
+The options that the study will use are constructed (`joints.Crack`), and the `validate` of every public
+function that it will call is given the arguments of that call.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._inputs import (
+    PRESSING,
+    contact_options,
+    crack_options,
+    generator_options,
+    joint_options,
+    read_surface,
+    spacing_of,
+)
+from fractalcontact.scenes._parts import map_reader
+from fractalcontact.scenes._plan import Stage, stages_of
+from fractalcontact.scenes._plausibility import implausible_input, warn
+from fractalcontact.scenes._scene import Scene, SurfaceTable
+from fractalcontact.scenes._scene_file import parse
+from fractalcontact.scenes._stages import JOINT_STAGES, public_function
+
+if TYPE_CHECKING:
+    from fractalcontact.joints import Crack
+
+LARGE = 1 << 18  # points of a generated surface that is not made twice
+
+
+def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
+    """Find all problems of a scene before anything is computed or written.
+
+    The surfaces are read or generated for that; a large generated one is replaced by a flat one of its size.
+
+    Parameters
+    ----------
+    scene : Scene or path-like
+
+    Returns
+    -------
+    Scene
+
+    Warns
+    -----
+    ScaleWarning
+        A slope or a pressure is implausible: a value in another unit, for example.
+
+    Raises
+    ------
+    InvalidInput
+        Lists all problems of the tables, the surfaces, the block, the material and the loads together.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> fc.scenes.validate("rigid_sliding").name
+    'rigid_sliding'
+    """
+    if isinstance(scene, Scene):
+        _validate(scene)
+        return scene
+    scene, problems = parse(scene)
+    if not problems:
+        _validate(scene)
+        return scene
+    try:
+        _validate(scene)
+    except InvalidInput as error:
+        problems += [line for line in error.problems if not _is_listed(line, problems)]
+    except Exception:  # invalid values may fail anywhere, in any way; their own problems are listed already
+        pass
+    raise InvalidInput(f"scene {scene.name}", problems)
+
+
+def _is_listed(line: str, problems: list[str]) -> bool:
+    """Return whether a problem of a surface or of the joint is already listed under its key in the scene."""
+    key, separator, _ = line.partition(": expected")
+    listed = (problem.partition(": expected")[0] for problem in problems)
+    return bool(separator) and any(other.endswith(key.rpartition(" ")[2]) for other in listed)
+
+
+def _validate(scene: Scene) -> None:
+    with Problems(f"scene {scene.name}") as problems:
+        surfaces = _validate_surfaces(scene, problems)
+        joint_presses = bool(scene.want.domains) and not scene.want.contact
+        if not problems.messages and (scene.want.joints or joint_presses):
+            _validate_shears(scene, surfaces, problems)
+        if not problems.messages:
+            _validate_calls(scene, surfaces, problems)
+    warn(implausible_input(scene, surfaces["surface"]))
+
+
+def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArray]:
+    """Return the surfaces of the scene; of an ensemble one."""
+    surfaces = {}
+    for name, table in (("surface", scene.surface), ("upper", scene.upper)):
+        if table is not None and (name == "surface" or scene.want.joints):
+            with problems.collect(f"{name}: "):
+                if table.generate is not None:
+                    _validate_call(f"surfaces.{table.generate}", **generator_options(table))
+                flat = _flat_surface(table)
+                surfaces[name] = read_surface(table, scene.folder) if flat is None else flat
+    return surfaces
+
+
+def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
+    """Return a flat surface in place of a large generated one; None for all others."""
+    if table.generate is None:
+        return None
+    shape = table.options["shape"]
+    shape = shape if isinstance(shape, list) else [shape] * 2
+    if math.prod(shape) < LARGE:
+        return None
+    from fractalcontact import surfaces
+
+    return surfaces.from_array(np.zeros(shape), table.options["spacing"])
+
+
+def _validate_shears(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
+    """Check the block and the shears, which must not push it off its face."""
+    from fractalcontact import joints
+
+    with problems.collect("joint: "):
+        crack = joints.Crack(surfaces["surface"], surfaces.get("upper"), **crack_options(scene))
+        for stage in stages_of(scene):
+            name = stage.name.partition("/")[2]
+            if stage.name.startswith("joints/") and name in JOINT_STAGES:
+                given = scene.stage_options(stage.row, ("shear", "direction"))
+                if "shear" in given:
+                    _validate_travel(crack, given, stage, problems)
+
+
+def _validate_travel(crack: Crack, given: dict[str, Any], stage: Stage, problems: Problems) -> None:
+    default = ("E", "N", "W", "S") if stage.name.endswith("dilatancy") else "E"
+    directions = given.get("direction", default)
+    longest = float(np.max(given["shear"]))
+    for direction in directions if isinstance(directions, (list, tuple)) else [directions]:
+        travel = crack.travel(direction)
+        if longest > travel * (1.0 + 1e-6):
+            problems.add(f"{stage.name}: shear", f"at most {travel:g} m towards {direction}", longest)
+
+
+def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
+    """Validate every call of the study; zeros replace the result of an earlier stage."""
+    surface, upper = surfaces["surface"], surfaces.get("upper")
+    is_flat = _flat_surface(scene.surface) is not None  # which loads are possible depends on the heights
+    crack = None
+    for stage in stages_of(scene):
+        name = stage.name.partition("/")[2]
+        with problems.collect(f"{stage.name}: "):
+            if stage.name == "dimensions":
+                options = dict(scene.table("dimensions"))
+                _validate_call(stage.row.function, surface, list(scene.want.dimensions), **options)
+            elif stage.name == "contact" and not is_flat:
+                _validate_call(stage.row.function, surface, keep=stage.keep, **contact_options(scene))
+            elif stage.reads_map:
+                reader, maps = map_reader(stage, scene), _zero_maps(scene, surface)
+                _validate_call(
+                    reader.function, maps if reader.variable == "gap" else maps > 0, **reader.options
+                )
+            elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
+                if scene.joint.register or (is_flat and name in PRESSING):
+                    continue
+                if crack is None:
+                    crack = public_function("joints.Crack")(surface, upper, **crack_options(scene))
+                options = joint_options(scene, name) | ({"keep": stage.keep} if stage.row.keeps else {})
+                _validate_call(stage.row.function, crack, **options)
+
+
+def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
+    public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
+
+
+def _zero_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
+    """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
+    from fractalcontact import surfaces
+
+    is_surface = bool(scene.want.contact) or scene.joint.block is None
+    spacing = spacing_of(surface)
+    edges = np.broadcast_to(0.0 if is_surface else scene.joint.block, 2)
+    cells = surface.shape if is_surface else tuple(np.rint(edges / spacing).astype(int).tolist())
+    periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
+    return surfaces.from_array(np.zeros(cells), spacing, periodic=periodic).expand_dims(step=2)
