@@ -1,4 +1,4 @@
-from ._area_scaling import area_dimension as area_dimension
+from ._area_dimension import area_dimension as area_dimension
 from ._boundary import boundary_dimension as boundary_dimension
 from ._box_counting import box_counts as box_counts
 from ._box_counting import box_dimension as box_dimension

@@ -1,4 +1,4 @@
-"""Area scaling: how the area of contact shrinks as the surface is resolved more finely."""
+"""Area dimension: how the area of contact shrinks as the surface is resolved more finely."""
 
 from __future__ import annotations
 
