@@ -59,7 +59,17 @@ sphinx_gallery_conf = {
     "copyfile_regex": r".*_study\.py",
 }
 
-PAGES = ("index", "data_model", "conventions", "glossary", "architecture", "extremes", "theory", "theory_*")
+PAGES = (
+    "index",
+    "scene_files",
+    "data_model",
+    "conventions",
+    "glossary",
+    "architecture",
+    "extremes",
+    "theory",
+    "theory_*",
+)
 html_theme = "pydata_sphinx_theme"
 html_title = f"fractalcontact {version}"
 html_show_sourcelink = False

@@ -27,8 +27,8 @@ from fractalcontact.plotting._transmissivity import hydraulic_aperture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER = {1: "face", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
-# the same figures of a study that is not compared with the paper
+PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
+# names of the same figures in a study that is not compared with the paper
 JOINT = {
     1: "surface",
     2: "sliding_scheme",

@@ -12,7 +12,7 @@ import fractalcontact as fc
 from fractalcontact import plotting
 
 PAPER = [
-    "figure_1_face",
+    "figure_1_surface",
     "figure_2_sliding_scheme",
     "figure_3_closure",
     "figure_4_contact_domains",
@@ -46,11 +46,17 @@ def test_complete_study(study, tmp_path):
         assert path.stat().st_size < 600_000
 
 
+def test_study_that_is_not_compared_with_the_paper(study, tmp_path):
+    tree = part(study, "surfaces", "joints/closure")
+    expected = ["surface", "joint_closure", "joint_contact_domains"]
+    assert names(plotting.draw(tree, tmp_path, paper=False)) == expected
+
+
 @pytest.mark.parametrize(
     ("paths", "expected"),
     [
-        (("surfaces",), ["figure_1_face"]),
-        (("surfaces", "joints/delta_surface"), ["figure_1_face", "figure_2_sliding_scheme"]),
+        (("surfaces",), ["figure_1_surface"]),
+        (("surfaces", "joints/delta_surface"), ["figure_1_surface", "figure_2_sliding_scheme"]),
         (("joints/rigid_dilatancy",), ["figure_5_dilatancy"]),
         (("joints/elastic_dilatancy",), ["figure_5_dilatancy"]),
         (("joints/closure",), ["figure_3_closure", "figure_4_contact_domains"]),
