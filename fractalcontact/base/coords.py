@@ -44,9 +44,6 @@ def drop_unknown_coords(array: xr.DataArray) -> xr.DataArray:
     return array.drop_vars(unknown)
 
 
-familiar = drop_unknown_coords  # until nobody uses it
-
-
 def check_leading(
     array: xr.DataArray, taken: Collection[str], problems: Problems, argument: str = "surface"
 ) -> None:

@@ -1,4 +1,4 @@
-"""The folder of a run: made if need be, and written by one run at a time."""
+"""Output folder of a run: created if necessary, and locked for one run at a time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WHERE = "fractalcontact run"
 
 
 def output_folder(out: str | os.PathLike[str]) -> Path:
-    """Return the output folder; it is made if need be, and cleared of temporary files of a killed run."""
+    """Return the output folder, created if necessary and without temporary files of interrupted runs."""
     out = Path(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,7 @@ def output_folder(out: str | os.PathLike[str]) -> Path:
 
 @contextmanager
 def locked(folder: Path | None) -> Iterator[None]:
-    """Lock a folder, so that no other run writes in it; the lock ends with the process, however it ends."""
+    """Lock a folder against other runs; the lock ends with the process, however it ends."""
     try:
         import fcntl
     except ImportError:  # a system without such locks

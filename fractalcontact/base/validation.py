@@ -54,11 +54,6 @@ class Problems:
         self.error = error
         self.messages: list[str] = []
 
-    @property
-    def found(self) -> list[str]:
-        """Former name of `messages`."""
-        return self.messages
-
     def __enter__(self) -> Problems:
         return self
 
