@@ -2,9 +2,10 @@
 
     closure = fractalcontact.contact.press(surface, contact_modulus=1e10, normal_force=[1e3, 1e4])
 
-`press` takes a surface, presses a rigid flat down on it (the two elastic bodies are in the contact modulus
-E*, see `effective_modulus`) and returns a Dataset over the steps of the path. `flat_stiffness` is the force
-per closure of the same block with perfectly mating faces.
+`press` presses a rigid flat down on a surface and returns a Dataset over the steps of a load path; both
+elastic bodies are in the contact modulus E*, see `effective_modulus`. `flat_stiffness` is the force per
+closure of a block with perfectly mating surfaces. `ContactOptions` and `LoadPath` hold the options of the
+solver and the load path, for functions that press many surfaces.
 """
 
 import lazy_loader

@@ -153,9 +153,9 @@ class Progress:
 class ConstrainedCG:
     """One run of the iteration.
 
-    The arrays are h, p, u, t, the modes inside a transform, and `work`, which holds in turn z (a free body
-    has a wider plane for it, `wide`), r = K t, and the pressure before a step that was projected. These are
-    all the arrays there are, so that a solution takes less than eight arrays beyond the heights.
+    The arrays are h, p, u, t, the modes inside a transform, and `work_array`, which holds in turn z (a free
+    body has a wider plane for it, `wide`), r = K t, and the pressure before a step that was projected. These
+    are all the arrays there are, so that a solution takes less than eight arrays beyond the heights.
     """
 
     def __init__(self, system: ContactSystem, control: Control, start: Array) -> None:
@@ -172,7 +172,7 @@ class ConstrainedCG:
         self.p = np.zeros(shape, dtype=self.dtype)  # pressure
         self.u = RELEASED  # displacement, see `update_displacement`
         self.t = np.zeros(shape, dtype=self.dtype)  # search direction
-        self.work = np.zeros(shape, dtype=self.dtype)  # z, r, or the pressure before a projected step
+        self.work_array = np.zeros(shape, dtype=self.dtype)  # z, r, or the pressure before a projected step
         same_plane = self.preconditioner.plane == shape
         self.wide = None if same_plane else np.zeros(self.preconditioner.plane, dtype=self.dtype)
         self.tau, self.G = 0.0, 0.0
@@ -310,7 +310,7 @@ class ConstrainedCG:
     # search direction and step length
 
     def find_step(self, objective: Objective, inside: SetError, outside: SetError) -> bool:
-        """Find direction (3 to 7) and step length (8); False where there is none."""
+        """Find direction (3 to 6) and step length (7, 8); False where there is none."""
         mean_part = inside.g**2 / inside.count if self.force_controlled and inside.count else 0.0
         spread = max(inside.g2 - mean_part, 0.0)
         admit = bool(outside.g2 > ADMIT_RATIO**2 * spread or outside.count < FEW * inside.count)
@@ -342,23 +342,22 @@ class ConstrainedCG:
         is zero where the set has changed.
         """
         pre, shift = self.preconditioner, self.dtype(g_sum / count if self.force_controlled else 0.0)
-        plane = self.work if self.wide is None else self.wide
+        plane = self.work_array if self.wide is None else self.wide
         if self.wide is not None:  # the margin of a free body
             plane[self.h.shape[0] :] = 0
             plane[:, self.h.shape[1] :] = 0
         state = (self.h, self.u, self.p, self.p_max, closure, admit, shift)
-        changes = self.pass_sums(
-            _kernels.select_free_set, pre.columns, *state, pre.mask, plane, pre.sums, pre.counts
-        )[0]
+        bins = (pre.mask, plane, pre.sums, pre.counts)
+        changes = self.pass_sums(_kernels.select_free_set, pre.columns, *state, *bins)[0]  # (3)
         plane, extra = pre.apply(plane) if self.preconditioned else (plane, np.zeros_like(pre.sums))
         if self.wide is None:
-            self.work = plane
+            self.work_array = plane
         else:
             self.wide = plane
         arrays = (self.h, self.u, self.t, closure, plane)
         z_sum, z_g, t_sum = self.pass_sums(_kernels.add_bins, pre.columns, pre.mask, extra, *arrays)[:3]
         mean = z_sum / count if self.force_controlled else -self.uniform_pressure(g_sum)
-        G_old, self.G = self.G, float(z_g - mean * g_sum)
+        G_old, self.G = self.G, float(z_g - mean * g_sum)  # (5), z with its mean taken off
         beta = self.G / G_old if changes <= SLIGHT_CHANGE * count and G_old > 0 else 0.0
         # the part of the last direction that is kept must not change the force either
         return plane, mean + (beta * t_sum / count if self.force_controlled else 0.0), beta
@@ -366,18 +365,18 @@ class ConstrainedCG:
     def uniform_pressure(self, g_sum: float) -> float:
         """Return the uniform pressure on the free set that closes the summed gap (periodic bodies, else 0).
 
-        The compliance of a periodic body has no mean, whose stiffness grows without bound towards full
-        contact; without this term the iteration does not move it.
+        The elastic operator of a periodic body leaves out the mean, whose stiffness grows without bound
+        towards full contact.
         """
         displacement = self.preconditioner.mean_displacement()
         return g_sum / displacement if displacement > 0 else 0.0
 
     def step_length(self, t_g: float) -> float:
         """Compute r = K t (7) and return tau = sum t g / sum t r (8); infinite where t does not descend."""
-        out = self.work if fft.writes_in_place() else None
-        self.work = RELEASED
-        self.work = self.operator.apply(self.t, out)
-        t_r = self.pass_sums(_kernels.curvature, self.t, self.work)[0]
+        out = self.work_array if fft.writes_in_place() else None
+        self.work_array = RELEASED
+        self.work_array = self.operator.apply(self.t, out)  # r (7)
+        t_r = self.pass_sums(_kernels.curvature, self.t, self.work_array)[0]
         return float(t_g / t_r) if t_r > 0 and t_g > 0 else np.inf
 
     # step
@@ -391,35 +390,35 @@ class ConstrainedCG:
             self.project_onto_bounds(force)
             return
         rows, size = self.h.shape[0], self.h.size
-        in_bands(subtract_step, rows, size, self.p, self.t, tau)
-        in_bands(subtract_step, rows, size, self.u, self.work, tau)
+        in_bands(subtract_step, rows, size, self.p, self.t, tau)  # p = p - tau t (9)
+        in_bands(subtract_step, rows, size, self.u, self.work_array, tau)  # u = u - tau r (10)
         self.u_is_exact = False
 
     def project_onto_bounds(self, force: float) -> None:
         """Take the projected step, whose sum is `force`, and restore the imposed force (9).
 
-        The pressure before the step is kept in `work`.
+        The pressure before the step is kept in `work_array`.
         """
         imposed = self.control.value
         if self.force_controlled and self.p_max < np.inf:
             self.project_onto_capped_simplex(imposed)
         elif self.force_controlled and not force > 0:
-            self.work[...] = uniform_on_lowest(self.u + self.h, imposed, float(self.p_max))
+            self.work_array[...] = uniform_on_lowest(self.u + self.h, imposed, float(self.p_max))
         else:
             missed = self.force_controlled and abs(force - imposed) > self.epsilon * imposed
             factor = self.dtype(imposed / force if missed else 1.0)
-            step = (self.p, self.t, self.dtype(self.tau), factor, self.p_max, self.work)
+            step = (self.p, self.t, self.dtype(self.tau), factor, self.p_max, self.work_array)
             in_bands(subtract_and_clip, self.h.shape[0], self.h.size, *step)
-        self.p, self.work = self.work, self.p
+        self.p, self.work_array = self.work_array, self.p
         self.update_displacement()
 
     def project_onto_capped_simplex(self, imposed: float) -> None:
         """Take the projected step under a bound p_max; the free set shares the force that this takes off."""
         free = self.preconditioner.mask[: self.h.shape[0], : self.h.shape[1]]
-        np.copyto(self.work, self.p)
+        np.copyto(self.work_array, self.p)
         values = self.p[free] - self.tau * self.t[free].astype(np.float64)
         rest = sum_by_rows(np.where(free, 0, self.p))
-        self.work[free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
+        self.work_array[free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
 
     def overshot(self, objective: Objective, progress: Progress) -> bool:
         """Return whether the last projected step has raised the objective and can be halved."""
@@ -434,7 +433,7 @@ class ConstrainedCG:
         self.halvings += 1
         self.tau /= 2
         self.G = 0.0
-        self.p, self.work = self.work, self.p
+        self.p, self.work_array = self.work_array, self.p
         tau = self.dtype(self.tau)
         sums = self.pass_sums(_kernels.projected_step_sums, self.p, self.t, tau, self.p_max)
         self.project_onto_bounds(sums[1])

@@ -1,4 +1,7 @@
-"""The elastic operator: displacement of every node under a pressure on all nodes, u = K p."""
+"""The elastic operator: displacement of every node under a pressure on all nodes, u = K p.
+
+The kernels are imported where they run, because options are validated without the compiler.
+"""
 
 from __future__ import annotations
 
