@@ -129,7 +129,7 @@ def _change(planes: Planes, components: Sequence[Components], plane: int) -> Arr
 def _add_returns(measurements: Measurements) -> None:
     """Add how every plane differs from that at the same load on the opposite branch before, if any."""
     planes = measurements.planes
-    coords, path = planes.coords or {}, planes.dims[-1]
+    coords, path = planes.coords, planes.dims[-1]
     load = next((name for name in LOADS if name in coords and path in coords[name].dims), None)
     if load is None:
         return

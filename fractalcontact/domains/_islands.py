@@ -132,7 +132,7 @@ def _table(components: Sequence[Components], planes: Planes, columns: Sequence[s
     """Return the table of all planes; lengths are NaN where the mask has no coordinates."""
     if not columns:
         return {}
-    axes = planes.plane_coords or {}
+    axes = planes.plane_coords
     origin = [float(axes[dim].values[0]) if axes else 0.0 for dim in ("y", "x")]
     tables = [component_table(plane, planes.grid, origin, columns) for plane in components]
     joined = {name: _chain([table.pop(name) for table in tables]) for name in columns}

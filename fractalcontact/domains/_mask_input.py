@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -42,8 +42,8 @@ class Planes:
     grid: Grid
     dims: tuple[str, ...] = ()
     shape: tuple[int, ...] = ()
-    coords: dict[str, xr.Variable] | None = None
-    plane_coords: dict[str, xr.Variable] | None = None
+    coords: dict[str, xr.Variable] = field(default_factory=dict)
+    plane_coords: dict[str, xr.Variable] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -212,10 +212,10 @@ def build_dataset(
     used = {dim for dims, _ in variables.values() for dim in dims}
     leading = {
         name: values
-        for name, values in (planes.coords or {}).items()
+        for name, values in planes.coords.items()
         if name not in variables and (name in QUANTITIES or name in used)
     }
-    on_grid = (planes.plane_coords or {}) if on_plane else {}
+    on_grid = planes.plane_coords if on_plane else {}
     of_rows = _row_coords(planes, *rows) if rows else {}
     variables = {**variables, "run_time": ((), np.nan)}  # reserved for `public_result`
     dataset = xr.Dataset(variables, coords={**leading, **on_grid, **of_rows, **(coords or {})})
@@ -234,8 +234,7 @@ def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
     places = np.unravel_index(plane, planes.shape) if planes.dims else ()
     for dim, length, index in zip(planes.dims, planes.shape, places, strict=True):
         if f"{row}_{dim}" in QUANTITIES:
-            leading = planes.coords or {}
-            values = leading[dim].values if dim in leading else np.arange(length)
+            values = planes.coords[dim].values if dim in planes.coords else np.arange(length)
             coords[f"{row}_{dim}"] = (row, values[index])
         else:
             attributes = {"units": "1", "long_name": f"index of the {row} along {dim}"}
