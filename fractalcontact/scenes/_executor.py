@@ -91,7 +91,7 @@ def worker_processes(count: int) -> Iterator[Executor | None]:
     methods = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if "forkserver" in methods:
-        context.set_forkserver_preload(["fractalcontact.scenes._study", "netCDF4", "numba"])
+        context.set_forkserver_preload(["fractalcontact.scenes._worker"])
     executor = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
     try:
         for _ in range(count):
