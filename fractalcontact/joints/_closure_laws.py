@@ -25,6 +25,8 @@ NO_STIFFNESS = "NaN where there is no force, where a branch of the path has one 
 FITS = ("closure_length", "reference_pressure", "exponential_misfit", "initial_stiffness",
         "greatest_closure", "hyperbolic_misfit")  # fmt: skip
 FEWEST_STEPS = 3  # to fit a law of two parameters
+STEEPEST = 40.0  # greatest exponent of a local power law, per length of its three points in log pressure
+GREATEST_CORRECTION = 0.2  # of the logarithm of a stiffness: beyond, the closure is too uneven for a law
 
 
 def _check(problems: Problems, *, closure: Any, **_: Any) -> None:
@@ -67,8 +69,9 @@ def closure_laws(closure: xr.Dataset) -> xr.Dataset:
     Notes
     -----
     Both laws are fitted by least squares of the closure to the first loading, up to the greatest force. The
-    stiffness is taken from neighbouring steps on the same branch of the path and is exact for the
-    exponential law.
+    stiffness is that of a power law through three neighbouring steps on the same branch of the path,
+    corrected for the change of its exponent: exact for straight lines, power laws and the exponential law,
+    and of third order at the ends of a branch.
 
     References
     ----------
@@ -164,10 +167,66 @@ def stiffness(pressure: Array, closure: Array) -> Array:
         if steps.size < 2:
             continue
         with np.errstate(divide="ignore", invalid="ignore"):
-            slope = np.gradient(closure[steps], np.log(pressure[steps]))
+            slope = log_slopes(np.log(pressure[steps]), closure[steps])
             on_branch = np.where((slope > 0) & np.isfinite(slope), pressure[steps] / slope, math.nan)
         values[steps] = np.where(np.isnan(values[steps]), on_branch, values[steps])
     return values
+
+
+def log_slopes(log_pressure: Array, closure: Array) -> Array:
+    """Return dw/d(ln p) at every step of one branch, by local power laws.
+
+    Through three neighbouring steps passes w = a + b p^m, exactly one where the closure grows: m = 1 is a
+    straight line, and m = 0 the exponential law. If the exponent m changes with ln p at the rate k, the
+    logarithm of dw/d(ln p) of that law is too small by k/6 times the product of the distances in ln p to the
+    other two steps, signed: the remainder of interpolation, as for a polynomial. The rate comes from the
+    laws beside it. Where the closure does not grow, a parabola in ln p takes the place of the power law.
+    """
+    order = np.argsort(log_pressure, kind="stable")
+    x, w = log_pressure[order], closure[order]
+    if x.size == 2:
+        return np.gradient(w, x)
+    triples = [slice(start, start + 3) for start in range(x.size - 2)]
+    exponents = np.array([_local_exponent(x[three], w[three]) for three in triples])
+    rates = np.zeros(exponents.size)
+    if exponents.size > 1:
+        rates = np.nan_to_num(np.gradient(exponents, [x[three].mean() for three in triples]))
+    slopes = np.empty(x.size)
+    for i, start in enumerate(np.clip(np.arange(x.size) - 1, 0, x.size - 3)):
+        slope, product = _local_slope(x[triples[start]], w[triples[start]], exponents[start], i - start)
+        correction = np.clip(rates[start] * product / 6.0, -GREATEST_CORRECTION, GREATEST_CORRECTION)
+        slopes[order[i]] = slope * math.exp(correction)
+    return slopes
+
+
+def _local_exponent(x: Array, w: Array) -> float:
+    """Return m of w = a + b exp(m x) through three points; NaN where w does not grow."""
+    from scipy.optimize import brentq
+
+    near, far = x[1] - x[0], x[2] - x[0]
+    if not (w[1] > w[0] and w[2] > w[1]):
+        return math.nan
+    ratio = (w[2] - w[0]) / (w[1] - w[0])
+
+    def excess(m: float) -> float:
+        return float(np.expm1(m * far) / np.expm1(m * near) - ratio if m else far / near - ratio)
+
+    ends = -STEEPEST / far, STEEPEST / far
+    if excess(ends[0]) >= 0 or excess(ends[1]) <= 0:
+        return math.nan
+    return float(brentq(excess, *ends, xtol=1e-14))
+
+
+def _local_slope(x: Array, w: Array, exponent: float, place: int) -> tuple[float, float]:
+    """Return dw/dx at one of three points, and the product of its signed distances to the other two."""
+    others = np.delete(np.arange(3), place)
+    product = float(np.prod(x[place] - x[others]))
+    if math.isnan(exponent):
+        parabola = np.polyfit(x - x[place], w, 2)
+        return float(parabola[1]), product
+    far = x[2] - x[0]
+    length = math.expm1(exponent * far) / exponent if exponent else far
+    return float((w[2] - w[0]) / length * math.exp(exponent * (x[place] - x[0]))), product
 
 
 def branches(pressure: Array) -> list[Array]:

@@ -53,6 +53,51 @@ def test_fit_to_first_loading_and_stiffness_per_branch():
     assert "no force" in result.stiffness.attrs["reason"]
 
 
+STUDY_LOADS = np.array([100, 200, 500, 1e3, 2e3, 3.5e3, 5e3, 7e3, 1e4, 1.4e4, 2e4, 3e4]) / 4e-4  # Pa
+
+
+@pytest.mark.parametrize("half_pressure", [1e5, 3e5, 1e6, 3e6, 1e7, 3e7, 1e8])
+def test_hyperbolic_stiffness_on_the_loads_of_the_study(half_pressure):
+    # w = Vm p/(c + p): dp/dw = (c + p)^2/(c Vm)
+    p = STUDY_LOADS
+    result = fc.joints.closure_laws(law(p, 1e-4 * p / (half_pressure + p)))
+    ratio = result.stiffness.values * 1e-4 * half_pressure / (half_pressure + p) ** 2
+    np.testing.assert_allclose(ratio[[0, -1]], 1.0, atol=0.02)
+    np.testing.assert_allclose(ratio[1:-1], 1.0, atol=0.01)
+
+
+def test_exponential_stiffness_on_the_loads_of_the_study():
+    result = fc.joints.closure_laws(law(STUDY_LOADS, 3e-6 * np.log(STUDY_LOADS / 2e3)))
+    np.testing.assert_allclose(result.stiffness, STUDY_LOADS / 3e-6, rtol=1e-9)
+
+
+@pytest.mark.parametrize("power", [0.5, 2 / 3, 1.0, -0.5])
+def test_stiffness_of_a_power_law_is_exact(power):
+    # 2/3 is a Hertzian contact, 1 a linear spring
+    w = np.sign(power) * 1e-6 * (STUDY_LOADS / 1e6) ** power
+    result = fc.joints.closure_laws(law(STUDY_LOADS, w))
+    np.testing.assert_allclose(result.stiffness, STUDY_LOADS / (power * w), rtol=1e-9)
+
+
+def test_stiffness_converges_with_third_order_at_the_ends():
+    errors = []
+    for steps in (8, 15, 29, 57):
+        p = np.geomspace(1e5, 1e8, steps)
+        got = fc.joints.closure_laws(law(p, p / (5e6 + p))).stiffness.values
+        errors.append(np.abs(got / ((5e6 + p) ** 2 / 5e6) - 1)[[0, -1]].max())
+    assert np.log2(errors[-2] / errors[-1]) > 2.7
+
+
+def test_stiffness_beside_a_step_without_closure():
+    # the third step adds no closure: no power law passes through it
+    p = np.array([1.0, 2.0, 4.0, 8.0, 16.0]) * 1e5
+    w = np.array([1.0, 2.0, 2.0, 3.0, 4.0]) * 1e-6
+    stiffness = fc.joints.closure_laws(law(p, w)).stiffness.values
+    parabola = np.polyfit(np.log(p[1:4] / p[2]), w[1:4], 2)[1]
+    assert stiffness[2] == pytest.approx(p[2] / parabola)
+    assert np.isfinite(stiffness[[0, 3, 4]]).all()
+
+
 def test_mated_faces_have_no_law(make_face):
     crack = fc.joints.Crack(make_face(np.zeros((8, 8)), 1e-4), young=1e9, poisson=0.2)
     result = fc.joints.closure_laws(fc.joints.closure(crack, shear=0.0, normal_force=[1.0, 2.0, 4.0]))
