@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 AZIMUTHS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
-LABEL_WIDTH = 0.16  # of the width of the section, needed by the label of the lift
+LABEL_WIDTH = 0.18  # of the width of the section, needed by the label of the lift
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -199,11 +199,15 @@ def _draw_dimensions(
         low, high = float(up(foot)), float(up(foot + step.lift))
         low_x, high_x = ax.get_xlim()
         # the label goes over the shear if that is wide enough, else in front of the block if there is space
-        right = end - start > LABEL_WIDTH * (high_x - low_x) or start - low_x < LABEL_WIDTH * (high_x - low_x)
+        needed = LABEL_WIDTH * (high_x - low_x)
+        behind, front = end - start, start - low_x
+        right = behind > needed or (front < needed and behind >= front)
+        separator = " = " if (behind if right else front) > needed else "\n"
         ax.plot([start, end], [high, high], color=_style.BLUE, lw=0.7, ls=":")
         ax.annotate("", (start, low), (start, high), arrowprops=arrow | {"color": _style.BLUE})
         away, side = (6, "left") if right else (-6, "right")
-        ax.annotate(f"{lift_name} = {quantity_text(step.lift, 'm')}", (start, (low + high) / 2), (away, 0),
+        label = f"{lift_name}{separator}{quantity_text(step.lift, 'm')}"
+        ax.annotate(label, (start, (low + high) / 2), (away, 0),
                     textcoords="offset points", color=_style.BLUE, ha=side, va="center",
                     path_effects=_style.halo())  # fmt: skip
 
