@@ -16,7 +16,7 @@ import tracemalloc
 from functools import _lru_cache_wrapper
 from pathlib import Path
 
-from fractalcontact.base.memory import peak_memory
+from fractalcontact.base.memory import block_dask_import, peak_memory
 
 TASK, REPORT = "task.pickle", "report.json"
 PACKAGE = "fractalcontact"
@@ -31,17 +31,12 @@ def main(folder):
         importlib.import_module(name)
     report = {}
     if task["scene"] is not None:
-        avoid_dask()
+        block_dask_import()  # as the command does for a study without workers
         report = run_scene(task["scene"], folder / "first")
     report |= {"libraries": libraries(), "memory": peak_memory() - before, "kernels": kernels()}
     if task["traced"]:
         report["array_memory"] = traced_memory(task["scene"], folder / "second")
     (folder / REPORT).write_text(json.dumps(report), encoding="utf-8")
-
-
-def avoid_dask():
-    """Keep xarray from importing dask, as the command does for a study without workers."""
-    sys.modules.setdefault("dask", None)
 
 
 def libraries():

@@ -74,7 +74,8 @@ CHAIN = """
 import gc, importlib, json, pickle, sys
 sys.path.insert(0, sys.argv[1])
 import probe
-probe.avoid_dask()
+from fractalcontact.base.memory import block_dask_import
+block_dask_import()
 from fractalcontact import scenes
 
 def reset_kernels():
