@@ -32,7 +32,7 @@ def stamp(
     *,
     title: str,
     references: str = PAPER,
-    **facts: Any,
+    **entries: Any,
 ) -> T:
     """Set the global attributes of a result, in place, and return it.
 
@@ -47,7 +47,7 @@ def stamp(
         What the data are, in a few words.
     references : str
         The source of the method.
-    **facts
+    **entries
         Further entries of the provenance: random stream, run time, achieved error ...
     """
     version = _version()
@@ -57,7 +57,7 @@ def stamp(
         "version": version,
         "fft": fft.library(),
         "threads": thread_count(),
-        **{key: plain(value) for key, value in facts.items()},
+        **{key: plain(value) for key, value in entries.items()},
     }
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     data.attrs.update(
