@@ -334,7 +334,7 @@ class Comparison:
         if self.benchmark.equal_parameters:
             compares &= self.parameter[:, None] == self.parameter
         quicker = self._quicker(self.log_time[:, None], self.log_time)
-        smaller = np.array([_clearly_smaller(one, log_errors) for one in log_errors])
+        smaller = np.array([_clearly_smaller(errors, log_errors) for errors in log_errors])
         self.beaten = (compares & quicker & smaller).any(axis=0)
         # all settings that compare are clearly worse, in error or in time
         self.unbeaten = (~compares | quicker | smaller).all(axis=1)
