@@ -59,15 +59,15 @@ def test_error_is_met_and_a_looser_one_is_faster(tmp_path, kind):
     assert transforms[-1] < int(exact["transforms"].sum())
 
 
-@pytest.mark.parametrize(("load", "contest"), [("nominal_pressure", ""), ("closure", ", closure imposed")])
-def test_tolerance_follows_the_curve_of_the_load(tmp_path, load, contest):
+@pytest.mark.parametrize(("load", "condition"), [("nominal_pressure", ""), ("closure", ", closure imposed")])
+def test_tolerance_follows_the_curve_of_the_load(tmp_path, load, condition):
     text = PRESSED.format(top="error = 1e-4", generator=FACES["free"][0], amplitude=FACES["free"][1],
                           boundary='boundary = "free"').replace("nominal_pressure", load)  # fmt: skip
     (tmp_path / "pressed.toml").write_text(text, encoding="utf-8")
-    (picked,) = selected(fc.scenes.load(tmp_path / "pressed.toml"))
-    (curve,) = _autotune.measured_curves()[f"rough, free body{contest}"].values()
-    at = curve.parameter.index(picked.option.value)
-    assert picked.option.error == pytest.approx(3 * max(curve.error[at:]))
+    (choice,) = selected(fc.scenes.load(tmp_path / "pressed.toml"))
+    (curve,) = _autotune.measured_curves()[f"rough, free body{condition}"].values()
+    at = curve.parameter.index(choice.option.value)
+    assert choice.option.error == pytest.approx(3 * max(curve.error[at:]))
 
 
 def selected(study):
@@ -87,25 +87,25 @@ def scene(tmp_path, top, **changes):
 
 def test_plan_lists_the_selection(tmp_path):
     with pytest.warns(FractalContactWarning, match="out of reach: want.dimensions reaches 0.0"):
-        told = str(fc.scenes.plan(scene(tmp_path, "error = 1e-3\n")))
+        text = str(fc.scenes.plan(scene(tmp_path, "error = 1e-3\n")))
     for key in ("joint.tolerance", "want.dimensions", "domains.box_dimension.cover"):
-        assert f"selected: {key} = " in told
-    assert "the smallest error available" in told  # no estimator comes within .001 on a face of 48 x 48
+        assert f"selected: {key} = " in text
+    assert "the smallest error available" in text  # no estimator comes within .001 on a face of 48 x 48
     assert "selected" not in str(fc.scenes.plan(scene(tmp_path, "")))
 
 
 @pytest.mark.filterwarnings("ignore:an error of")
 def test_looser_error_selects_a_faster_estimator(tmp_path):
-    picked = {}
+    choice_by_error = {}
     for error in (0.3, 1e-4):
         choices = selected(scene(tmp_path, f"error = {error}\n"))
         (methods,) = (choice.option.value for choice in choices if choice.key == "want.dimensions")
-        picked[error] = methods[0]
+        choice_by_error[error] = methods[0]
         assert set(methods) >= {"spectrum"}
     seconds = {
         name: curve.at(48.0)[1] for name, curve in _autotune.measured_curves()["Hurst exponent"].items()
     }
-    assert seconds[picked[0.3]] < seconds[picked[1e-4]]
+    assert seconds[choice_by_error[0.3]] < seconds[choice_by_error[1e-4]]
 
 
 @pytest.mark.filterwarnings("ignore:an error of", "ignore:a budget of")
@@ -139,7 +139,7 @@ def test_explicit_values_are_never_changed(tmp_path):
 
 
 def test_budget_is_kept_and_a_larger_one_reduces_the_error(tmp_path):
-    least = sum(one.option.seconds for one in selected(scene(tmp_path, "error = 0.9\n")))
+    least = sum(choice.option.seconds for choice in selected(scene(tmp_path, "error = 0.9\n")))
     errors = []
     for budget in (1.01 * least, 2 * least, 100 * least):
         choices = selected(scene(tmp_path, f"budget = {budget}\n"))
@@ -170,8 +170,8 @@ def test_selection_is_in_the_summary_and_in_the_file(tmp_path):
 def test_shipped_curves_cover_the_methods():
     found = _autotune.measured_curves()
     assert set(found["Hurst exponent"]) == set(fc.dimensions.methods())
-    for contest in found.values():
-        for curve in contest.values():
+    for benchmark in found.values():
+        for curve in benchmark.values():
             assert len(curve.parameter) == len(curve.error) == len(curve.seconds) >= 1
     assert _autotune.CURVES_FILE.stat().st_size < 20_000
 

@@ -62,7 +62,7 @@ def test_study_stopped_at_every_part_gives_the_same_bytes(whole, tmp_path, monke
             signal.raise_signal(number)
 
     watch_calls(monkeypatch, stop_in_first_part)
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    before = {signum: signal.getsignal(signum) for signum in (signal.SIGINT, signal.SIGTERM)}
     while True:
         asked.clear()
         runs += 1
@@ -77,7 +77,7 @@ def test_study_stopped_at_every_part_gives_the_same_bytes(whole, tmp_path, monke
         assert runs < 20
     assert len(numbers) > 6
     assert set(numbers) == {number}
-    assert {one: signal.getsignal(one) for one in before} == before
+    assert {signum: signal.getsignal(signum) for signum in before} == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
     assert variables(tmp_path / "result.nc") == expected
 
@@ -127,10 +127,10 @@ def test_killed_study_leaves_no_incomplete_file(whole, tmp_path, number):
     while not list(tmp_path.glob(".stages/*.npz")) and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(process.pid, number)
-    _, told = process.communicate(timeout=60)
+    _, text = process.communicate(timeout=60)
     if number != signal.SIGKILL:
         assert process.returncode == 128 + number
-        assert "resumes" in told
+        assert "resumes" in text
         assert fc.open(tmp_path / "partial.nc").attrs["completeness"].startswith("partial")
     assert not (tmp_path / "result.nc").exists()
     tree = fc.scenes.run(whole[0], out=tmp_path, progress=False)
@@ -207,15 +207,15 @@ def test_contents_of_a_foreign_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "told", ['{"stages": {"a": 3}}', '{"stages": {"a": {"residual": null}}}', '{"stages": [1]}', "[1]", "3"]
+    "text", ['{"stages": {"a": 3}}', '{"stages": {"a": {"residual": null}}}', '{"stages": [1]}', "[1]", "3"]
 )
-def test_contents_of_a_file_with_foreign_provenance(tmp_path, told):
+def test_contents_of_a_file_with_foreign_provenance(tmp_path, text):
     with netCDF4.Dataset(tmp_path / "other.nc", "w") as file:
         file.createDimension("t", 2)
         file.createVariable("temperature", "f8", ("t",))[:] = 1.0
         file.createVariable("ragged", file.createVLType("f8", "list"), ("t",))
         file.createVariable("word", str, ("t",))[:] = np.array(["a", "b"], dtype=object)
-        file.provenance = told
+        file.provenance = text
     assert "temperature" in fc.scenes.contents(tmp_path / "other.nc")
     assert list(fc.open(tmp_path / "other.nc")["word"].values) == ["a", "b"]
 

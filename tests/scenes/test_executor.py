@@ -161,7 +161,7 @@ def test_killed_worker_process_is_reported_and_the_study_resumes(whole, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize("once_there_is", ["*", "*.npz"])
 def test_killed_worker_of_dask_changes_no_byte(whole, tmp_path, once_there_is):
-    """A real one: another takes its place, and what it had done and not handed over is done again."""
+    """Another worker takes its place and repeats what was not handed over."""
     distributed = pytest.importorskip("distributed")
     killed = []
 

@@ -31,9 +31,9 @@ def test_implausible_units_warn_before_anything_runs(tmp_path, word):
 
 def test_closure_deeper_than_the_block_warns(tmp_path):
     text = SOUND.replace("young = 30e9", "young = 30e3").replace("[1.0, 10.0]", "[1.0, 1e3]")
-    with pytest.warns(ScaleWarning) as told:
+    with pytest.warns(ScaleWarning) as caught:
         fc.scenes.run(written(tmp_path, text), progress=False)
-    assert any("is the modulus in Pa" in str(one.message) for one in told)
+    assert any("is the modulus in Pa" in str(warning.message) for warning in caught)
 
 
 @pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "pressed_face"])
