@@ -59,6 +59,10 @@ _EVENT = {
     "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
     "flag_meanings": "continuation birth death merge split merge_and_split",
 }
+_SCALE_POSITION = {
+    "flag_values": np.array([-1, 0, 1], dtype=np.int8),
+    "flag_meanings": "below inside above",
+}
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
@@ -203,6 +207,11 @@ QUANTITIES: dict[str, Quantity] = {
     "greatest_closure": Quantity("m", "greatest closure of the hyperbolic law"),
     "hyperbolic_misfit": Quantity("m", "root mean square difference from the hyperbolic law"),
     "roughness_coefficient": Quantity("1", "joint roughness coefficient JRC"),
+    "roughness_coefficient_low": Quantity("1", "JRC below which 2.5 % of the single profiles lie"),
+    "roughness_coefficient_high": Quantity("1", "JRC above which 2.5 % of the single profiles lie"),
+    "scaled_roughness_coefficient": Quantity("1", "joint roughness coefficient JRC of the longer joint"),
+    "scale_position": Quantity("1", "position of JRC on the scale of standard profiles", _SCALE_POSITION),
+    "regression_interval": Quantity("m", "sampling interval to which the regression was fitted"),
     "profile_slope": Quantity("1", "root mean square slope Z2 of the profile at a lag"),
     "smoothing": Quantity("m", "length of shear over which the slope of the dilatancy was taken"),
     "stiffness": Quantity("Pa m-1", "normal stiffness per nominal area"),

@@ -1,15 +1,15 @@
-"""Joint roughness coefficient (JRC) of a measured surface from the slope of its profiles."""
+"""Joint roughness coefficient (JRC) of a surface or a profile from the slope of its profiles."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import read_grid
+from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -18,25 +18,64 @@ from fractalcontact.joints._directions import Direction, check_directions, direc
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.roughness_coefficient"
-LAG = 1.27e-3  # m: the interval of the readings to which the correlation was fitted
+
+
+class Regression(NamedTuple):
+    """JRC = offset + factor f(Z2) of readings one interval (m) apart; f is log10 without a power."""
+
+    interval: float
+    offset: float
+    factor: float
+    power: float | None
+
+
+# Tse and Cruden read the standard profiles every 1.27 mm on prints enlarged 2.5 times in both axes (Li and
+# Zhang 2015, Int. J. Rock Mech. Min. Sci. 77:27), which leaves slopes as they are: 0.508 mm on the joint.
+REGRESSIONS = {
+    "tse_cruden": (Regression(0.508e-3, 32.2, 32.47, None),),
+    "yu_vayssade": (
+        Regression(0.25e-3, -4.51, 60.32, 1.0),
+        Regression(0.5e-3, -3.47, 61.79, 1.0),
+        Regression(1e-3, -2.31, 64.22, 1.0),
+    ),
+    "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
+}
+DEFAULT_LAG = {"tse_cruden": 0.508e-3, "yu_vayssade": 0.5e-3, "tatone_grasselli": 0.5e-3}
 LARGEST_JRC = 20.0
-OUTSIDE = "NaN where the law gives less than 0 or more than 20, the ends of the scale of standard profiles"
+SAMPLE_LENGTH = 0.1  # m: the length of joint to which the scale of standard profiles refers
+LAG_TOLERANCE = 0.1  # relative; at H = 0.7 it changes the result by 0.4
+FEWEST_PROFILES = 20  # below, the 2.5 % quantile is lower than every profile but one
+BELOW, INSIDE, ABOVE = np.int8(-1), np.int8(0), np.int8(1)
+OUTSIDE = "outside 0 to 20, the scale of standard profiles, it is an extrapolation (see scale_position)"
+STRAIGHT = "NaN where the profiles are straight lines: the regression takes the logarithm of their slope"
+FEW_PROFILES = f"NaN where fewer than {FEWEST_PROFILES} profiles are long enough, or some are straight lines"
 REFERENCES = (
     "Tse, R. and Cruden, D. M., Estimating joint roughness coefficients, Int. J. Rock Mech. Min. Sci. 16 "
-    "(1979)"
+    "(1979); Yu, X. and Vayssade, B., Joint profiles and their roughness parameters, Int. J. Rock Mech. Min. "
+    "Sci. 28 (1991)"
 )
 
 
-def _check(problems: Problems, *, surface: Any, direction: Any, lag: Any) -> None:
-    directions_are_valid = check_directions(problems, direction)
-    lag_is_valid = problems.number("lag", lag, above=0, at_most=1e100)
-    if not (problems.surface("surface", surface, finite=False) and directions_are_valid and lag_is_valid):
+def _check(
+    problems: Problems, *, surface: Any, direction: Any, regression: Any, lag: Any, length: Any
+) -> None:
+    directions_are_valid = direction is None or check_directions(problems, direction)
+    lag_is_valid = problems.number("lag", lag, above=0, at_most=1e100, optional=True)
+    lag_is_valid = problems.choice("regression", regression, REGRESSIONS) and lag_is_valid
+    problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=1e100, optional=True)
+    if not problems.surface("surface", surface, finite=False, profile=True):
         return
-    grid = read_grid(surface)
-    for towards in read_directions(direction):
-        cells = _lag_cells(grid.spacing, towards, float(lag))
+    if not (directions_are_valid and lag_is_valid):
+        return
+    grid = read_grid(surface, core_dims(surface))
+    interval = _lag_or_default(lag, regression)
+    for towards in read_directions(_direction_or_default(direction, surface)):
+        if len(grid.shape) == 1 and towards.unit[0] != 0.0:
+            problems.add("direction", "E or W for a profile", towards.name)
+            continue
+        cells = _lag_cells(grid.spacing, towards, interval)
         fits = all(abs(n) < size for n, size in zip(cells, grid.shape, strict=True))
-        problems.require(fits, "surface", f"heights {lag:g} m apart towards {towards.name}", "none")
+        problems.require(fits, "surface", f"heights {interval:g} m apart towards {towards.name}", "none")
 
 
 @public_result(
@@ -48,29 +87,40 @@ def _check(problems: Problems, *, surface: Any, direction: Any, lag: Any) -> Non
 def roughness_coefficient(
     surface: xr.DataArray,
     *,
-    direction: str | float | Sequence[str | float] = ("E", "N"),
-    lag: float = LAG,
+    direction: str | float | Sequence[str | float] | None = None,
+    regression: str = "tse_cruden",
+    lag: float | None = None,
+    length: float | None = None,
 ) -> xr.Dataset:
-    """Return the joint roughness coefficient JRC of a measured surface, JRC = 32.2 + 32.47 log10(Z2).
+    """Return the joint roughness coefficient JRC of a surface or profile from the slope Z2 of its profiles.
 
-    Z2 is the root mean square slope of the profiles along a direction, between readings one lag apart, after
-    removal of the mean plane. On a fractal surface Z2 grows as the lag decreases. The correlation is
-    therefore only valid at the lag of the standard profiles, 1.27 mm, which is the default.
+    Z2 is the root mean square slope along a direction between readings one lag apart, after removal of the
+    mean plane (of a profile: the mean line). On a fractal surface Z2 grows as the lag decreases. A regression
+    is therefore only valid at the sampling interval to which it was fitted, which is the default lag.
 
     Parameters
     ----------
-    surface : DataArray, shape (y, x)
+    surface : DataArray, shape (y, x) or (x,)
         Heights, m; missing ones (NaN) are left out.
     direction : str, float, or a sequence of them
         Directions of the profiles: compass words, or azimuths in degrees. Opposite ones give the same.
-    lag : float
-        Interval between the readings, m; it is rounded to whole cells (y, x), at least one.
+        Default: E and N; E for a profile.
+    regression : {"tse_cruden", "yu_vayssade", "tatone_grasselli"}
+        Regression of JRC over Z2, with the sampling intervals to which it was fitted: 0.508 mm; 0.25, 0.5
+        and 1 mm; 0.5 and 1 mm. The one whose interval is nearest to the lag in use is taken.
+    lag : float, optional
+        Interval between the readings, m; it is rounded to whole cells (y, x), at least one. Default: 0.508 mm
+        for "tse_cruden", otherwise 0.5 mm.
+    length : float, optional
+        Length of a joint, m, at least 0.1, to which the coefficient is scaled as well.
 
     Returns
     -------
     Dataset over direction
-        roughness_coefficient, the `roughness` of `barton_choubey_strength`, NaN with the `reason` outside 0
-        to 20; profile_slope Z2; lag (m) in use.
+        roughness_coefficient, the `roughness` of `barton_choubey_strength`; a value outside 0 to 20 is an
+        extrapolation, which scale_position reports. roughness_coefficient_low and _high, between which 95 %
+        of the single profiles of the surface lie. profile_slope Z2, lag (m) in use, regression_interval (m).
+        With `length` scaled_roughness_coefficient.
 
     Raises
     ------
@@ -78,61 +128,156 @@ def roughness_coefficient(
         `surface` is no surface, is shorter than the lag or has no pair of heights one lag apart, or an
         argument is wrong.
 
+    Notes
+    -----
+    The two limits describe the scatter of profiles as long as the surface. They are no confidence interval
+    of the coefficient.
+
     References
     ----------
-    Tse and Cruden (1979), Int. J. Rock Mech. Min. Sci. 16:303; Barton and Choubey (1977), Rock Mechanics
-    10:1.
+    Tse and Cruden (1979), Int. J. Rock Mech. Min. Sci. 16:303; Yu and Vayssade (1991), Int. J. Rock Mech.
+    Min. Sci. 28:333; Tatone and Grasselli (2010), Int. J. Rock Mech. Min. Sci. 47:1391; Barton and Bandis
+    (1982), 23rd US Symposium on Rock Mechanics.
 
     Examples
     --------
     >>> import numpy as np
     >>> import fractalcontact as fc
-    >>> teeth = 0.2e-3 * (np.arange(40) % 2) * np.ones((40, 1))  # slope 0.2 mm over 1.27 mm
-    >>> surface = fc.surfaces.from_array(teeth, 1.27e-3)
+    >>> teeth = 0.1e-3 * (np.arange(40) % 2) * np.ones((40, 1))  # slope 0.1 mm over 0.5 mm
+    >>> surface = fc.surfaces.from_array(teeth, 0.5e-3)
     >>> jrc = fc.joints.roughness_coefficient(surface, direction="E").roughness_coefficient
-    >>> jrc.values.round(1).tolist()  # 32.2 + 32.47 log10(0.2 / 1.27)
-    [6.1]
+    >>> jrc.values.round(1).tolist()  # 32.2 + 32.47 log10(0.2)
+    [9.5]
+    >>> result = fc.joints.roughness_coefficient(surface, direction="E", regression="yu_vayssade")
+    >>> result.roughness_coefficient.values.round(1).tolist()  # 61.79 * 0.2 - 3.47
+    [8.9]
     """
-    grid = read_grid(surface)
-    directions = read_directions(direction)
+    dims = core_dims(surface)
+    grid = read_grid(surface, dims)
+    chosen_direction = _direction_or_default(direction, surface)
+    directions = read_directions(chosen_direction)
+    interval = _lag_or_default(lag, regression)
     plane = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
-    slopes, lags = np.empty(len(directions)), np.empty(len(directions))
+    count = len(directions)
+    slopes, lags, intervals = np.empty(count), np.empty(count), np.empty(count)
+    coefficient, limits = np.empty(count), np.full((2, count), np.nan)
     with Problems(WHERE) as problems:
         for i, towards in enumerate(directions):
-            slopes[i], lags[i] = _rms_slope(plane, grid.spacing, towards, float(lag))
-            expected = f"heights {lag:g} m apart towards {towards.name}"
+            lines = _profile_slopes(plane, grid.spacing, towards, interval)
+            slopes[i], lags[i] = lines.slope, lines.lag
+            fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))
+            intervals[i], coefficient[i] = fitted.interval, _coefficient(fitted, lines.slope)
+            if lines.of_profiles.size >= FEWEST_PROFILES:  # JRC grows with Z2: the quantiles correspond
+                limits[:, i] = _coefficient(fitted, np.quantile(lines.of_profiles, (0.025, 0.975)))
+            expected = f"heights {interval:g} m apart towards {towards.name}"
             problems.require(math.isfinite(slopes[i]), "surface", expected, "none")
-    with np.errstate(divide="ignore"):
-        coefficient = 32.2 + 32.47 * np.log10(slopes)
-    inside = (coefficient >= 0) & (coefficient <= LARGEST_JRC)
+    position = np.where(coefficient > LARGEST_JRC, ABOVE, np.where(coefficient < 0, BELOW, INSIDE))
+    limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
+    variables = {
+        "roughness_coefficient": np.where(np.isfinite(coefficient), coefficient, np.nan),
+        "roughness_coefficient_low": limits[0],
+        "roughness_coefficient_high": limits[1],
+        "scale_position": position.astype(np.int8),
+        "profile_slope": slopes,
+        "lag": lags,
+        "regression_interval": intervals,
+    }
+    if length is not None:
+        variables["scaled_roughness_coefficient"] = _scaled(coefficient, float(length))
     result = xr.Dataset(
-        {
-            "roughness_coefficient": ("direction", np.where(inside, coefficient, np.nan)),
-            "profile_slope": ("direction", slopes),
-            "lag": ("direction", lags),
-        },
+        {name: ("direction", values) for name, values in variables.items()},
         coords=direction_coords(directions),
+        attrs={"parameters": {"direction": chosen_direction, "lag": interval}},
     )
-    if not inside.all():
-        result["roughness_coefficient"].attrs["reason"] = OUTSIDE
+    _add_notes(result)
     return result
 
 
+def _direction_or_default(direction: Any, surface: xr.DataArray) -> Any:
+    if direction is not None:
+        return direction
+    return ("E", "N") if len(core_dims(surface)) == 2 else ("E",)
+
+
+def _lag_or_default(lag: float | None, regression: str) -> float:
+    return DEFAULT_LAG[regression] if lag is None else float(lag)
+
+
+def _coefficient(law: Regression, slope: Any) -> Any:
+    """Return JRC of a slope or of several; minus infinity for a slope of 0 under a logarithm."""
+    with np.errstate(divide="ignore"):
+        return law.offset + law.factor * (np.log10(slope) if law.power is None else slope**law.power)
+
+
+def _scaled(coefficient: Array, length: float) -> Array:
+    """Return JRC of a joint of that length after Barton and Bandis; NaN below the scale."""
+    inside = np.where(coefficient >= 0, coefficient, np.nan)
+    return np.asarray(inside * (length / SAMPLE_LENGTH) ** (-0.02 * inside))
+
+
+def _add_notes(result: xr.Dataset) -> None:
+    """Say which values are extrapolated or missing, and where the lag is not that of the regression."""
+    comments = []
+    if (result["scale_position"] != INSIDE).any():
+        comments.append(OUTSIDE)
+    off = np.abs(result["lag"].values / result["regression_interval"].values - 1.0) > LAG_TOLERANCE
+    if off.any():
+        comments.append("the lag in use is not the sampling interval of the regression")
+    if comments:
+        result["roughness_coefficient"].attrs["comment"] = "; ".join(comments)
+    if np.isnan(result["roughness_coefficient"]).any():
+        result["roughness_coefficient"].attrs["reason"] = STRAIGHT
+    for name in ("roughness_coefficient_low", "roughness_coefficient_high"):
+        if np.isnan(result[name]).any():
+            result[name].attrs["reason"] = FEW_PROFILES
+
+
 def _lag_cells(spacing: Sequence[float], towards: Direction, lag: float) -> list[int]:
-    """Return the lag in cells (y, x), at least one cell along the longer component."""
-    cells = [round(lag * part / step) for part, step in zip(towards.unit, spacing, strict=True)]
+    """Return the lag in cells along each axis, at least one cell along the longer component."""
+    unit = towards.unit[-len(spacing) :]
+    cells = [round(lag * part / step) for part, step in zip(unit, spacing, strict=True)]
     if not any(cells):
-        axis = int(abs(towards.unit[1]) >= abs(towards.unit[0]))
-        cells[axis] = 1 if towards.unit[axis] > 0 else -1
+        axis = max(range(len(unit)), key=lambda i: (abs(unit[i]), i))
+        cells[axis] = 1 if unit[axis] > 0 else -1
     return cells
 
 
-def _rms_slope(plane: Array, spacing: Sequence[float], towards: Direction, lag: float) -> tuple[float, float]:
-    """Return the rms slope between heights one lag apart (NaN without any), and the lag in use."""
+class ProfileSlopes(NamedTuple):
+    """Rms slope of all profiles (NaN without any), of each profile, and the lag in use (m)."""
+
+    slope: float
+    of_profiles: Array
+    lag: float
+
+
+def _profile_slopes(plane: Array, spacing: Sequence[float], towards: Direction, lag: float) -> ProfileSlopes:
+    """Return the slopes between heights one lag apart.
+
+    The profiles are the lines of cells along the lag. Those with less than half of the readings of the
+    longest are left out of `of_profiles`: a short one scatters more.
+    """
     cells = _lag_cells(spacing, towards, lag)
     ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, plane.shape, strict=True))
     behind = tuple(slice(max(-n, 0), size + min(-n, 0)) for n, size in zip(cells, plane.shape, strict=True))
     length = math.hypot(*(n * step for n, step in zip(cells, spacing, strict=True)))
-    rise = plane[ahead] - plane[behind]
-    rise = rise[np.isfinite(rise)]
-    return (math.sqrt(np.mean(rise**2)) / length if rise.size else math.nan), length
+    squares = (plane[ahead] - plane[behind]) ** 2
+    observed = np.isfinite(squares)
+    if not observed.any():
+        return ProfileSlopes(math.nan, np.empty(0), length)
+    line = _line_numbers(squares.shape, cells, spacing)[observed]
+    squares = squares[observed]
+    counts = np.bincount(line)
+    long_enough = (counts > 0) & (2 * counts >= counts.max())
+    means = np.bincount(line, weights=squares)[long_enough] / counts[long_enough]
+    return ProfileSlopes(math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length, length)
+
+
+def _line_numbers(shape: Sequence[int], cells: Sequence[int], spacing: Sequence[float]) -> Array:
+    """Return the number of the line along the lag, one cell wide, on which each pair of heights lies."""
+    if len(shape) == 1:
+        return np.zeros(shape, dtype=np.int64)
+    lag_y, lag_x = (n * step for n, step in zip(cells, spacing, strict=True))
+    y, x = (np.arange(n) * step for n, step in zip(shape, spacing, strict=True))
+    across = (x * lag_y - y[:, None] * lag_x) / (math.hypot(lag_y, lag_x) * min(spacing))
+    numbers = np.rint(across).astype(np.int64)
+    return np.asarray(numbers - numbers.min())
