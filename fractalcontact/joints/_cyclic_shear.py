@@ -14,9 +14,11 @@ from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._directions import check_direction, read_direction
 from fractalcontact.joints._friction import (
     ERROR,
+    FORMS,
     REFERENCES,
     check_dilatancy,
     dilatancy_slopes,
+    lift_curve,
     mark_locked,
     read_basic_angle,
     read_dilatancy,
@@ -25,6 +27,7 @@ from fractalcontact.joints._friction import (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 STRESSES = ("shear_stress", "frictional_work")
+LIFT = "_lift"  # name for the curve whose slope gives the angle
 
 
 def _check(
@@ -35,10 +38,11 @@ def _check(
     direction: Any,
     nominal_pressure: Any,
     basic_friction_angle: Any,
+    form: Any,
     smoothing: Any,
 ) -> None:
     valid = [
-        check_dilatancy(problems, dilatancy, basic_friction_angle, smoothing, nominal_pressure),
+        check_dilatancy(problems, dilatancy, basic_friction_angle, form, smoothing, nominal_pressure),
         problems.numbers("path", path),
         direction is None or check_direction(problems, direction),
     ]
@@ -75,6 +79,7 @@ def cyclic_shear(
     direction: str | float | None = None,
     nominal_pressure: float | Sequence[float] | None = None,
     basic_friction_angle: float | None = None,
+    form: str = "kinematic",
     smoothing: float | None = None,
 ) -> xr.Dataset:
     """Return the shear stress along a path of shear that reverses.
@@ -95,14 +100,15 @@ def cyclic_shear(
         Direction of positive positions; None: the first one of the dilatancy.
     nominal_pressure : float or sequence of float, optional
         Pressures (Pa) for rigid faces; dilatancy under force has its own.
-    basic_friction_angle, smoothing
+    basic_friction_angle, form, smoothing
         As for `fractalcontact.joints.friction`.
 
     Returns
     -------
     Dataset over (point[, step])
-        Every shear of the dilatancy on the way and the turning points, these twice, once with each sense:
-        shear (position, m), slip (m), sense (1 out, -1 back), dilatancy (m), friction_angle (degree); with
+        Every shear of the dilatancy on the way and the turning points, these twice, once with each sense; so
+        is the position 0 where the path crosses it, once with the slope of each side. Variables: shear
+        (position, m), slip (m), sense (1 out, -1 back), dilatancy (m), friction_angle (degree); with
         forces or pressures shear_stress (Pa) and frictional_work (J/m2, since the start). NaN with the
         `reason` where the friction angle reaches 90 degrees, and for the work from there on.
 
@@ -127,33 +133,42 @@ def cyclic_shear(
     >>> cycle.friction_angle.values.round(6).tolist()
     [40.0, 40.0, 40.0, 20.0, 20.0, 20.0]
     """
-    name, _ = read_dilatancy(dilatancy)
+    name, shears = read_dilatancy(dilatancy)
     turns = float_array(path)
+    dilatancy = dilatancy.assign({LIFT: (dilatancy[name].dims, lift_curve(dilatancy, form))})
     sides = {
         sign: dilatancy.isel(direction=int(_places(dilatancy, azimuth)[0]))
         if "direction" in dilatancy.dims
         else dilatancy
         for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items()
     }
-    position, opening = _joined_sides(sides, name)
-    slopes, _ = dilatancy_slopes(position, opening, smoothing)
+    shear, sense, side = _points_along(turns, shears)
+
+    def along(tables: dict[int, Array]) -> Array:
+        return _interpolated(np.abs(shear), side, shears, tables)
+
+    lifts = {sign: _table(dataset[LIFT], shears.size) for sign, dataset in sides.items()}
+    # each side has its own slope at the position 0: that of `friction` in its direction
+    slopes = {sign: dilatancy_slopes(shears, lift, smoothing)[0] for sign, lift in lifts.items()}
+    angle = (sense * side)[:, None] * np.degrees(np.arctan(along(slopes)))
+    basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
+    columns = {
+        "dilatancy": along({sign: _table(dataset[name], shears.size) for sign, dataset in sides.items()}),
+        "friction_angle": basic_angle + angle,
+    }
     pressure = None
     if name == "dilatancy":
-        pressure = _joined_sides(sides, "nominal_pressure")[1]
+        pressure = along(
+            {sign: _table(dataset["nominal_pressure"], shears.size) for sign, dataset in sides.items()}
+        )
     elif nominal_pressure is not None:
         values = float_array(nominal_pressure)
-        pressure = np.broadcast_to(values, (position.size, values.size))
-    shear, sense = _points_along(turns, position)
-    angle = np.degrees(np.arctan(_interpolated(shear, position, slopes)))
-    columns = {
-        "dilatancy": _interpolated(shear, position, opening),
-        "friction_angle": read_basic_angle(dilatancy, basic_friction_angle) + sense[:, None] * angle,
-    }
+        pressure = np.broadcast_to(values, (shear.size, values.size))
     if pressure is not None:
-        pressure = _interpolated(shear, position, pressure)
         columns |= _stresses(shear, sense, columns["friction_angle"], pressure)
     result = _dataset(shear, sense, columns, pressure, by_step=name == "dilatancy")
-    result["basic_friction_angle"] = read_basic_angle(dilatancy, basic_friction_angle)
+    result["basic_friction_angle"] = basic_angle
+    result["friction_angle"].attrs["comment"] = FORMS[form]
     mark_locked(result, STRESSES)
     return result.assign_attrs(slope_of=name)
 
@@ -193,15 +208,6 @@ def _places(dilatancy: xr.Dataset, azimuth: float) -> Array:
     return np.flatnonzero(np.isclose(_azimuths(dilatancy), azimuth, atol=1e-9))
 
 
-def _joined_sides(sides: dict[int, xr.Dataset], name: str) -> tuple[Array, Array]:
-    """Return the positions, ascending, and a variable over (position, step)."""
-    shears = np.asarray(sides[1]["shear"].values, dtype=float)
-    tables = {sign: _table(side[name], shears.size) for sign, side in sides.items()}
-    if -1 not in tables:
-        return shears, tables[1]
-    return np.concatenate([-shears[:0:-1], shears]), np.concatenate([tables[-1][:0:-1], tables[1]])
-
-
 def _table(variable: xr.DataArray, size: int) -> Array:
     """Return a variable over (shear, step)."""
     if "shear" not in variable.dims:
@@ -209,21 +215,34 @@ def _table(variable: xr.DataArray, size: int) -> Array:
     return np.asarray(variable.transpose("shear", ...).values, dtype=float).reshape(size, -1)
 
 
-def _points_along(turns: Array, position: Array) -> tuple[Array, Array]:
-    """Return the positions along the path, those of the dilatancy included, and the sense of sliding."""
-    legs, senses = [], []
+def _points_along(turns: Array, shears: Array) -> tuple[Array, Array, Array]:
+    """Return the positions along the path, those of the dilatancy included, the sense and the side.
+
+    The side is 1 for positions towards the direction and -1 for those opposite; a leg that crosses 0 has
+    this point on both.
+    """
+    legs, senses, sides = [], [], []
     for first, last in itertools.pairwise(turns):
-        low, high = min(first, last), max(first, last)
-        inner = position[(position > low) & (position < high)]
-        leg = np.concatenate([[low], inner, [high]])
-        legs.append(leg if last > first else leg[::-1])
-        senses.append(np.full(leg.size, 1 if last > first else -1, dtype=np.int8))
-    return np.concatenate(legs), np.concatenate(senses)
+        sense = 1 if last > first else -1
+        ends = (first, 0.0, last) if min(first, last) < 0 < max(first, last) else (first, last)
+        for start, stop in itertools.pairwise(ends):
+            side = -1 if min(start, stop) < 0 else 1
+            low, high = sorted((abs(start), abs(stop)))
+            inner = shears[(shears > low) & (shears < high)]
+            leg = side * np.concatenate([[low], inner, [high]]) + 0.0  # no minus zero
+            legs.append(leg if (leg[-1] > leg[0]) == (sense > 0) else leg[::-1])
+            senses.append(np.full(leg.size, sense, dtype=np.int8))
+            sides.append(np.full(leg.size, side, dtype=np.int8))
+    return np.concatenate(legs), np.concatenate(senses), np.concatenate(sides)
 
 
-def _interpolated(shear: Array, position: Array, table: Array) -> Array:
-    """Return a table over (position, ...) at other positions, linear between."""
-    return np.stack([np.interp(shear, position, column) for column in table.T], axis=1)
+def _interpolated(shear: Array, side: Array, shears: Array, tables: dict[int, Array]) -> Array:
+    """Return a variable over (point, step), linear between the shears, from one table for each side."""
+    values = np.empty((shear.size, tables[1].shape[1]))
+    for sign, table in tables.items():
+        here = side == sign
+        values[here] = np.stack([np.interp(shear[here], shears, column) for column in table.T], axis=1)
+    return values
 
 
 def _stresses(shear: Array, sense: Array, angle: Array, pressure: Array) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""Friction of a joint: the basic friction angle plus the dilatancy angle."""
+"""Friction of a joint: the basic friction angle plus the angle at which the faces climb."""
 
 from __future__ import annotations
 
@@ -18,18 +18,44 @@ REFERENCES = (
     "Patton, F. D., Multiple modes of shear failure in rock, 1st ISRM Congress, Lisbon (1966); "
     "Goodman, R. E., Introduction to Rock Mechanics, 2nd ed. (1989)"
 )
+FORMS = {
+    "kinematic": "basic friction angle plus atan(d delta/dv)",
+    "energy": "basic friction angle plus atan(d delta/dv + (1/N) dU/dv)",
+}
+LOCKED_ANGLE = 90.0  # degree
 LOCKED = (
     "NaN where the friction angle reaches 90 degrees: the faces are locked and cannot slide without damage"
 )
+UNRESOLVED = "NaN where the shears do not resolve the distance: a step of shear is longer, or it exceeds them"
+PEAKS = ("peak_friction_angle", "peak_shear_strength", "secant_friction_angle", "secant_shear_strength")
+PEAK_SHEARS = ("peak_shear", "peak_strength_shear")
+NOT_KNOWN = "depends on the distance in a way that is not known: the shears resolve one distance only"
+ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 ERROR = "that of the dilatancy"
 # a window given as a decimal must not lose a point to rounding, nor one of two equally near points
 WINDOW_ROUNDING = 1.0 + 1e-9
+PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
+FEWEST_STEPS = 2  # of shear in the default distance: the peak over half of it is then known as well
+HALVINGS = 20
+NEGLIGIBLE = 1.0  # degree; change of the peak when the distance is halved
 
 
 def _check(
-    problems: Problems, *, dilatancy: Any, basic_friction_angle: Any, smoothing: Any, nominal_pressure: Any
+    problems: Problems,
+    *,
+    dilatancy: Any,
+    basic_friction_angle: Any,
+    form: Any,
+    smoothing: Any,
+    distance: Any,
+    nominal_pressure: Any,
 ) -> None:
-    check_dilatancy(problems, dilatancy, basic_friction_angle, smoothing, nominal_pressure)
+    bounded = problems.number("distance", distance, above=0, optional=True)
+    if check_dilatancy(problems, dilatancy, basic_friction_angle, form, smoothing, nominal_pressure):
+        reach = float(np.ptp(read_dilatancy(dilatancy)[1]))
+        if bounded and distance is not None:
+            expected = f"at most the {reach:g} m that the shears cover"
+            problems.require(float(distance) <= reach * WINDOW_ROUNDING, "distance", expected, distance)
 
 
 @public_result(title="friction of a joint", references=REFERENCES, achieved_error=ERROR, check=_check)
@@ -37,13 +63,15 @@ def friction(
     dilatancy: xr.Dataset,
     *,
     basic_friction_angle: float | None = None,
+    form: str = "kinematic",
     smoothing: float | None = None,
+    distance: float | None = None,
     nominal_pressure: float | Sequence[float] | None = None,
 ) -> xr.Dataset:
     """Return friction angle and shear strength of a joint from its dilatancy.
 
     The dilatancy angle is i = atan(d delta/dv), the friction angle phi = phi_basic + i, and the shear
-    strength under the nominal pressure sigma is sigma tan(phi).
+    strength under the nominal pressure sigma is sigma tan(phi). The peak is taken over a stated distance.
 
     Parameters
     ----------
@@ -52,29 +80,42 @@ def friction(
         is used if present, otherwise the rigid one.
     basic_friction_angle : float, optional
         Degree, 0 to 90; None: the one stored in `dilatancy`.
+    form : {"kinematic", "energy"}
+        "energy": i = atan(T/N) with the horizontal force T of faces without friction; for elastic faces.
     smoothing : float, optional
         Length of shear (m) of a straight fit to the dilatancy around each shear. None: the slope through the
         neighbours. The angle depends on this length: compare only angles of equal `smoothing`.
+    distance : float, optional
+        Shear (m) over which the peak is the mean: the secant from v to v + distance. None: 1 % of the side of
+        the block, but at least two steps of shear (median), and at most all of it.
     nominal_pressure : float or sequence of float, optional
         Pressures sigma (Pa) for the strength of rigid faces; dilatancy under force has its own.
 
     Returns
     -------
     Dataset
-        dilatancy_angle, friction_angle (degree) over (direction, shear[, step]); with forces or pressures
-        shear_strength (Pa), NaN with the `reason` where the friction angle reaches 90 degrees and the faces
-        lock, negative where the block slides by itself. Over (direction[, step]): peak_friction_angle,
-        peak_shear_strength and the shears of both. Also basic_friction_angle and, over shear, smoothing.
+        dilatancy_angle, friction_angle (degree) over (direction, shear[, step]), with "energy" also
+        frictionless_angle, atan(T/N); with forces or pressures shear_strength (Pa), negative where the block
+        slides by itself. Over (direction[, step]): peak_friction_angle, peak_shear_strength, and the shears v
+        of both; peak_distance (m). secant_friction_angle and secant_shear_strength over `distance`: the peaks
+        over this distance halved and doubled, as far as the shears resolve. Strengths and peaks are NaN with
+        the `reason` where the faces lock. Also basic_friction_angle and, over shear, smoothing.
 
     Raises
     ------
     InvalidInput
         `dilatancy` is not the Dataset of `dilatancy`, has fewer than two shears, or an argument is wrong.
 
+    Notes
+    -----
+    The kinematic form is that of the paper. It neglects the elastic energy U stored in the faces while they
+    slide: T = N d delta/dv + dU/dv. Mated fractal faces have no peak of their own: it grows as the distance
+    gets shorter, and `comment` of the peak says by how much.
+
     References
     ----------
     Patton (1966), 1st ISRM Congress; Goodman (1989), Introduction to Rock Mechanics; Borri-Brunetto,
-    Carpinteri and Chiaia (1998), FRAMCOS-3, section 4.
+    Carpinteri and Chiaia (1998), FRAMCOS-3, section 4; Barton and Choubey (1977), Rock Mechanics 10:1.
 
     Examples
     --------
@@ -85,45 +126,203 @@ def friction(
     >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
     >>> climb = fc.joints.dilatancy(crack, shear=[0, 2, 4, 6], direction="E")
     >>> result = fc.joints.friction(climb, nominal_pressure=1e6)
-    >>> result.peak_friction_angle.values.round(3).tolist()
-    [45.0]
+    >>> result.peak_friction_angle.values.round(3).tolist(), float(result.peak_distance)
+    ([45.0], 4.0)
     >>> (result.peak_shear_strength / 1e6).values.round(3).tolist()
     [[1.0]]
     """
     name, shears = read_dilatancy(dilatancy)
     basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
-    heights = drop_unknown_coords(dilatancy[name]).drop_attrs().transpose("shear", ...)
-    slopes, lengths = dilatancy_slopes(shears, heights.values.reshape(shears.size, -1), smoothing)
-    angle = heights.copy(data=np.degrees(np.arctan(slopes)).reshape(heights.shape))
-    angle = angle.transpose(*dilatancy[name].dims)
-    result = xr.Dataset({"dilatancy_angle": angle, "friction_angle": angle + basic_angle})
+    opening = drop_unknown_coords(dilatancy[name]).drop_attrs()
+    lift = opening.copy(data=lift_curve(dilatancy, form))
+    result = xr.Dataset({"dilatancy_angle": _angle(opening, smoothing)})
+    if form == "energy":
+        result["frictionless_angle"] = _angle(lift, smoothing)
+    result["friction_angle"] = _angle(lift, smoothing) + basic_angle
     pressure = drop_unknown_coords(dilatancy["nominal_pressure"]) if name == "dilatancy" else None
     if nominal_pressure is not None:
         values = float_array(nominal_pressure)
         pressure = xr.DataArray(values, dims="step", coords={"step": np.arange(values.size)})
         result = result.assign_coords(nominal_pressure=pressure)
-    _add_peaks(result, pressure)
+    if pressure is not None:
+        result["shear_strength"] = _strength(result["friction_angle"], pressure)
+    length = default_distance(dilatancy, shears) if distance is None else float(distance)
+    secants = _secant_angles(lift, length) + basic_angle
+    result = result.assign(_peaks(secants, pressure, length).data_vars)
+    _, lengths = dilatancy_slopes(shears, np.zeros((shears.size, 1)), smoothing)
     result["basic_friction_angle"], result["smoothing"] = basic_angle, ("shear", lengths)
     result = result.drop_attrs().assign_attrs(slope_of=name)  # of the shear under the name of a peak
-    mark_locked(result, ("shear_strength", "peak_shear_strength", "peak_strength_shear"))
+    result["friction_angle"].attrs["comment"] = FORMS[form]
+    _explain(result, secants)
     return result
 
 
-def _add_peaks(result: xr.Dataset, pressure: xr.DataArray | None) -> None:
-    """Add the greatest angle and its shear; with pressures also strength, peak strength and its shear."""
-    angle = result["friction_angle"]
-    place = angle.fillna(-np.inf).argmax("shear")
-    result["peak_friction_angle"] = angle.isel(shear=place).drop_vars("shear")
-    result["peak_shear"] = result["shear"].isel(shear=place).drop_vars("shear")
-    if pressure is None:
-        return
-    tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < 90.0).values)))
-    strength = (tangent * pressure).transpose(*[dim for dim in angle.dims if dim != "step"], "step")
-    peak = strength.max("shear", skipna=False)
-    place = strength.fillna(np.inf).argmax("shear")
-    result["shear_strength"], result["peak_shear_strength"] = strength, peak
-    peak_shear = result["shear"].isel(shear=place).drop_vars("shear")
-    result["peak_strength_shear"] = peak_shear.where(peak.notnull())
+def lift_curve(dilatancy: xr.Dataset, form: str) -> Array:
+    """Return the curve (m) whose slope is the tangent of the angle at which the faces climb.
+
+    That is the dilatancy, or in the energy form the work of the horizontal force T of faces without friction
+    per normal force N, since the first shear. From T dv = N dz + dU, with z the height of the upper body,
+    follows d delta + dU/N for a constant N. If N varies (a spring), the flat block alone has the closure w_b
+    = N/k and the energy N w_b/2, and N dw_b = d(N w_b/2): both parts of the block are left out.
+    """
+    name = _dilatancy_name(dilatancy)
+    opening = dilatancy[name]
+    if form == "kinematic":
+        return np.asarray(opening.values, dtype=np.float64)
+    force, bulk, energy = (
+        dilatancy[each].broadcast_like(opening).transpose(*opening.dims).values for each in ENERGIES
+    )
+    axis = opening.dims.index("shear")
+    force, stored = np.moveaxis(force, axis, 0), np.moveaxis(energy - 0.5 * force * bulk, axis, 0)
+    mean_force = 0.5 * (force[1:] + force[:-1])
+    no_work = np.zeros_like(mean_force)  # faces that do not touch store nothing
+    steps = np.divide(np.diff(stored, axis=0), mean_force, out=no_work, where=mean_force > 0)
+    work = np.concatenate([np.zeros_like(force[:1]), np.cumsum(steps, axis=0)])
+    return np.asarray(opening.values + np.moveaxis(work, 0, axis))
+
+
+def _angle(lift: xr.DataArray, smoothing: float | None) -> xr.DataArray:
+    """Return the angle (degree) of a curve over (..., shear, ...)."""
+    curves = lift.transpose("shear", ...)
+    slopes, _ = dilatancy_slopes(_shears(lift), curves.values.reshape(curves.sizes["shear"], -1), smoothing)
+    angle = curves.copy(data=np.degrees(np.arctan(slopes)).reshape(curves.shape))
+    return angle.transpose(*lift.dims)
+
+
+def _strength(angle: xr.DataArray, pressure: xr.DataArray) -> xr.DataArray:
+    tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < LOCKED_ANGLE).values)))
+    return (tangent * pressure).transpose(*[dim for dim in angle.dims if dim != "step"], "step")
+
+
+def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
+    """Return the shear over which the peak is taken: 1 % of the side of the block, if the shears allow."""
+    side = float(dilatancy["nominal_area"]) ** 0.5 if "nominal_area" in dilatancy else 0.0
+    resolved = max(PEAK_SHARE * side, FEWEST_STEPS * float(np.median(np.diff(shears))))
+    return min(resolved, float(np.ptp(shears)))
+
+
+def _secant_angles(lift: xr.DataArray, length: float) -> xr.DataArray:
+    """Return the angle of the secant from every shear v to v + distance, over (..., distance, shear, ...).
+
+    The distances are `length`, halved and doubled as often as the shears resolve.
+    """
+    shears = _shears(lift)
+    candidates = length * 2.0 ** np.arange(-HALVINGS, HALVINGS + 1)
+    finest, reach = np.diff(shears).min() / WINDOW_ROUNDING, np.ptp(shears) * WINDOW_ROUNDING
+    candidates = candidates[(candidates == length) | ((candidates >= finest) & (candidates <= reach))]
+    resolved = np.isfinite(secant_slopes(shears, shears[:, None], candidates)).any(axis=(1, 2))
+    distances = candidates[resolved | (candidates == length)]
+    curves = lift.transpose("shear", ...)
+    slopes = secant_slopes(shears, curves.values.reshape(shears.size, -1), distances)
+    shape = (distances.size, *curves.shape)
+    angles = xr.DataArray(
+        np.degrees(np.arctan(slopes)).reshape(shape),
+        dims=("distance", *curves.dims),
+        coords={**curves.coords, "distance": distances},
+    )
+    place = lift.dims.index("shear")
+    return angles.transpose(*lift.dims[:place], "distance", *lift.dims[place:])
+
+
+def secant_slopes(shears: Array, curves: Array, distances: Array) -> Array:
+    """Return the slope of every curve from every shear v to v + distance, linear between the shears.
+
+    Parameters
+    ----------
+    shears : ndarray, shape (n,)
+        Ascending.
+    curves : ndarray, shape (n, m)
+        One curve in each column.
+    distances : ndarray, shape (k,)
+
+    Returns
+    -------
+    ndarray, shape (k, n, m)
+        NaN where the curve ends before v + distance, or a step of shear on the way is longer than the
+        distance.
+    """
+    steps = np.diff(shears)
+    slopes = np.full((distances.size, *curves.shape), np.nan)
+    for k, distance in enumerate(distances):
+        if distance * WINDOW_ROUNDING < steps.min():
+            continue
+        rounding = distance * (WINDOW_ROUNDING - 1.0)
+        for i, start in enumerate(shears):
+            end = start + distance
+            last = int(np.searchsorted(shears, end - rounding))  # the first shear at or beyond the end
+            if last == shears.size:
+                break
+            if steps[i:last].max() <= distance + rounding:
+                beyond = (shears[last] - end) / steps[last - 1] * (curves[last] - curves[last - 1])
+                slopes[k, i] = (curves[last] - beyond - curves[i]) / distance
+    return slopes
+
+
+def _peaks(secants: xr.DataArray, pressure: xr.DataArray | None, length: float) -> xr.Dataset:
+    """Return the greatest secant friction angle and strength of every distance, and those of `length`."""
+    locked = (secants >= LOCKED_ANGLE).any("shear")
+    columns = {"friction_angle": secants}
+    if pressure is not None:
+        if "shear" in pressure.dims:  # against a spring: the mean over the distance
+            pressure = _secant_means(pressure, secants["distance"].values)
+        columns["shear_strength"] = _strength(secants, pressure)
+    result = xr.Dataset({"peak_distance": length})
+    for name, values in columns.items():
+        greatest = values.max("shear").where(~locked).transpose(*[d for d in values.dims if d != "shear"])
+        result[f"secant_{name}"] = greatest
+        place = values.fillna(-np.inf).argmax("shear")
+        shear = values["shear"].isel(shear=place).drop_vars("shear").where(greatest.notnull())
+        of_peak = "peak_shear" if name == "friction_angle" else "peak_strength_shear"
+        for peak, every in ((f"peak_{name}", greatest), (of_peak, shear)):
+            result[peak] = every.sel(distance=length).drop_vars("distance")
+    return result
+
+
+def _secant_means(values: xr.DataArray, distances: Array) -> xr.DataArray:
+    """Return the mean of values over (..., shear, ...) from every shear v to v + distance."""
+    curves = values.transpose("shear", ...)
+    shears, table = _shears(values), curves.values.reshape(curves.sizes["shear"], -1)
+    integral = np.zeros_like(table)
+    integral[1:] = np.cumsum(0.5 * np.diff(shears)[:, None] * (table[1:] + table[:-1]), axis=0)
+    means = secant_slopes(shears, integral, distances).reshape(distances.size, *curves.shape)
+    return xr.DataArray(means, dims=("distance", *curves.dims), coords={"distance": distances})
+
+
+def _shears(curve: xr.DataArray) -> Array:
+    return np.asarray(curve["shear"].values, dtype=np.float64)
+
+
+def _dependence(secants: xr.DataArray) -> str:
+    """Return how the peak depends on the distance, from the two shortest that the shears resolve."""
+    angles = secants.transpose("distance", "shear", ...).values
+    greatest = np.where(np.isfinite(angles), angles, -np.inf).max(axis=1).reshape(len(angles), -1)
+    resolved = np.flatnonzero(np.isfinite(greatest).any(axis=1))
+    if resolved.size < 2:
+        return NOT_KNOWN
+    both = np.isfinite(greatest[resolved[:2]]).all(axis=0)
+    if not both.any():
+        return NOT_KNOWN
+    shortest, next_one = greatest[resolved[:2]][:, both]
+    change, at = float(np.abs(shortest - next_one).max()), float(secants["distance"][resolved[0]])
+    if change <= NEGLIGIBLE:
+        return f"changes by at most {change:.2g} degree when the distance is halved to {at:.3g} m"
+    return (
+        f"changes by up to {change:.3g} degree when the distance is halved to {at:.3g} m, the shortest that "
+        "the shears resolve: no limit is reached; compare only peaks over equal distances"
+    )
+
+
+def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
+    """Say how the peaks depend on the distance, and why values are missing."""
+    mark_locked(result, ("shear_strength",))
+    locked = bool((secants >= LOCKED_ANGLE).any())
+    unresolved = bool(np.isnan(secants.sel(distance=float(result["peak_distance"])).values).all())
+    reason = "; ".join([LOCKED] * locked + [UNRESOLVED] * unresolved)
+    for name in (*PEAKS, *PEAK_SHEARS):
+        if name in result and name in PEAKS:
+            result[name].attrs["comment"] = _dependence(secants)
+        if name in result and bool(np.isnan(result[name].values).any()):
+            result[name].attrs["reason"] = reason
 
 
 def mark_locked(result: xr.Dataset, names: Sequence[str]) -> None:
@@ -134,9 +333,15 @@ def mark_locked(result: xr.Dataset, names: Sequence[str]) -> None:
 
 
 def check_dilatancy(
-    problems: Problems, dilatancy: Any, basic_friction_angle: Any, smoothing: Any, nominal_pressure: Any
+    problems: Problems,
+    dilatancy: Any,
+    basic_friction_angle: Any,
+    form: Any,
+    smoothing: Any,
+    nominal_pressure: Any,
 ) -> bool:
     """Check the Dataset of `dilatancy` and the options that are common to friction and cyclic shear."""
+    is_form = problems.choice("form", form, FORMS)
     problems.number("smoothing", smoothing, above=0, optional=True)
     problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
     expected = "the Dataset of fractalcontact.joints.dilatancy"
@@ -145,6 +350,11 @@ def check_dilatancy(
         return False
     name = _dilatancy_name(dilatancy)
     needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
+    if is_form and form == "energy":
+        expected_form = "'kinematic' for a dilatancy without forces, and where faces yield"
+        is_elastic = name == "dilatancy" and "plastic_work" not in dilatancy
+        problems.require(is_elastic, "form", expected_form, form)
+        needed += ENERGIES if is_elastic else []
     absent = [variable for variable in needed if variable not in dilatancy.variables]
     if absent or "shear" not in dilatancy[name].dims:
         problems.add("dilatancy", expected, f"no {', '.join(absent) or 'dim shear'}")

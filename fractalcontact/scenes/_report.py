@@ -204,7 +204,9 @@ def _friction(tree: xr.DataTree) -> str:
     friction = group_of(tree, "joints/friction")
     if friction is None or "peak_shear_strength" not in friction:
         return ""
-    rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", "shear")]
+    over = float(friction["peak_distance"]) * 1e3
+    column = f"from shear, over {over:.3g} mm"
+    rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", column)]
     for direction in friction["direction"].values:
         for step in range(friction.sizes["step"]):
             state = friction.sel(direction=direction).isel(step=step)
@@ -214,11 +216,12 @@ def _friction(tree: xr.DataTree) -> str:
                     str(direction),
                     f"{float(state['nominal_pressure']) / 1e6:.3g} MPa",
                     f"{strength / 1e6:.4g} MPa" if np.isfinite(strength) else "none: the faces lock",
-                    f"{float(state['peak_friction_angle']):.1f} degree",
-                    f"{float(state['peak_shear']) * 1e3:.3g} mm",
+                    f"{float(state['peak_friction_angle']):.1f} degree" if np.isfinite(strength) else "",
+                    f"{float(state['peak_shear']) * 1e3:.3g} mm" if np.isfinite(strength) else "",
                 )
             )
-    return table(rows)
+    comment = friction["peak_friction_angle"].attrs.get("comment")
+    return table(rows) + (f"\nThe peak friction angle {comment}." if comment else "")
 
 
 def _contact_set(tree: xr.DataTree) -> str:

@@ -32,6 +32,7 @@ ONE_NUMBER: dict[str, dict[str, Any]] = {
     "contact_modulus": {"above": 0.0},
     "tolerance": {"above": 0.0, "below": 1.0},
     "smoothing": {"above": 0.0},
+    "distance": {"above": 0.0},
     "viscosity": {"above": 0.0},
     "hardness": {"above": 0.0},
 }
