@@ -1,4 +1,4 @@
-"""One walk over every public function: labels from the table, a clean file, the same data read back."""
+"""Every public function that returns labelled data: labels of the schema, a compliant file, a round trip."""
 
 import importlib
 
@@ -10,8 +10,8 @@ import fractalcontact as fc
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.scenes import contents
 
-ROOMS = ("surfaces", "dimensions", "contact", "domains", "joints")
-# these give no labelled data: an object, a number, a table of words, the named laws of the handbooks
+SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints")
+# these return an object, a number or a table of words, not labelled data
 UNLABELLED = {
     "joints.Crack",
     "joints.PARK_PAULAY",
@@ -30,21 +30,21 @@ UNLABELLED = {
 }
 
 
-def face(n=40):
+def rough(n=40):
     return fc.surfaces.fbm((n, n), 1e-4, hurst=0.7, rms_increment=5e-6, rng=11)
 
 
-def wavy(n=40):
+def periodic(n=40):
     return fc.surfaces.spectral((n, n), 1e-4, hurst=0.8, rms_height=1e-5, rng=12)
 
 
 def crack():
-    return fc.joints.Crack(face(), young=30e9, poisson=0.2, block=2e-3)
+    return fc.joints.Crack(rough(), young=30e9, poisson=0.2, block=2e-3)
 
 
 def pressed():
     return fc.contact.press(
-        wavy(), contact_modulus=1e9, nominal_pressure=[1e6, 1e7], keep=("state", "pressure", "gap")
+        periodic(), contact_modulus=1e9, nominal_pressure=[1e6, 1e7], keep=("state", "pressure", "gap")
     )
 
 
@@ -61,20 +61,20 @@ def slid():
 
 
 CALLS = {
-    "surfaces.fbm": face,
-    "surfaces.spectral": wavy,
+    "surfaces.fbm": rough,
+    "surfaces.spectral": periodic,
     "surfaces.midpoint": lambda: fc.surfaces.midpoint((20, 20), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1),
     "surfaces.weierstrass": lambda: fc.surfaces.weierstrass(
         (20, 20), 1e-4, hurst=0.7, rms_height=1e-6, rng=1
     ),
     "surfaces.from_array": lambda: fc.surfaces.from_array(np.eye(5), 1e-3),
     "surfaces.sample": lambda: fc.surfaces.sample("concrete_crack"),
-    "surfaces.level": lambda: fc.surfaces.level(face()),
-    "surfaces.fill": lambda: fc.surfaces.fill(face().where(face().x > 2e-4)),
-    "surfaces.despike": lambda: fc.surfaces.despike(face()),
-    "surfaces.describe": lambda: fc.surfaces.describe(face()),
-    "dimensions.estimate": lambda: fc.dimensions.estimate(face(), list(fc.dimensions.methods())),
-    "dimensions.spectrum": lambda: fc.dimensions.spectrum(wavy()),
+    "surfaces.level": lambda: fc.surfaces.level(rough()),
+    "surfaces.fill": lambda: fc.surfaces.fill(rough().where(rough().x > 2e-4)),
+    "surfaces.despike": lambda: fc.surfaces.despike(rough()),
+    "surfaces.describe": lambda: fc.surfaces.describe(rough()),
+    "dimensions.estimate": lambda: fc.dimensions.estimate(rough(), list(fc.dimensions.methods())),
+    "dimensions.spectrum": lambda: fc.dimensions.spectrum(periodic()),
     "contact.press": pressed,
     "joints.delta_surface": lambda: fc.joints.delta_surface(crack(), [1e-4, 2e-4], "W"),
     "joints.closure": lambda: fc.joints.closure(
@@ -89,8 +89,8 @@ CALLS = {
     "joints.delta_dimension": lambda: fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4]),
     "joints.dilatancy": slid,
     "joints.friction": lambda: fc.joints.friction(slid()),
-    "joints.register": lambda: fc.joints.register(face(), face() + 1e-5),
-    "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(face(), lag=4e-4),
+    "joints.register": lambda: fc.joints.register(rough(), rough() + 1e-5),
+    "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(rough(), lag=4e-4),
     "joints.transmissivity": lambda: fc.joints.transmissivity(gap()),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
     "domains.area_dimension": lambda: fc.domains.area_dimension(
@@ -100,36 +100,31 @@ CALLS = {
 }
 
 
-def walked():
-    """Return every public function that gives labelled data, as room.function."""
-    for room in ROOMS:
-        module = importlib.import_module(f"fractalcontact.{room}")
+def public_functions():
+    """Yield every public function that returns labelled data, as subpackage.function."""
+    for subpackage in SUBPACKAGES:
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
         for name in module.__all__:
-            if f"{room}.{name}" not in UNLABELLED:
-                yield f"{room}.{name}"
+            if f"{subpackage}.{name}" not in UNLABELLED:
+                yield f"{subpackage}.{name}"
 
 
 def result_of(name, tmp_path):
     if name in CALLS:
         return CALLS[name]()
-    room, function = name.split(".")
     if name == "surfaces.read":
-        return fc.surfaces.read(fc.save(face(), tmp_path / "face.nc"))
-    given = {"dimensions": face, "domains": state}.get(room)
-    assert given is not None, f"tell this test how to call {name}"
-    return getattr(getattr(fc, room), function)(given())
+        return fc.surfaces.read(fc.save(rough(), tmp_path / "surface.nc"))
+    subpackage, function = name.split(".")
+    make_input = {"dimensions": rough, "domains": state}.get(subpackage)
+    assert make_input is not None, f"add a call of {name} to CALLS"
+    return getattr(getattr(fc, subpackage), function)(make_input())
 
 
-@pytest.fixture(params=list(walked()))
-def result(request, tmp_path):
-    return request.param, result_of(request.param, tmp_path)
-
-
-def test_labels_file_and_round_trip(result, tmp_path, compliance):
-    name, found = result
-    if not isinstance(found, (xr.Dataset, xr.DataArray)):
-        pytest.fail(f"{name} gives a {type(found).__name__}")
-    dataset = found if isinstance(found, xr.Dataset) else found.to_dataset(name=found.name)
+@pytest.mark.parametrize("name", list(public_functions()))
+def test_labels_file_and_round_trip(name, tmp_path, compliance):
+    result = result_of(name, tmp_path)
+    assert isinstance(result, (xr.Dataset, xr.DataArray)), f"{name} returns a {type(result).__name__}"
+    dataset = result if isinstance(result, xr.Dataset) else result.to_dataset(name=result.name)
     for key, variable in dataset.variables.items():
         quantity = QUANTITIES[key]
         # scales of a mask are in cells, those of a surface in metres
@@ -138,18 +133,18 @@ def test_labels_file_and_round_trip(result, tmp_path, compliance):
         assert variable.attrs["long_name"], (name, key)
         if variable.ndim >= 2 and {"y", "x"} <= set(variable.dims):
             assert variable.dims[-2:] == ("y", "x"), (name, key)
-    assert "provenance" in found.attrs, name
-    path = fc.save(found, tmp_path / "result.nc")
+    assert "provenance" in result.attrs, name
+    path = fc.save(result, tmp_path / "result.nc")
     assert compliance(path) == [], name
-    told = contents(path)
-    assert "run time" in told, name
-    words = ("achieved error ", "residual:", "error:", "low:", "misfit:")
-    assert any(word in told for word in words), name
-    xr.testing.assert_identical(fc.open(path), found)
-    if isinstance(found, xr.Dataset):
-        found.to_netcdf(tmp_path / "plain.nc")
+    description = contents(path)
+    assert "run time" in description, name
+    error_labels = ("achieved error ", "residual:", "error:", "low:", "misfit:")
+    assert any(label in description for label in error_labels), name
+    xr.testing.assert_identical(fc.open(path), result)
+    if isinstance(result, xr.Dataset):
+        result.to_netcdf(tmp_path / "plain.nc")
         assert compliance(tmp_path / "plain.nc") == [], name
 
 
-def test_nothing_is_named_load():
+def test_no_variable_has_the_name_of_an_xarray_method():
     assert "load" not in QUANTITIES

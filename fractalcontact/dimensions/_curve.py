@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]

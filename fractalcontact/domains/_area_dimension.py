@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.results import public_result
-from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     Array,

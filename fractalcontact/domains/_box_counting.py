@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.special import stdtrit
 
 from fractalcontact.base.results import public_result
-from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _random_null
 from fractalcontact.domains._box_covers import COVERS, Curve, cover_curve

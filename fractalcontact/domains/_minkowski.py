@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.results import public_result
-from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.domains._mask_input import (
     Array,

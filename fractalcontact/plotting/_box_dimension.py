@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.scaling import local_slope
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._families import draw_families, path_panels
 from fractalcontact.plotting._inputs import as_dataset, result_of, table

@@ -13,7 +13,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._circulant_embedding import draw, embed, torus_shape
+from fractalcontact.surfaces._circulant import draw, embed, torus_shape
 from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 

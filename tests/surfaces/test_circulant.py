@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fractalcontact.surfaces import _circulant_embedding as circulant
+from fractalcontact.surfaces import _circulant as circulant
 
 EXPONENTS = (0.01, 0.1, 0.3, 0.5, 0.75, 0.76, 0.9, 0.99)
 

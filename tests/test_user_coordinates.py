@@ -1,4 +1,4 @@
-"""Faces that carry coordinates and attributes of the user's own, through every room."""
+"""Inputs with coordinates and attributes of the user's own, through every subpackage."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,12 @@ N = 24
 SHEAR = [0.0, 1e-4, 2e-4]
 
 
-def face(**options):
+def rough(**options):
     return fc.surfaces.fbm((N, N), 1e-4, hurst=0.7, rms_increment=5e-6, rng=11, **options)
 
 
-def strange(surface):
-    """Return a surface with coordinates of any name and kind, some of them names of results."""
+def with_user_coords(surface):
+    """Return a surface with coordinates of any name and dtype, some of them names of results."""
     surface = surface.assign_coords(
         sample="A1",
         when=np.datetime64("2020-01-01", "ns"),
@@ -32,8 +32,8 @@ def strange(surface):
     return surface
 
 
-def told(dataset):
-    """Return what a joint gave, with coordinates put on by its reader."""
+def annotated(dataset):
+    """Return a joint result with coordinates added by the user."""
     dataset = dataset.assign_coords(sample="A1", who=("shear", np.arange(dataset.sizes["shear"])))
     dataset.attrs["provenance"] = "typed in"
     return dataset
@@ -43,7 +43,7 @@ def crack(surface):
     return fc.joints.Crack(surface, young=3e10, poisson=0.2, block=1.2e-3)
 
 
-def slid(surface, **options):
+def sheared(surface, **options):
     return fc.joints.dilatancy(crack(surface), shear=SHEAR, direction=["E", "W"], **options)
 
 
@@ -63,10 +63,10 @@ FUNCTIONS = {
     "delta_surface": lambda z: fc.joints.delta_surface(crack(z), SHEAR),
     "closure": lambda z: fc.joints.closure(crack(z), shear=SHEAR, normal_force=[1.0], keep=("state",)),
     "laws": lambda z: fc.joints.closure_laws(
-        told(fc.joints.closure(crack(z), shear=SHEAR, normal_force=[1.0, 2.0, 3.0]))
+        annotated(fc.joints.closure(crack(z), shear=SHEAR, normal_force=[1.0, 2.0, 3.0]))
     ),
-    "friction": lambda z: fc.joints.friction(told(slid(z, normal_force=[1.0]))),
-    "cyclic_shear": lambda z: fc.joints.cyclic_shear(told(slid(z)), [0.0, 1e-4, -1e-4]),
+    "friction": lambda z: fc.joints.friction(annotated(sheared(z, normal_force=[1.0]))),
+    "cyclic_shear": lambda z: fc.joints.cyclic_shear(annotated(sheared(z)), [0.0, 1e-4, -1e-4]),
     "register": lambda z: fc.joints.register(z, z + 1e-5),
     "roughness_coefficient": fc.joints.roughness_coefficient,
     "transmissivity": lambda z: fc.joints.transmissivity(z - z.min()),
@@ -74,42 +74,42 @@ FUNCTIONS = {
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_what_the_house_does_not_know_changes_nothing(name, tmp_path):
-    plain = FUNCTIONS[name](face())
-    found = FUNCTIONS[name](strange(face()))
-    assert set(found.coords) <= set(QUANTITIES)
-    assert found.sizes == plain.sizes
-    if isinstance(found, xr.Dataset):
-        assert set(found.data_vars) == set(plain.data_vars)
-        times = [key for key in found.data_vars if "time" in key]
-        xr.testing.assert_equal(found.drop_vars(times).reset_coords(drop=True),
+def test_unknown_coordinates_change_nothing(name, tmp_path):
+    plain = FUNCTIONS[name](rough())
+    result = FUNCTIONS[name](with_user_coords(rough()))
+    assert set(result.coords) <= set(QUANTITIES)
+    assert result.sizes == plain.sizes
+    if isinstance(result, xr.Dataset):
+        assert set(result.data_vars) == set(plain.data_vars)
+        times = [key for key in result.data_vars if "time" in key]
+        xr.testing.assert_equal(result.drop_vars(times).reset_coords(drop=True),
                                 plain.drop_vars(times).reset_coords(drop=True))  # fmt: skip
     else:
-        np.testing.assert_array_equal(found.values, plain.values)
-    assert "operator" not in found.attrs
-    fc.save(found, tmp_path / "found.nc")
+        np.testing.assert_array_equal(result.values, plain.values)
+    assert "operator" not in result.attrs
+    fc.save(result, tmp_path / "result.nc")
 
 
 @pytest.mark.parametrize("name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity"])
-def test_the_coordinate_of_an_own_dim_stays(name, tmp_path):
+def test_coordinate_of_a_user_dim_is_kept(name, tmp_path):
     stack = (
-        face(members=2).rename(member="depth").assign_coords(depth=[0.5, 2.0], owner=("depth", ["p", "q"]))
+        rough(members=2).rename(member="depth").assign_coords(depth=[0.5, 2.0], owner=("depth", ["p", "q"]))
     )
     stack["depth"].attrs.update(units="km", history="somewhere")
-    found = FUNCTIONS[name](stack)
-    assert found.depth.attrs == {"units": "km", "long_name": "depth"}
-    assert found.depth.values.tolist() == [0.5, 2.0]
-    assert "owner" not in found.coords
-    xr.testing.assert_identical(fc.open(fc.save(found, tmp_path / "stack.nc")), found)
+    result = FUNCTIONS[name](stack)
+    assert result.depth.attrs == {"units": "km", "long_name": "depth"}
+    assert result.depth.values.tolist() == [0.5, 2.0]
+    assert "owner" not in result.coords
+    xr.testing.assert_identical(fc.open(fc.save(result, tmp_path / "stack.nc")), result)
 
 
 @pytest.mark.parametrize("name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity"])
-def test_an_index_of_several_levels_is_left_out(name):
-    stack = face(members=4).rename(member="case").drop_vars("case")
+def test_multi_index_is_dropped(name):
+    stack = rough(members=4).rename(member="case").drop_vars("case")
     stack = stack.assign_coords(a=("case", [0, 0, 1, 1]), b=("case", [0, 1, 0, 1])).set_index(case=["a", "b"])
-    found = FUNCTIONS[name](stack)
-    assert found.sizes["case"] == 4
-    assert not {"case", "a", "b"} & set(found.coords)
+    result = FUNCTIONS[name](stack)
+    assert result.sizes["case"] == 4
+    assert not {"case", "a", "b"} & set(result.coords)
 
 
 @pytest.mark.parametrize(
@@ -125,14 +125,14 @@ def test_an_index_of_several_levels_is_left_out(name):
         ("transmissivity", "axis"),
     ],
 )
-def test_a_dim_called_as_a_result_is_refused(name, dim):
+def test_dim_named_like_a_result_is_refused(name, dim):
     with pytest.raises(
         ValueError, match=rf"dims: expected leading dims not called as the results are, {dim}"
     ):
-        FUNCTIONS[name](face(members=2).rename(member=dim))
+        FUNCTIONS[name](rough(members=2).rename(member=dim))
 
 
-def test_what_no_file_holds_is_told(tmp_path):
+def test_attributes_that_no_file_holds_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"result: expected names, values and attributes that a NetCDF"):
-        fc.save(strange(face()), tmp_path / "face.nc")
+        fc.save(with_user_coords(rough()), tmp_path / "face.nc")
     assert list(tmp_path.iterdir()) == []
