@@ -4,6 +4,7 @@ import importlib
 
 import numpy as np
 import pytest
+import skimage as ski
 import xarray as xr
 
 import fractalcontact as fc
@@ -109,7 +110,14 @@ def public_functions():
                 yield f"{subpackage}.{name}"
 
 
+def image_file(folder):
+    ski.io.imsave(folder / "mask.png", np.uint8(255 * np.eye(9)), check_contrast=False)
+    return folder / "mask.png"
+
+
 def result_of(name, tmp_path):
+    if name == "domains.read_mask":
+        return fc.domains.read_mask(image_file(tmp_path), 1e-4)
     if name in CALLS:
         return CALLS[name]()
     if name == "surfaces.read":

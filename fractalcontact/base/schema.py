@@ -80,6 +80,7 @@ QUANTITIES: dict[str, Quantity] = {
     # surfaces
     "height": Quantity("m", "surface height"),
     "valid": Quantity("1", "cell was observed"),
+    "mask": Quantity("1", "cell belongs to the set"),
     "filled_points": Quantity("1", "number of missing points that were filled"),
     "removed_points": Quantity("1", "number of spikes that were removed"),
     "missing_points": Quantity("1", "number of missing points"),

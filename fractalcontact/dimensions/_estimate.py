@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions import (
     _covering_area,

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import logarithm
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces

@@ -10,8 +10,8 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces

@@ -11,6 +11,7 @@ from ._lineage import lineage as lineage
 from ._minkowski import minkowski_dimension as minkowski_dimension
 from ._multifractal import generalised_dimensions as generalised_dimensions
 from ._percolation import percolation as percolation
+from ._read_mask import read_mask as read_mask
 
 __all__ = [
     "area_dimension",
@@ -26,4 +27,5 @@ __all__ = [
     "lineage",
     "minkowski_dimension",
     "percolation",
+    "read_mask",
 ]

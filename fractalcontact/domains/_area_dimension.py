@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     Array,
@@ -18,7 +18,7 @@ from fractalcontact.domains._mask_input import (
     build_dataset,
     check_mask,
     mask_grid,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import ROUNDING, fit_line, interval_notes
 
@@ -103,7 +103,7 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
     >>> round(float(result.area_dimension), 4)  # ln 8 / ln 3
     1.8928
     """
-    stacks = sorted((read_mask(mask) for mask in masks), key=lambda planes: planes.side)
+    stacks = sorted((read_planes(mask) for mask in masks), key=lambda planes: planes.side)
     fractions = [_contact_fractions(planes) for planes in stacks]
     counted, improved = (np.stack(values, axis=-1) for values in zip(*fractions, strict=True))
     resolution = np.array([planes.side for planes in stacks])

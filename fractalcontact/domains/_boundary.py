@@ -18,7 +18,7 @@ from fractalcontact.domains._mask_input import (
     build_dataset,
     check_mask,
     parallel_map,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import dimension_variables, interval_notes, window_notes
 
@@ -84,7 +84,7 @@ def boundary_dimension(
     >>> round(float(result.boundary_dimension), 1)  # a smooth boundary
     1.0
     """
-    return analyse(read_mask(mask, valid=valid, periodic=periodic))
+    return analyse(read_planes(mask, valid=valid, periodic=periodic))
 
 
 def analyse(planes: Planes) -> xr.Dataset:

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtrit
 
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _random_null
 from fractalcontact.domains._box_covers import COVERS, Curve, cover_curve
@@ -23,7 +23,7 @@ from fractalcontact.domains._mask_input import (
     check_mask,
     plane_shape,
     read_box_sizes,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import (
     ROUNDING,
@@ -129,7 +129,7 @@ def box_dimension(
     >>> round(float(result.box_dimension), 4)  # ln 3 / ln 2
     1.585
     """
-    return analyse(read_mask(mask, valid=valid, periodic=periodic), scales=scales, cover=cover)
+    return analyse(read_planes(mask, valid=valid, periodic=periodic), scales=scales, cover=cover)
 
 
 @public_result(title="Box counts", references=SOURCE, achieved_error="exact", check=_check_box_counts)
@@ -169,7 +169,7 @@ def box_counts(
     >>> fc.domains.box_counts(mask, [1, 2, 4], cover="aligned").box_count.values.tolist()
     [64, 16, 4]
     """
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     every = np.arange(1, max(1, min(planes.grid.shape) // 2) + 1)
     box_sizes = read_box_sizes(sizes, every)
     curve = cover_curve(planes, box_sizes, cover)

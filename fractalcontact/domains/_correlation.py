@@ -9,8 +9,8 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     Array,
@@ -20,7 +20,7 @@ from fractalcontact.domains._mask_input import (
     check_mask,
     plane_shape,
     read_box_sizes,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
@@ -89,7 +89,7 @@ def correlation_dimension(
     >>> round(float(fc.domains.correlation_dimension(mask).correlation_dimension), 6)  # a line
     1.0
     """
-    return analyse(read_mask(mask, valid=valid, periodic=periodic), scales=scales)
+    return analyse(read_planes(mask, valid=valid, periodic=periodic), scales=scales)
 
 
 def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:

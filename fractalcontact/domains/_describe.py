@@ -13,7 +13,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.domains import _boundary, _box_counting, _correlation, _lacunarity, _minkowski
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._islands import island_scalars
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
 from fractalcontact.domains._percolation import AXES, crossings, percolation_name
 
 ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
@@ -76,7 +76,7 @@ def describe(
     >>> int(result.n_islands), round(float(result.coverage), 3), result.percolates.values.tolist()
     (1, 0.133, [False, False])
     """
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
     measurements = measure_planes(planes, MEASURES, components, connectivity)
     size = min(LACUNARITY_BOX, *planes.grid.shape)

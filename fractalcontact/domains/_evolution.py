@@ -16,7 +16,7 @@ from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains._connected_components import Components, label_planes
 from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes
 from fractalcontact.domains._lineage import check_path, island_overlaps
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
 
 SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998); Hausdorff, Mengenlehre (1927)"
 CHANGES = "changes"
@@ -89,7 +89,7 @@ def evolution(
     (1.0, 0.5)
     """
     wanted = WORDS if want is None else word_tuple(want)
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     components: list[Components] = []
     if any(word in wanted for word in NEED_ISLANDS):
         components = label_planes(planes, connectivity, keep=CHANGES in wanted)

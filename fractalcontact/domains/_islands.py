@@ -19,7 +19,7 @@ from fractalcontact.domains._connected_components import (
     euler_number,
     label_planes,
 )
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
@@ -92,7 +92,7 @@ def islands(
     """
     maps = word_tuple(keep)
     columns = COLUMNS if table is None else word_tuple(table)
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     detailed = None if table is None else bool(set(columns) - set(PLAIN_COLUMNS))
     components = label_planes(planes, connectivity, keep="label" in maps, detailed=detailed)
     too_many = table is None and any(plane.details is None for plane in components)

@@ -20,7 +20,7 @@ from fractalcontact.domains._mask_input import (
     parallel_map,
     plane_shape,
     read_box_sizes,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import fit_line
 
@@ -97,7 +97,7 @@ def lacunarity(
     >>> result.lacunarity.values.tolist()
     [2.0, 1.0, 1.0]
     """
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     return analyse(planes, box_sizes, boxes=boxes)
 
 

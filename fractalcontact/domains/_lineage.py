@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._mask_input import Array, build_dataset, plane_shape, read_mask
+from fractalcontact.domains._mask_input import Array, build_dataset, plane_shape, read_planes
 
 SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998)"
 CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flags of `event` in the schema
@@ -76,7 +76,7 @@ def lineage(
     >>> [result.event.flag_meanings.split()[event] for event in result.event.values]
     ['merge', 'merge']
     """
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity)
     later = [plane for plane in range(planes.count) if plane % planes.shape[-1]]
     tables = [event_table(components[plane - 1], components[plane]) for plane in later]

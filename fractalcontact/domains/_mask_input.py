@@ -87,7 +87,7 @@ class Planes:
 def check_mask(
     problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, argument: str = "mask"
 ) -> bool:
-    """Check a mask, its observed cells and the choice of periodicity; `read_mask` then reads them."""
+    """Check a mask, its observed cells and the choice of periodicity; `read_planes` then reads them."""
     if not _check_cells(problems, mask, argument):
         problems.boolean("periodic", periodic, optional=True)
         return False
@@ -157,7 +157,7 @@ def mask_grid(mask: xr.DataArray) -> Grid:
     return Grid(shape, (1.0, 1.0), (False, False), has_coordinates=False)
 
 
-def read_mask(
+def read_planes(
     mask: xr.DataArray, *, valid: xr.DataArray | None = None, periodic: bool | None = None
 ) -> Planes:
     """Return the planes of a mask that passed `check_mask`."""

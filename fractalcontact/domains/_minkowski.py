@@ -10,8 +10,8 @@ import xarray as xr
 
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.domains._mask_input import (
     Array,
@@ -20,7 +20,7 @@ from fractalcontact.domains._mask_input import (
     check_mask,
     parallel_map,
     plane_shape,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._random_null import miss_probability
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
@@ -89,7 +89,7 @@ def minkowski_dimension(
     >>> round(float(fc.domains.minkowski_dimension(mask).minkowski_dimension), 6)  # a line
     1.0
     """
-    return analyse(read_mask(mask, valid=valid, periodic=periodic), radii=radii)
+    return analyse(read_planes(mask, valid=valid, periodic=periodic), radii=radii)
 
 
 def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:

@@ -18,7 +18,7 @@ from fractalcontact.domains._mask_input import (
     check_mask,
     plane_shape,
     read_box_sizes,
-    read_mask,
+    read_planes,
 )
 from fractalcontact.domains._scaling_fit import (
     ROUNDING,
@@ -110,7 +110,7 @@ def generalised_dimensions(
     1.737
     """
     orders = float_array(q)
-    planes = read_mask(_support(mask), valid=valid)
+    planes = read_planes(_support(mask), valid=valid)
     default = 2 ** np.arange(
         default_sizes(planes.grid.shape).max(initial=1).item().bit_length(), dtype=np.int64
     )

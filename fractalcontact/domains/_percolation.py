@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_mask
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
 
 AXES = ("x", "y")
 SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (1994)"
@@ -59,7 +59,7 @@ def percolation(
     >>> fc.domains.percolation(xr.DataArray(rows, dims=("y", "x"))).percolates.values.tolist()
     [True, False]
     """
-    planes = read_mask(mask, valid=valid, periodic=periodic)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
     values = crossings(label_planes(planes, connectivity, keep=False), planes)
     variables = {
         "coverage": planes.variable(planes.coverage),

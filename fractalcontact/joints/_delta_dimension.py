@@ -11,8 +11,8 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
-from fractalcontact.base.results import public_result
 from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import delta_surface

@@ -41,7 +41,7 @@ def mask():
 
 
 def test_all_public_functions_are_tested_here():
-    assert set(fc.domains.__all__) == {*FUNCTIONS, "area_dimension"}
+    assert set(fc.domains.__all__) == {*FUNCTIONS, "area_dimension", "read_mask"}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -37,7 +37,7 @@ WANTED = {
         "decorrelation_length",
         "transmissivity",
     ),
-    "domains": tuple(name for name in fc.domains.__all__ if name != "area_dimension"),
+    "domains": tuple(name for name in fc.domains.__all__ if name not in ("area_dimension", "read_mask")),
 }
 WORDS = {
     f"{subpackage}/{word}": TEMPLATE.replace("SUBPACKAGE", subpackage).replace("WORD", word)

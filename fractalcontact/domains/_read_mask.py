@@ -1,0 +1,120 @@
+"""Masks read from images: photographs of stained contacts, pressure films, segmented micrographs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def _check(problems: Problems, *, path: Any, spacing: Any, threshold: Any, dark: Any) -> None:
+    if problems.path("path", path):
+        problems.require(Path(path).is_file(), "path", "an existing file", Path(path).name)
+    if problems.numbers("spacing", spacing, above=0):
+        size = float_array(spacing).size
+        problems.require(size in (1, 2), "spacing", "one number or (y, x)", f"{size} numbers")
+    problems.number("threshold", threshold, optional=True)
+    problems.boolean("dark", dark)
+
+
+@public_result(
+    title="Mask read from an image",
+    references="Otsu, IEEE Trans. Systems, Man, and Cybernetics 9:62 (1979) (threshold)",
+    achieved_error="exact",
+    check=_check,
+)
+def read_mask(
+    path: str | os.PathLike[str],
+    spacing: float | tuple[float, float],
+    *,
+    threshold: float | None = None,
+    dark: bool = False,
+) -> xr.DataArray:
+    """Read a mask from an image file (PNG, TIFF, JPEG and others).
+
+    Parameters
+    ----------
+    path : path
+        The image. Colours are converted to grey values; an opacity channel is ignored.
+    spacing : float, or (y, x)
+        Edge of a pixel in metres.
+    threshold : float, optional
+        Pixels with a larger grey value belong to the set. By default half-way between the two values of a
+        two-valued image, and Otsu's threshold for any other.
+    dark : bool
+        Dark pixels belong to the set, at or below the threshold: for stains and pressure films.
+
+    Returns
+    -------
+    DataArray of bool, dims (y, x)
+        `mask`, with y upwards: the first row of the image is the last of the mask. The provenance has the
+        threshold and the number of distinct grey values.
+
+    Raises
+    ------
+    InvalidInput
+        The file does not exist or an argument is out of range.
+    UnreadableFile
+        The file is no image, holds several images, or has only one grey value and no threshold is given.
+
+    References
+    ----------
+    Otsu (1979), IEEE Transactions on Systems, Man, and Cybernetics 9:62.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc, numpy as np, skimage as ski, tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "film.png"
+    >>> ski.io.imsave(path, np.uint8([[0, 255, 255], [0, 0, 255]]), check_contrast=False)
+    >>> mask = fc.domains.read_mask(path, 1e-4)
+    >>> mask.values.astype(int).tolist()
+    [[0, 0, 1], [0, 1, 1]]
+    """
+    grey = _grey_values(Path(path))
+    levels = np.unique(grey)
+    if threshold is None:
+        threshold = _threshold(grey, levels, Path(path).name)
+    cells = (grey <= threshold if dark else grey > threshold)[::-1]
+    step = np.broadcast_to(float_array(spacing), 2).tolist()
+    coords = plane_coords(cells.shape, step, (False, False))
+    facts = {"threshold": float(threshold), "grey_values": int(levels.size)}
+    return xr.DataArray(np.ascontiguousarray(cells), coords, ("y", "x"), name="mask", attrs=facts)
+
+
+def _grey_values(path: Path) -> Array:
+    """Return the grey values (ny, nx) of an image."""
+    from skimage.color import rgb2gray
+    from skimage.io import imread
+
+    try:
+        with path.open("rb") as file:
+            image = np.asarray(imread(file))
+    except Exception as error:  # each of the image libraries raises exceptions of its own
+        raise UnreadableFile(path.name, [f"path: expected an image, got {type(error).__name__}"]) from error
+    if image.ndim == 3 and image.shape[-1] == 2:  # grey value and opacity
+        image = image[..., 0]
+    if image.ndim == 3 and image.shape[-1] in (3, 4):
+        image = rgb2gray(image[..., :3])
+    if image.ndim != 2:
+        raise UnreadableFile(path.name, [f"path: expected one image, got an array of shape {image.shape}"])
+    return image.astype(np.float64)
+
+
+def _threshold(grey: Array, levels: Array, name: str) -> float:
+    """Return the grey value that separates the set from the rest."""
+    from skimage.filters import threshold_otsu
+
+    if levels.size < 2:
+        message = f"threshold: expected a number for an image of one grey value ({levels[0]:g}), got None"
+        raise UnreadableFile(name, [message])
+    return float(levels.mean()) if levels.size == 2 else float(threshold_otsu(grey))

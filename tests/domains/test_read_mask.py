@@ -1,0 +1,70 @@
+"""Masks from image files: orientation, thresholds, and files that are no images."""
+
+import json
+
+import numpy as np
+import pytest
+import skimage as ski
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
+
+CELLS = np.random.default_rng(4).random((20, 30)) < 0.3
+
+
+def write(path, image):
+    ski.io.imsave(path, image, check_contrast=False)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["png", "tif", "bmp"])
+def test_mask_comes_back_from_an_image(tmp_path, suffix):
+    path = write(tmp_path / f"mask.{suffix}", np.uint8(255 * CELLS))
+    mask = fc.domains.read_mask(path, (2e-4, 1e-4))
+    np.testing.assert_array_equal(mask.values[::-1], CELLS)
+    assert mask.dtype == bool
+    assert mask.y.values[0] == pytest.approx(1e-4)
+    assert float(mask.x[1] - mask.x[0]) == pytest.approx(1e-4)
+    assert float(fc.domains.describe(mask).coverage) == pytest.approx(CELLS.mean())
+
+
+def test_dark_pixels_are_the_complement(tmp_path):
+    path = write(tmp_path / "film.png", np.uint8(255 * CELLS))
+    bright, dark = (fc.domains.read_mask(path, 1e-4, dark=dark) for dark in (False, True))
+    np.testing.assert_array_equal(dark.values, ~bright.values)
+
+
+def test_colour_and_opacity(tmp_path):
+    colour = np.zeros((*CELLS.shape, 4), np.uint8)
+    colour[CELLS, 1], colour[..., 3] = 200, 255
+    mask = fc.domains.read_mask(write(tmp_path / "colour.png", colour), 1e-4)
+    np.testing.assert_array_equal(mask.values[::-1], CELLS)
+
+
+def test_otsu_separates_two_noisy_levels(tmp_path):
+    noise = np.random.default_rng(5).normal(scale=12.0, size=CELLS.shape)
+    image = np.uint8(np.clip(60 + 120 * CELLS + noise, 0, 255))
+    path = write(tmp_path / "noisy.png", image)
+    mask = fc.domains.read_mask(path, 1e-4)
+    np.testing.assert_array_equal(mask.values[::-1], CELLS)
+    threshold = json.loads(mask.attrs["provenance"])["threshold"]
+    np.testing.assert_array_equal(fc.domains.read_mask(path, 1e-4, threshold=threshold), mask)
+
+
+def test_one_grey_value_needs_a_threshold(tmp_path):
+    path = write(tmp_path / "blank.png", np.full((5, 5), 7, np.uint8))
+    with pytest.raises(UnreadableFile, match="threshold: expected a number"):
+        fc.domains.read_mask(path, 1e-4)
+    assert not fc.domains.read_mask(path, 1e-4, threshold=7).values.any()
+
+
+def test_wrong_arguments_are_listed_together(tmp_path):
+    with pytest.raises(InvalidInput) as caught:
+        fc.domains.read_mask(tmp_path / "none.png", -1.0, threshold="x", dark=2)
+    assert len(caught.value.problems) == 4
+
+
+def test_file_that_is_no_image(tmp_path):
+    (tmp_path / "text.png").write_text("no image")
+    with pytest.raises(UnreadableFile, match="expected an image"):
+        fc.domains.read_mask(tmp_path / "text.png", 1e-4)
