@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.tables import table
+from fractalcontact.scenes._caveats import group_of
 from fractalcontact.scenes._contents import note
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -17,9 +18,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PAPER_DIMENSION = (2.15, 2.29)  # of the scanned face
 PAPER_SHEAR, PAPER_BLOCK = 8e-4, 2e-2  # m: shear of the plateau, edge of the block
 PLATEAU = 0.25  # largest last change over the first one that counts as a plateau
-CONCRETE_HARDNESS = (0.1e9, 1e9)  # Pa: cement paste and hard aggregate
 MIN_CELLS = 30  # fewer cells in contact resolve no spot
-MAX_SLOPE = 0.3  # rms slope up to which small-slope elasticity is a good approximation
 
 
 class Statement(NamedTuple):
@@ -42,8 +41,7 @@ def paper_table(tree: xr.DataTree) -> str:
     Returns
     -------
     str
-        A row for every statement for which the study has data, then the limits of the comparison: slopes,
-        unresolved spots, true pressures beside the hardness. Empty where there is no joint.
+        A row for every statement for which the study has data. Empty where there is no joint.
 
     Notes
     -----
@@ -65,7 +63,10 @@ def paper_table(tree: xr.DataTree) -> str:
     if not statements:
         return ""
     rows = [("section", "statement of the paper", "this study", "agrees"), *statements]
-    return "\n".join([table(rows), *(note(limit) for limit in limits(tree))])
+    limit = (
+        "The paper states orders of magnitude and trends; neither its surface nor its modulus is published."
+    )
+    return "\n".join([table(rows), note(limit)])
 
 
 def paper_statements(tree: xr.DataTree) -> list[Statement]:
@@ -73,36 +74,6 @@ def paper_statements(tree: xr.DataTree) -> list[Statement]:
     if "joints" not in tree.children:
         return []
     return [statement for part in PARTS for statement in part(tree)]
-
-
-def limits(tree: xr.DataTree) -> list[str]:
-    """Return the limits of the comparison."""
-    closure = group_of(tree, "joints/closure")
-    lines = [
-        "The paper states orders of magnitude and trends; neither its surface nor its modulus is published."
-    ]
-    if closure is None:
-        return lines
-    cells = np.rint(_values(closure, "contact_fraction") * _cells(closure))
-    least = int(cells[:, 0].min())
-    if least < MIN_CELLS:
-        lines.append(
-            f"At the smallest force {least} to {int(cells[:, 0].max())} cells touch: no spot is resolved, "
-            "and the contact area is that of the grid."
-        )
-    pressure = _values(closure, "nominal_pressure")[:, -1] / _values(closure, "contact_fraction")[:, -1]
-    low, high = (value / 1e9 for value in CONCRETE_HARDNESS)
-    lines.append(
-        f"The true mean pressure at the largest force is {pressure.min() / 1e9:.2g} to "
-        f"{pressure.max() / 1e9:.2g} GPa; concrete yields at {low:g} to {high:g} GPa: elastic contact areas "
-        "are too small unless a hardness is given."
-    )
-    delta = group_of(tree, "joints/delta_surface")
-    if delta is not None:
-        slope = _rms_slope(delta["height"])
-        word = "outside" if slope > MAX_SLOPE else "within"
-        lines.append(f"The rms slope of the delta-surface is {slope:.2g}: {word} small-slope elasticity.")
-    return lines
 
 
 def _surface_dimension(tree: xr.DataTree) -> Iterator[Statement]:
@@ -282,16 +253,6 @@ PARTS: tuple[Callable[[xr.DataTree], Iterator[Statement]], ...] = (
 )
 
 
-def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
-    """Return the Dataset of a group, None where the study has none."""
-    node = tree
-    for name in path.split("/"):
-        if name not in node.children:
-            return None
-        node = node.children[name]
-    return node.to_dataset() if node.has_data else None
-
-
 def _values(data: xr.Dataset, name: str) -> Array:
     """Return a variable over (shear, step); of several directions the first."""
     variable = data[name]
@@ -307,13 +268,6 @@ def _cells(closure: xr.Dataset) -> float:
     """Return the number of cells of the block."""
     crack = json.loads(closure.attrs["provenance"])["parameters"]["crack"]
     return float(np.prod(crack["block_cells"]))
-
-
-def _rms_slope(height: xr.DataArray) -> float:
-    from fractalcontact import surfaces
-
-    plane = height.isel(shear=-1) if "shear" in height.dims else height
-    return float(surfaces.describe(plane)["rms_slope"])
 
 
 def _word(agrees: bool) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.tables import table
+from fractalcontact.scenes._caveats import caveats, group_of
 from fractalcontact.scenes._contents import note, reasons, stage_table
-from fractalcontact.scenes._paper import group_of, paper_table
+from fractalcontact.scenes._paper import paper_table
 
 
 def summary(tree: xr.DataTree) -> str:
@@ -48,6 +49,7 @@ def summary(tree: xr.DataTree) -> str:
         _dilatancy(tree),
         _friction(tree),
         _contact_set(tree),
+        "\n".join(note(caveat) for caveat in caveats(tree)),
         paper_table(tree) if compares_with_paper(tree) else "",
         stage_table(tree),
     ]

@@ -65,16 +65,6 @@ def test_disagreement_is_reported(tree):
     assert row(backwards, "equal F falls")[1] == "no"
 
 
-def test_limits_count_cells_and_pressures(tree):
-    text = " ".join(paper_table(tree).split())
-    closing = tree["joints/closure"]
-    cells = (closing.state.values[:, 0] > 0).sum(axis=(-2, -1))
-    assert f"{cells.min()} to {cells.max()} cells touch" in text
-    pressure = 2e3 / closing.contact_area.values[:, -1] / 1e9
-    assert f"{pressure.min():.2g} to {pressure.max():.2g} GPa" in text
-    assert "small-slope" in text
-
-
 def test_table_from_the_file_alone_is_the_same(tree, tmp_path):
     path = fc.save(tree, tmp_path / "result.nc")
     assert paper_table(fc.open(path)) == paper_table(tree)

@@ -1,0 +1,130 @@
+"""What limits the results of a study: resolution of the spots, slopes, true pressures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy import ndimage
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
+PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
+MAX_SLOPE = 0.3  # rms slope up to which strains, some half of it, and rotations are small
+PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
+
+
+def caveats(tree: xr.DataTree) -> list[str]:
+    """Return what limits the results of a study, for every group that was pressed.
+
+    Parameters
+    ----------
+    tree : DataTree
+        From `fractalcontact.scenes.run` or `fractalcontact.open`; nothing else is read.
+
+    Returns
+    -------
+    list of str
+        One sentence each: islands of too few cells, at which loads; slopes beyond small strains; the true
+        pressure where no hardness limits it. Empty where the results have no such limit.
+    """
+    lines: list[str] = []
+    for path, surface in PRESSED.items():
+        pressed = group_of(tree, path)
+        if pressed is not None and "contact_fraction" in pressed:
+            lines += [*_resolution(path, pressed), *_slopes(path, pressed, surface)]
+            lines += _true_pressure(path, pressed, _material(tree))
+    return lines
+
+
+def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
+    """Return the Dataset of a group, None where the study has none."""
+    node = tree
+    for name in path.split("/"):
+        if name not in node.children:
+            return None
+        node = node.children[name]
+    return node.to_dataset() if node.has_data else None
+
+
+def cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
+    """Return the median number of cells of the islands of contact, over the dims of the contact area.
+
+    Where no map of the contact is stored, it is the number of cells of square islands with the same ratio of
+    perimeter to area. NaN where nothing touches.
+    """
+    fraction = pressed["contact_fraction"]
+    if "state" in pressed:
+        planes = pressed["state"].transpose(*fraction.dims, "y", "x")
+        masks = np.asarray(planes.values).reshape(-1, *planes.shape[-2:]) > 0
+        medians = np.array([_median_cells(mask) for mask in masks])
+        return fraction.copy(data=medians.reshape(fraction.shape))
+    edges = (fraction - pressed["corrected_contact_fraction"]) / (PERIMETER_TO_CELLS * fraction)
+    return (4.0 / edges.where(edges > 0)) ** 2
+
+
+def _median_cells(mask: Array) -> float:
+    labels, count = ndimage.label(mask)
+    return float(np.median(np.bincount(labels.ravel())[1:])) if count else float("nan")
+
+
+def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
+    cells = cells_per_island(pressed)
+    others = [dim for dim in cells.dims if dim != "step"]
+    low, high = (np.atleast_1d(getattr(cells, end)(others).values) for end in ("min", "max"))
+    touching = np.isfinite(low)
+    unresolved = touching & (low < MIN_CELLS)
+    if not unresolved.any():
+        return
+    greatest = int(np.flatnonzero(touching)[-1])
+    ends = dict.fromkeys(f"{end[greatest]:.2g}" for end in (low, high))
+    where = (
+        "at every load"
+        if unresolved.sum() == touching.sum()
+        else (f"at {int(unresolved.sum())} of {int(touching.sum())} loads")
+    )
+    source = "" if "state" in pressed else ", from their perimeter"
+    yield (
+        f"{path}: the spots of contact are not resolved {where}: the median island has {' to '.join(ends)} "
+        f"cells at the last load{source}, and {MIN_CELLS} are needed. Areas of single islands and their "
+        "shape are those of the grid."
+    )
+
+
+def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
+    if "rms_slope" not in pressed:
+        return
+    slope = float(pressed["rms_slope"].max())
+    if slope > MAX_SLOPE:
+        yield (
+            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {MAX_SLOPE:g} strains are not "
+            "small, and linear elasticity is an approximation."
+        )
+
+
+def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> Iterator[str]:
+    if "plastic_work" in pressed:  # a hardness limits the pressure
+        return
+    true = pressed["nominal_pressure"] / pressed["contact_fraction"].where(pressed["contact_fraction"] > 0)
+    low, high = (f"{float(end) / 1e9:.2g}" for end in (true.min(), true.max()))
+    limits = material.get("yield_pressure")
+    if limits is not None and float(true.max()) > np.min(limits):
+        span = " to ".join(f"{float(limit) / 1e9:.2g}" for limit in np.atleast_1d(limits))
+        yield (
+            f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
+            "elastic contact areas are too small; a hardness limits the pressure."
+        )
+
+
+def _material(tree: xr.DataTree) -> dict[str, Any]:
+    """Return the table of the material in the scene of a study, empty where there is none."""
+    try:
+        scene = json.loads(tree.attrs["provenance"])["parameters"]["scene"]
+        material = scene.get("material", {})
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return {}
+    return material if isinstance(material, dict) else {}

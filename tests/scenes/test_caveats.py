@@ -1,0 +1,75 @@
+"""Caveats below the summary: each appears where it holds, and only there."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fractalcontact as fc
+
+PERIODIC = fc.surfaces.spectral(
+    (128, 128), 1e-5, hurst=0.8, rolloff=3e-4, short_cutoff=1e-4, rms_slope=0.05, rng=1
+)
+GRID_NOISE = fc.surfaces.spectral((64, 64), 1e-5, hurst=0.3, rms_slope=0.2, rng=1)
+
+
+def study(pressed, path="contact", **material):
+    """Return the tree of a study with one pressed group."""
+    tree = xr.DataTree.from_dict({path: pressed})
+    tree.attrs["provenance"] = json.dumps({"parameters": {"scene": {"material": material}}})
+    return tree
+
+
+def text(tree):
+    return " ".join(fc.scenes.summary(tree).split())
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return fc.contact.press(GRID_NOISE, contact_modulus=1e9, nominal_pressure=[1e5, 1e6, 1e7])
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    return fc.contact.press(PERIODIC, contact_modulus=1e9, nominal_pressure=[5e6, 2e7])
+
+
+def test_unresolved_spots_at_every_load(rough):
+    cells = fc.domains.islands(rough.state.isel(step=-1)).cells
+    assert "not resolved at every load" in text(study(rough))
+    assert f"the median island has {float(np.median(cells)):.2g} cells at the last load" in text(study(rough))
+
+
+def test_many_small_spots_are_not_resolved_by_their_sum(rough):
+    assert (rough.state.values[-1] > 0).sum() > 300
+    assert "not resolved" in text(study(rough.isel(step=[-1])))
+
+
+def test_resolved_spots_have_no_caveat(smooth):
+    assert np.median(fc.domains.islands(smooth.state.isel(step=0)).cells) > 30
+    assert "not resolved" not in text(study(smooth))
+
+
+def test_resolution_is_told_without_the_maps(rough, smooth):
+    assert "not resolved at every load" in text(study(rough.drop_vars("state")))
+    assert "from their perimeter" in text(study(rough.drop_vars("state")))
+    assert "not resolved" not in text(study(smooth.drop_vars("state")))
+
+
+def test_yield_is_that_of_the_stated_material(rough):
+    true = rough.nominal_pressure / rough.contact_fraction / 1e9
+    found = text(study(rough, yield_pressure=[1e6, 2e7]))
+    assert f"true mean pressure is {float(true.min()):.2g} to {float(true.max()):.2g} GPa" in found
+    assert "yields at 0.001 to 0.02 GPa" in found
+    assert "concrete" not in found
+
+
+def test_no_yield_without_a_stated_material_or_below_it(rough):
+    assert "yields" not in text(study(rough))
+    assert "yields" not in text(study(rough, yield_pressure=[1e12, 2e12]))
+
+
+def test_no_caveat_of_yield_where_a_hardness_is_given():
+    hard = fc.contact.press(GRID_NOISE, contact_modulus=1e9, nominal_pressure=1e6, hardness=5e7)
+    assert "yields" not in text(study(hard, yield_pressure=[1e6, 2e7]))
