@@ -1,15 +1,17 @@
 """Rough surfaces in contact: fractal dimension, closure, dilatancy and the domain of true contacts.
 
-The rooms, in the order in which a surface walks through them:
+Subpackages:
 
-surfaces    heights come in: synthetic or measured
-dimensions  how rough a surface is
-contact     two bodies pressed together
-joints      a crack: two faces, sheared and closed
-domains     what touches: islands, box dimension, lacunarity
-scenes      a whole study declared in one file
+surfaces    input and synthesis of surfaces
+dimensions  roughness and fractal dimension
+contact     elastic and plastic contact of a rough surface with a flat
+joints      a crack of two faces under normal load and shear
+domains     analysis of the set of true contacts: islands, box dimension, lacunarity
+scenes      a whole study declared in one TOML file
+accuracy    error against run time of every method
+plotting    figures drawn from labelled results
 
-Importing the package loads none of them; each is loaded when it is first named.
+`save` and `open` write and read results as NetCDF files. A subpackage is imported when it is first used.
 """
 
 import lazy_loader

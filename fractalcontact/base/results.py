@@ -1,12 +1,12 @@
 """Decorator of public functions: validation, run time, labels and provenance of their results.
 
     def _check(problems, mask, *, connectivity, **_):
-        problems.choice("connectivity", connectivity, (4, 8))
+        problems.integer("connectivity", connectivity, at_least=1, at_most=2)
 
     @public_result(title="Islands of contact", references="...", achieved_error="exact", check=_check)
-    def islands(mask, *, connectivity=8):
+    def islands(mask, *, connectivity=2):
         ...
-        return xr.Dataset(variables, coords, attrs={"labelled_by": "scikit-image"})
+        return xr.Dataset(variables, coords, attrs={"neighbours": 8})
 
 The function returns plain variables and coordinates with names of `base.schema`. Attributes `comment`,
 `reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
@@ -30,7 +30,7 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.provenance import PAPER, stamp
 from fractalcontact.base.schema import label
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, did_you_mean
 
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
@@ -80,7 +80,12 @@ def public_result(
         name = public_name(function)
 
         def checked(*arguments: Any, **options: Any) -> dict[str, Any]:
-            bound = signature.bind(*arguments, **options)
+            try:
+                bound = signature.bind(*arguments, **options)
+            except TypeError as cause:
+                unknown = [word for word in options if word not in signature.parameters]
+                hint = did_you_mean(unknown[0], signature.parameters) if unknown else ""
+                raise TypeError(f"{name}: {cause}{hint}") from None
             bound.apply_defaults()
             if check is not None:
                 with Problems(name, error) as problems:

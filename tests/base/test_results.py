@@ -72,3 +72,12 @@ def test_recorded_parameters_can_be_replaced():
 def test_error_type_of_the_checks():
     with pytest.raises(UnreadableFile, match="scale"):
         step(fc.surfaces.from_array(np.eye(4), 1e-3), scale=-1.0)
+
+
+def test_unknown_argument_names_the_function_and_the_nearest_argument():
+    with pytest.raises(
+        TypeError, match=r"fractalcontact\.contact\.press: .*'closur'.*did you mean 'closure'"
+    ):
+        fc.contact.press(None, contact_modulus=1e9, closur=1e-6)
+    with pytest.raises(TypeError, match=r"fractalcontact\.contact\.press: missing .*contact_modulus"):
+        fc.contact.press(None)
