@@ -114,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> int:
     from fractalcontact import scenes
-    from fractalcontact.base.output import RESULT
+    from fractalcontact.base.output_folder import RESULT
 
     if options.plan:
         print(scenes.plan(scenes.validate(options.scene)))
@@ -145,7 +145,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     if options.large and not options.extreme:
         raise InvalidInput("fractalcontact accuracy", ["--large: expected only with --extreme"])
     if options.out is not None:
-        from fractalcontact.base.output import output_folder
+        from fractalcontact.base.output_folder import output_folder
 
         output_folder(options.out)  # before the measuring, not after it
     if options.extreme:
@@ -175,7 +175,7 @@ def _error_against_time(options: argparse.Namespace) -> int:
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
     """Save a result and return the name of the file, which is another one where the run was stopped."""
     from fractalcontact.base.netcdf import save
-    from fractalcontact.base.output import PARTIAL_RESULT
+    from fractalcontact.base.output_folder import PARTIAL_RESULT
 
     if stop:
         return save(result, target.with_name(PARTIAL_RESULT)).name

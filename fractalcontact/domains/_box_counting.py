@@ -1,4 +1,4 @@
-"""Box counting: the number of boxes that meet a set, and the box dimension beside that of its random null."""
+"""Box dimension from the counts of `_box_covers.py`, beside that of the random null; with its interval."""
 
 from __future__ import annotations
 

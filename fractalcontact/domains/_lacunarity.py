@@ -199,7 +199,10 @@ def _mass_of_boxes(cells: Array, size: int) -> Array:
 
 
 def _null_lacunarity(coverage: Array, sizes: Array) -> Array:
-    """Return the lacunarity of independent cells of coverage p, 1 + (1 - p) / (p r^2); (planes, sizes)."""
+    """Return the lacunarity of independent cells of coverage p, 1 + (1 - p) / (p r^2); (planes, sizes).
+
+    Its box counts are in `_random_null.py`.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(coverage > 0, (1.0 - coverage) / coverage, np.nan)
     return np.asarray(1.0 + excess[:, None] / sizes.astype(float) ** 2)

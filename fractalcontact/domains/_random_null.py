@@ -2,7 +2,8 @@
 
 The null places the k cells of the set at random on the A observed cells. A region of m cells is then missed
 by the set with the probability C(A - m, k) / C(A, k). Expected box counts, and their covariance over the
-sizes of the box, follow in closed form.
+sizes of the box, follow in closed form. The curves of the null of the other measures stand with the measures:
+`_lacunarity.py`, `_minkowski.py` and `_correlation.py`.
 """
 
 from __future__ import annotations

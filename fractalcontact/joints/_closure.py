@@ -17,9 +17,9 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
-from fractalcontact.joints._directions import Direction, direction_coords, is_single, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Path = float | Sequence[float] | Array

@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.provenance import plain
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._directions import (
+from fractalcontact.joints._compass import (
     check_direction,
     check_directions,
     read_direction,

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._directions import check_direction, read_direction
+from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._friction import (
     ERROR,
     FORMS,

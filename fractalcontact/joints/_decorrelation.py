@@ -17,15 +17,15 @@ import xarray as xr
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
-from fractalcontact.joints._delta_surface import heights_under, missing_heights
-from fractalcontact.joints._directions import (
+from fractalcontact.joints._compass import (
     COMPASS,
     Direction,
     check_directions,
     direction_coords,
     read_directions,
 )
+from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
+from fractalcontact.joints._delta_surface import heights_under, missing_heights
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

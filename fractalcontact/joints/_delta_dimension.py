@@ -14,9 +14,9 @@ from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import delta_surface
-from fractalcontact.joints._directions import check_direction, read_direction
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[float, float]

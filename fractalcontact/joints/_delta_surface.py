@@ -18,8 +18,8 @@ from fractalcontact.base import fft
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
-from fractalcontact.joints._directions import Direction, direction_coords, is_single, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -21,9 +21,9 @@ from fractalcontact.joints._closure import (
     press_sheared,
     warn_unconverged,
 )
+from fractalcontact.joints._compass import COMPASS, Direction, direction_coords, read_directions
 from fractalcontact.joints._crack import Block, Crack, Pair, block_coords, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
-from fractalcontact.joints._directions import COMPASS, Direction, direction_coords, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Columns = dict[str, Array]

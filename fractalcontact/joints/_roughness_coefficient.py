@@ -13,7 +13,7 @@ from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._directions import Direction, check_directions, direction_coords, read_directions
+from fractalcontact.joints._compass import Direction, check_directions, direction_coords, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._families import draw_families, path_panels
+from fractalcontact.plotting._box_size_curves import draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
 from fractalcontact.plotting._units import axis_label, name_of, scale_for, scale_of
@@ -177,4 +177,4 @@ def local_slopes(
     elif "null_fraction" in data:
         slope = 2.0 - local_slope(data["radius"].values, data["null_fraction"].values)
         data = data.assign(null_slope=(data["null_fraction"].dims, slope))
-    return draw_families(data, shear, normal_force, figure, "local_slope", "null_slope")
+    return draw_size_curves(data, shear, normal_force, figure, "local_slope", "null_slope")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._families import draw_families
+from fractalcontact.plotting._box_size_curves import draw_size_curves
 from fractalcontact.plotting._inputs import result_of
 
 if TYPE_CHECKING:
@@ -56,4 +56,4 @@ def lacunarity(
     box size (mm) | lacunarity $\Lambda$
     """
     data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
-    return draw_families(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")
+    return draw_size_curves(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")

@@ -3,7 +3,7 @@
 ``error = 1e-3`` in a scene bounds the relative error of pressures, and the error of exponents and dimensions;
 ``budget = 30`` asks for the smallest such error within so many seconds. Values set explicitly are never
 changed. The errors are those measured on the surfaces and sets of `fractalcontact.accuracy`, the seconds are
-those of the machine that measured the curves (`curves.json`, made by the benchmarks).
+those of the machine that measured the curves (`autotune_curves.json`, made by the benchmarks).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fractalcontact.scenes._inputs import surface_grid
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import STAGES
 
-CURVES_FILE = Path(__file__).with_name("curves.json")
+CURVES_FILE = Path(__file__).with_name("autotune_curves.json")
 SAFETY_FACTOR = 3.0  # on the error of the curve: surfaces differ
 ERRORS = tuple(float(f"{e:.3g}") for e in np.geomspace(0.3, 1e-12, 70))
 MEASURED_EDGE = 128.0  # points along an edge of the surface on which tolerances were measured

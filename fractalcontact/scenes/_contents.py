@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.outline import Outline, outline
+from fractalcontact.base.netcdf_header import Header, read_headers
 from fractalcontact.base.tables import table
 
 WIDTH = 110
@@ -48,7 +48,7 @@ def contents(path: str | os.PathLike[str]) -> str:
     >>> [line for line in text.splitlines() if "height" in line][-1].split()
     ['height', '(y', '16,', 'x', '16)', 'surface', 'height', '[m]']
     """
-    groups = outline(path, _is_achieved)
+    groups = read_headers(path, _is_achieved)
     root = groups["/"]
     keys = ("title", "source", "completeness", "selected")
     lines = [str(root.attrs[key]) for key in keys if key in root.attrs]
@@ -141,7 +141,7 @@ def _phrases(facts: dict[str, Any]) -> Iterable[str]:
             yield f"{word} {value:.2g}" if isinstance(value, float) else f"{word} {value}"
 
 
-def _variable_lines(group: Outline) -> Iterable[str]:
+def _variable_lines(group: Header) -> Iterable[str]:
     """Yield name, dims, long name and units of every variable, in columns."""
     rows = []
     for name, (sizes, attributes) in group.variables.items():
@@ -159,7 +159,7 @@ def _is_achieved(name: str) -> bool:
     return name in ("run_time", "residual", "converged") or name.endswith(ends)
 
 
-def _achieved_lines(group: Outline) -> Iterable[str]:
+def _achieved_lines(group: Header) -> Iterable[str]:
     """Yield the achieved errors of a group and its run time, each from the smallest to the largest."""
     for name, numbers in group.numbers.items():
         values: np.ndarray[Any, Any] = np.ravel(np.ma.filled(np.ma.asarray(numbers, dtype=float), np.nan))
@@ -176,7 +176,7 @@ def _achieved_lines(group: Outline) -> Iterable[str]:
             yield f"    {word}: {' ... '.join(ends)}"
 
 
-def _reason_lines(group: Outline) -> Iterable[str]:
+def _reason_lines(group: Header) -> Iterable[str]:
     """Yield the remarks on single methods, those of several variables once."""
     variables: dict[str, list[str]] = {}
     for name, (_, attributes) in group.variables.items():

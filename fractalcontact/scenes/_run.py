@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf, provenance, schema, signals
-from fractalcontact.base.output import PARTIAL_RESULT, RESULT, locked, output_folder
+from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, output_folder
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds

@@ -66,7 +66,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
     Examples
     --------
     >>> import fractalcontact as fc
-    >>> scene = fc.scenes.load("pressed_face")
+    >>> scene = fc.scenes.load("pressed_surface")
     >>> len(scene.table("contact")["nominal_pressure"])  # a range is expanded
     12
     """

@@ -12,7 +12,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._planes import check_planes, height_planes
+from fractalcontact.surfaces._height_planes import check_planes, height_planes
 
 POLYNOMIALS = ("mean", "plane", "quadric")
 

@@ -11,9 +11,9 @@ PACKAGE = Path(fc.__file__).parent
 
 
 def test_curves_are_written_in_the_form_of_the_shipped_ones(tmp_path):
-    autotune_curves.write(fc.accuracy.measure("contact", budget=1), tmp_path / "curves.json")
-    curves = json.loads((tmp_path / "curves.json").read_text(encoding="utf-8"))
-    (shipped_file,) = PACKAGE.glob("*/curves.json")
+    autotune_curves.write(fc.accuracy.measure("contact", budget=1), tmp_path / "autotune_curves.json")
+    curves = json.loads((tmp_path / "autotune_curves.json").read_text(encoding="utf-8"))
+    (shipped_file,) = PACKAGE.glob("*/autotune_curves.json")
     shipped = json.loads(shipped_file.read_text(encoding="utf-8"))
     assert "rough, free body" in curves
     assert set(curves) <= set(shipped)

@@ -155,7 +155,7 @@ def test_scene_that_fails_is_reported(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rigid_sliding", "pressed_face", "jacksboro_fault", "concrete_crack"])
+@pytest.mark.parametrize("name", ["rigid_sliding", "pressed_surface", "jacksboro_fault", "concrete_crack"])
 def test_shipped_scene_takes_only_what_is_required(name):
     measured = resources.audit(name)
     assert resources.surplus(measured) == []

@@ -36,7 +36,7 @@ def test_closure_deeper_than_the_block_warns(tmp_path):
     assert any("is the modulus in Pa" in str(warning.message) for warning in caught)
 
 
-@pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "pressed_face"])
+@pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "pressed_surface"])
 def test_plausible_scenes_do_not_warn(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

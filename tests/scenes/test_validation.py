@@ -65,7 +65,7 @@ def test_folder_of_another_run_is_refused(tmp_path):
 
 def test_invalid_client_is_refused():
     with pytest.raises(InvalidInput, match="client: expected a distributed.Client"):
-        fc.scenes.run("pressed_face", progress=False, client="tcp://there")
+        fc.scenes.run("pressed_surface", progress=False, client="tcp://there")
 
 
 def test_accuracy_refuses_an_unwritable_folder_first(tmp_path):

@@ -1,4 +1,4 @@
-"""Content of a NetCDF file without its arrays, read without xarray for a fast start of the command line."""
+"""Header of a NetCDF file: content without arrays, read without xarray so that the command starts fast."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from fractalcontact.base.errors import UnreadableFile
 
 
 @dataclass(frozen=True)
-class Outline:
-    """Content of a group: its attributes, sizes and attributes of each variable, and some values."""
+class Header:
+    """Header of a group: its attributes, sizes and attributes of each variable, and some values."""
 
     attrs: dict[str, Any]
     variables: dict[str, tuple[dict[str, int], dict[str, Any]]]
     numbers: dict[str, Any]
 
 
-def outline(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[str, Outline]:
-    """Return the content of a NetCDF file by group, with the values of the variables selected by `read`.
+def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[str, Header]:
+    """Return the header of every group of a file, with the values of the variables selected by `read`.
 
     Raises
     ------
@@ -34,10 +34,10 @@ def outline(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[s
     where = "fractalcontact.open"
     if not source.is_file():
         raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
-    groups: dict[str, Outline] = {}
+    groups: dict[str, Header] = {}
 
     def walk(group: Any, name_of_group: str) -> None:
-        groups[name_of_group or "/"] = Outline(
+        groups[name_of_group or "/"] = Header(
             dict(group.__dict__),
             {
                 str(name): (_sizes(variable), dict(variable.__dict__))

@@ -1,4 +1,4 @@
-"""Planes of measured heights, with gaps: their check, and their values as one stack."""
+"""Check of measured heights with gaps, and their values as a stack of planes or profiles."""
 
 from __future__ import annotations
 

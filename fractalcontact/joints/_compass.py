@@ -1,4 +1,4 @@
-"""Directions of sliding: compass words, or azimuths in degrees (E is +x, N is +y, anticlockwise from E)."""
+"""Compass directions of sliding, read from words or azimuths (degree; E is +x, N is +y, anticlockwise)."""
 
 from __future__ import annotations
 

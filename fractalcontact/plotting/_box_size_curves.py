@@ -1,4 +1,4 @@
-"""Curves over box size, as a family for increasing load and one for increasing shear."""
+"""Figures of curves over box size or radius: one panel for increasing load, one for increasing shear."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MAX_CURVES = 6  # more curves than this cross the curves of their random nulls i
 STEEP = 1.5  # ratio of values above which lacunarity is drawn on a logarithmic axis
 
 
-def draw_families(
+def draw_size_curves(
     data: xr.Dataset, shear: float | None, force: float | None, figure: Any, name: str, null_name: str
 ) -> Figure:
     """Draw `name` over box size beside its random null, a panel per path that is longer than one."""
