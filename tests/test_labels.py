@@ -77,6 +77,15 @@ CALLS = {
     "dimensions.estimate": lambda: fc.dimensions.estimate(rough(), list(fc.dimensions.methods())),
     "dimensions.spectrum": lambda: fc.dimensions.spectrum(periodic()),
     "contact.press": pressed,
+    "contact.partial_slip": lambda: fc.contact.partial_slip(
+        periodic(),
+        contact_modulus=1e9,
+        poisson=0.2,
+        friction_coefficient=0.5,
+        nominal_pressure=1e6,
+        tangential_force=[2.0, 4.0, -2.0],
+        keep=("slip_state", "traction_x", "traction_y", "slip_x", "slip_y"),
+    ),
     "joints.delta_surface": lambda: fc.joints.delta_surface(crack(), [1e-4, 2e-4], "W"),
     "joints.closure": lambda: fc.joints.closure(
         crack(), shear=[1e-4], normal_force=[1.0, 10.0], keep=("state",)

@@ -53,6 +53,13 @@ _STOP = {
     "flag_meanings": " ".join(STOP_REASONS),
 }
 
+STICK, SLIP = 1, 2
+_SLIP_STATE = {
+    "flag_values": np.array([OPEN, STICK, SLIP], dtype=np.int8),
+    "flag_meanings": "open stick slip",
+}
+SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")  # that `partial_slip` can return
+
 CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  # that `press` can return
 
 _EVENT = {
@@ -178,6 +185,19 @@ QUANTITIES: dict[str, Quantity] = {
     "residual_height": Quantity("m", "surface height after unloading"),
     "disc_radius": Quantity("m", "radius of the rigid circular plate"),
     "contact_modulus": Quantity("Pa", "contact modulus E* of the pair"),
+    "poisson": Quantity("1", "Poisson's ratio of the bodies"),
+    "friction_coefficient": Quantity("1", "coefficient of friction"),
+    "tangential_force": Quantity("N", "tangential force on the upper body, positive towards the azimuth"),
+    "tangential_displacement": Quantity("m", "elastic displacement of the upper body along the azimuth"),
+    "tangential_stiffness": Quantity("N m-1", "increment of tangential force over that of displacement"),
+    "stick_area": Quantity("m2", "contact area that sticks (cells)"),
+    "slip_area": Quantity("m2", "contact area that slips (cells)"),
+    "dissipated_energy": Quantity("J", "energy dissipated by friction since the start of the path"),
+    "slip_state": Quantity("1", "open, stick or slip", _SLIP_STATE),
+    "traction_x": Quantity("Pa", "tangential traction on the surface along x"),
+    "traction_y": Quantity("Pa", "tangential traction on the surface along y"),
+    "slip_x": Quantity("m", "slip of the upper body over the surface along x"),
+    "slip_y": Quantity("m", "slip of the upper body over the surface along y"),
     # joints
     "bulk_closure": Quantity("m", "closure of the flat block under the same force"),
     "interface_closure": Quantity("m", "closure without that of the flat block"),

@@ -2,6 +2,7 @@ from ._flat_block import flat_stiffness as flat_stiffness
 from ._modulus import effective_modulus as effective_modulus
 from ._options import ContactOptions as ContactOptions
 from ._options import LoadPath as LoadPath
+from ._partial_slip import partial_slip as partial_slip
 from ._press import press as press
 
 __all__ = [
@@ -9,5 +10,6 @@ __all__ = [
     "LoadPath",
     "effective_modulus",
     "flat_stiffness",
+    "partial_slip",
     "press",
 ]

@@ -15,14 +15,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.grid import Grid
 from fractalcontact.contact._flat_block import flat_block
+from fractalcontact.contact._options import ContactOptions, LoadPath
 from fractalcontact.contact._scaled_problem import (
     Body,
     Control,
     Problem,
     Solution,
     Units,
+    make_units,
     mean_by_rows,
+    scaled_body,
     sum_by_rows,
 )
 
@@ -147,6 +151,24 @@ class Step:
     def elastic_energy(self) -> float:
         """Elastic energy in J."""
         return 0.5 * self.solution.work * self.path.units.energy
+
+
+def scaled_path(
+    heights: Array, grid: Grid, contact_modulus: float, options: ContactOptions, load: LoadPath
+) -> ScaledPath:
+    """Return the scaled problem with its load path."""
+    control, values = load.solver_values(grid.nominal_area)
+    spacing = (grid.spacing[0], grid.spacing[1])
+    gap = heights.max() - heights
+    units = make_units(spacing, float(gap.max()), contact_modulus, control, float(values.max()))
+    gap /= units.height
+    shape = (grid.shape[0], grid.shape[1])
+    periodic, influence = options.is_periodic(grid), options.influence_on(grid)
+    body = scaled_body(shape, spacing, periodic, influence, options.disc_radius)
+    hardness = np.inf if options.hardness is None else options.hardness
+    return ScaledPath(
+        body, units, gap, control, tuple(values.tolist()), hardness, options.tolerance, options.method
+    )
 
 
 def solve_path(path: ScaledPath) -> Iterator[Step]:

@@ -15,9 +15,8 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
+from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
-from fractalcontact.contact._scaled_problem import make_units, scaled_body
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -155,7 +154,7 @@ def press(
     )
     grid = read_grid(surface)
     heights = np.asarray(surface.values, dtype=np.float64)
-    path = _scaled_path(heights, grid, float(contact_modulus), options, load)
+    path = scaled_path(heights, grid, float(contact_modulus), options, load)
     names = word_tuple(keep)
     scalars: list[dict[str, Any]] = []
     maps: dict[str, list[Array]] = {name: [] for name in names}
@@ -172,24 +171,6 @@ def press(
         "achieved_residual": float(np.fmax.reduce(result["residual"].values)),
     }
     return result
-
-
-def _scaled_path(
-    heights: Array, grid: Grid, contact_modulus: float, options: ContactOptions, load: LoadPath
-) -> ScaledPath:
-    """Return the scaled problem with its load path."""
-    control, values = load.solver_values(grid.nominal_area)
-    spacing = (grid.spacing[0], grid.spacing[1])
-    gap = heights.max() - heights
-    units = make_units(spacing, float(gap.max()), contact_modulus, control, float(values.max()))
-    gap /= units.height
-    shape = (grid.shape[0], grid.shape[1])
-    periodic, influence = options.is_periodic(grid), options.influence_on(grid)
-    body = scaled_body(shape, spacing, periodic, influence, options.disc_radius)
-    hardness = np.inf if options.hardness is None else options.hardness
-    return ScaledPath(
-        body, units, gap, control, tuple(values.tolist()), hardness, options.tolerance, options.method
-    )
 
 
 def _map(step: Step, name: str, heights: Array) -> Array:

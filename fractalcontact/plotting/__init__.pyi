@@ -17,6 +17,7 @@ from ._islands import island_map as island_map
 from ._islands import islands as islands
 from ._lacunarity import lacunarity as lacunarity
 from ._paper import paper_figure as paper_figure
+from ._partial_slip import slip_domains as slip_domains
 from ._shear_scheme import sliding_scheme as sliding_scheme
 from ._surface import field as field
 from ._surface import surface as surface
@@ -45,5 +46,6 @@ __all__ = [
     "paper_figure",
     "rigid_dilatancy",
     "sliding_scheme",
+    "slip_domains",
     "surface",
 ]

@@ -34,6 +34,7 @@ DIRECTION_COLOURS = {"E": RED, "N": GREEN, "W": BLUE, "S": ORANGE}
 DIRECTION_LINES = {"E": "-", "N": "--", "W": "-", "S": "--"}
 INK, GREY, PALE, MISSING = "#222222", "#6B6B6B", "#E4E4E4", "#D9D9D9"
 STATE_COLOURS = ("#F2F0E9", "#12355B", RED)  # open, contact, yielded
+SLIP_COLOURS = (STATE_COLOURS[0], STATE_COLOURS[1], ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 SEQUENCE_END = 0.86  # the lightest colours of the map cannot be read on white
 MAX_LEGEND_ENTRIES = 8

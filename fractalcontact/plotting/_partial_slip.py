@@ -1,0 +1,125 @@
+"""Maps of stick and slip along a path of tangential force."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.validation import Problems
+from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_of_columns
+from fractalcontact.plotting._inputs import extent_of, result_of
+from fractalcontact.plotting._surface import plane_scale
+from fractalcontact.plotting._units import scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+STATES = ("open", "stick", "slip")
+
+
+@_style.styled
+def slip_domains(
+    result: Any,
+    *,
+    panels: int = 6,
+    figure: Figure | SubFigure | None = None,
+) -> Figure:
+    """Draw maps of stick, slip and open along a path of tangential force.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.contact.partial_slip`: variable `slip_state` with dims (step, y, x), or without
+        step.
+    panels : int
+        Largest number of maps, spread evenly over the steps.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        There is no slip state, or it has another dim than step longer than one.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.partial_slip(
+    ...     surface,
+    ...     contact_modulus=1e9,
+    ...     poisson=0.2,
+    ...     friction_coefficient=0.5,
+    ...     normal_force=10.0,
+    ...     tangential_force=[1.0, 3.0, -3.0],
+    ... )
+    >>> figure = fc.plotting.slip_domains(result)
+    >>> len(figure.axes)
+    3
+    """
+    with Problems("fc.plotting.slip_domains") as problems:
+        problems.integer("panels", panels, at_least=1)
+    data = result_of(result, "slip_domains", ("slip_state",), ("step",))
+    path = data.isel(step=_style.spread_indices(data.sizes["step"], panels))
+    count, columns = path.sizes["step"], number_of_columns(path.sizes["step"])
+    width = _style.WIDTH * columns / COLUMNS
+    height = maps_height(path.rename(slip_state="state"), count, width) + 0.25
+    sheet = _style.figure_or_new(figure, (max(width, 3.0), height))
+    axes = sheet.subplots(-(-count // columns), columns, squeeze=False).ravel()
+    for number, ax in enumerate(axes):
+        if number >= count:
+            ax.set_axis_off()
+            continue
+        step = path.isel(step=number)
+        _slip_map(ax, step["slip_state"])
+        head = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
+        ax.set_title(head + ",  ".join(_title_parts(step, data)), fontsize=8.5)
+    if "x" in path.coords:
+        extent, length = extent_of(path["slip_state"]), plane_scale(path["slip_state"])
+        _maps.scale_bar(axes[(count - 1) // columns * columns], extent, length)
+    _legend(sheet)
+    return _style.root_figure(sheet)
+
+
+def _slip_map(ax: Axes, plane: xr.DataArray) -> None:
+    import matplotlib
+
+    palette = np.array([matplotlib.colors.to_rgb(colour) for colour in _style.SLIP_COLOURS])
+    flags = np.asarray(plane.transpose("y", "x").values).astype(np.int64)
+    _maps.draw_image(ax, palette[np.clip(flags, 0, 2)], extent_of(plane), plane_scale(plane))
+    _maps.bare_frame(ax)
+
+
+def _title_parts(step: xr.Dataset, data: xr.Dataset) -> list[str]:
+    """Return the tangential force and the share of the contact that sticks."""
+    parts = []
+    if "tangential_force" in data.variables:
+        scale = scale_of(data["tangential_force"])
+        number = f"{float(scale(step['tangential_force'].values)):.3g}".replace("-", "\N{MINUS SIGN}")
+        parts.append(f"$Q$ = {number} {scale.unit}")
+    flags = step["slip_state"].values
+    contact = int(np.count_nonzero(flags > 0))
+    if contact:
+        share = 100 * np.count_nonzero(flags == 1) / contact
+        parts.append(f"{share:.0f} % sticks" if share >= 10 else f"{share:.2g} % sticks")
+    else:
+        parts.append("no contact")
+    return parts
+
+
+def _legend(sheet: Any) -> None:
+    from matplotlib.patches import Patch
+
+    entries = [
+        Patch(facecolor=colour, edgecolor=_style.GREY, linewidth=0.4, label=word)
+        for colour, word in zip(_style.SLIP_COLOURS, STATES, strict=True)
+    ]
+    sheet.legend(handles=entries, loc="outside lower right", ncols=3)
