@@ -98,6 +98,7 @@ CALLS = {
     ),
     "joints.delta_dimension": lambda: fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4]),
     "joints.dilatancy": slid,
+    "joints.directional_roughness": lambda: fc.joints.directional_roughness(rough()),
     "joints.friction": lambda: fc.joints.friction(slid()),
     "joints.register": lambda: fc.joints.register(rough(), rough() + 1e-5),
     "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(rough(), lag=4e-4),

@@ -69,6 +69,7 @@ FUNCTIONS = {
     "cyclic_shear": lambda z: fc.joints.cyclic_shear(annotated(sheared(z)), [0.0, 1e-4, -1e-4]),
     "register": lambda z: fc.joints.register(z, z + 1e-5),
     "roughness_coefficient": fc.joints.roughness_coefficient,
+    "directional_roughness": fc.joints.directional_roughness,
     "transmissivity": lambda z: fc.joints.transmissivity(z - z.min()),
 }
 

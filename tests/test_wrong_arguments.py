@@ -52,6 +52,7 @@ CALLS = {
     },
     "joints.Crack": {"lower": SURFACE, "young": 1e10, "poisson": 0.2},
     "joints.delta_surface": {"crack": CRACK, "shear": 1e-4},
+    "joints.directional_roughness": {"surface": SURFACE},
     "joints.dilatancy": {"crack": CRACK, "shear": [0.0, 1e-4]},
     "joints.friction": {"dilatancy": SHEARED},
     "joints.cyclic_shear": {"dilatancy": SHEARED, "path": [0.0, 1e-4, 0.0], "nominal_pressure": 1e6},

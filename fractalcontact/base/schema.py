@@ -72,6 +72,7 @@ _SCALE_POSITION = {
 }
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
+_NO_FACET = {"comment": "NaN where no facet faces the shear"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
 QUANTITIES: dict[str, Quantity] = {
@@ -238,6 +239,11 @@ QUANTITIES: dict[str, Quantity] = {
     "scaled_roughness_coefficient": Quantity("1", "joint roughness coefficient JRC of the longer joint"),
     "scale_position": Quantity("1", "position of JRC on the scale of standard profiles", _SCALE_POSITION),
     "regression_interval": Quantity("m", "sampling interval to which the regression was fitted"),
+    "area_fraction": Quantity("1", "share of the area that faces the shear"),
+    "theta_max": Quantity("degree", "greatest apparent dip towards the shear"),
+    "shape": Quantity("1", "exponent C of the area over the apparent dip", _NO_FACET),
+    "roughness_metric": Quantity("degree", "directional roughness theta_max/(C+1)"),
+    "mean_dip": Quantity("degree", "mean apparent dip of the area that faces the shear"),
     "profile_slope": Quantity("1", "root mean square slope Z2 of the profile at a lag"),
     "smoothing": Quantity("m", "length of shear over which the slope of the dilatancy was taken"),
     "stiffness": Quantity("Pa m-1", "normal stiffness per nominal area"),

@@ -13,9 +13,9 @@ decorrelation_length  the shear at which the facing heights have decorrelated
 transmissivity        the flow through the open part of the joint
 register              two measured faces brought into mated position, before all others
 
-For comparison with practice: the `roughness_coefficient` (JRC) of a surface, the criteria
-`barton_choubey_strength`, `barton_bandis_scaled`, `bandis_constants`, `bandis_closure` and `PARK_PAULAY`, and
-the size effects `self_weight_strength` and `size_effect`.
+For comparison with practice: the `roughness_coefficient` (JRC) and the `directional_roughness` of a surface,
+the criteria `barton_choubey_strength`, `barton_bandis_scaled`, `bandis_constants`, `bandis_closure` and
+`PARK_PAULAY`, and the size effects `self_weight_strength` and `size_effect`.
 
 Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is +x and N is +y.
 """

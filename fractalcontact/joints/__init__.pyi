@@ -6,6 +6,7 @@ from ._decorrelation import decorrelation_length as decorrelation_length
 from ._delta_dimension import delta_dimension as delta_dimension
 from ._delta_surface import delta_surface as delta_surface
 from ._dilatancy import dilatancy as dilatancy
+from ._directional_roughness import directional_roughness as directional_roughness
 from ._friction import friction as friction
 from ._registration import register as register
 from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
@@ -32,6 +33,7 @@ __all__ = [
     "delta_dimension",
     "delta_surface",
     "dilatancy",
+    "directional_roughness",
     "friction",
     "register",
     "roughness_coefficient",

@@ -11,6 +11,7 @@ from ._dilatancy import elastic_dilatancy as elastic_dilatancy
 from ._dilatancy import rigid_dilatancy as rigid_dilatancy
 from ._dimensions import dimension_curves as dimension_curves
 from ._dimensions import dimensions as dimensions
+from ._directional_roughness import directional_roughness as directional_roughness
 from ._draw import draw as draw
 from ._friction import friction as friction
 from ._islands import island_map as island_map
@@ -32,6 +33,7 @@ __all__ = [
     "delta_dimension",
     "dimension_curves",
     "dimensions",
+    "directional_roughness",
     "draw",
     "elastic_dilatancy",
     "error_against_time",

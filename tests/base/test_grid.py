@@ -103,6 +103,7 @@ def test_edges_of_a_small_mask():
         fc.surfaces.level,
         fc.surfaces.despike,
         fc.joints.roughness_coefficient,
+        fc.joints.directional_roughness,
         lambda surface: fc.contact.press(surface, contact_modulus=1e9, closure=1e-6),
         lambda surface: fc.joints.Crack(surface, young=1e9, poisson=0.2),
         lambda surface: fc.joints.register(surface, surface),

@@ -1,0 +1,196 @@
+"""Directional roughness after Grasselli: the slopes of a surface that face a shear, for each azimuth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy.optimize import brentq
+
+from fractalcontact.base.grid import read_grid
+from fractalcontact.base.polynomial import detrended, slopes
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._compass import LARGEST_AZIMUTH, read_direction
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+AZIMUTHS = tuple(5.0 * i for i in range(72))
+THRESHOLDS = 200  # thresholds of dip at which the law is fitted; 100 or 400 change C by less than 0.1 %
+LARGEST_SHAPE = 1e6
+ROUNDING = 64 * np.finfo(np.float64).eps  # smallest slope, over the greatest height over the spacing
+NO_FACET = "NaN where no facet faces the shear"
+REFERENCES = (
+    "Grasselli, G., Wirth, J. and Egger, P., Quantitative three-dimensional description of a rough surface "
+    "and parameter evolution with shearing, Int. J. Rock Mech. Min. Sci. 39 (2002); Tatone, B. S. A. and "
+    "Grasselli, G., A method to evaluate the three-dimensional roughness of fracture surfaces in brittle "
+    "geomaterials, Rev. Sci. Instrum. 80 (2009)"
+)
+
+
+def _check(problems: Problems, *, surface: Any, azimuth: Any) -> None:
+    problems.numbers("azimuth", azimuth, at_least=-LARGEST_AZIMUTH, at_most=LARGEST_AZIMUTH)
+    if problems.surface("surface", surface, finite=False):
+        complete = np.isfinite(surface.values)
+        complete = complete[1:, 1:] & complete[1:, :-1] & complete[:-1, 1:] & complete[:-1, :-1]
+        problems.require(bool(complete.any()), "surface", "four neighbouring heights", "none")
+
+
+@public_result(
+    title="directional roughness",
+    references=REFERENCES,
+    achieved_error="exact to rounding, but for shape and roughness_metric, which are a fit",
+    check=_check,
+)
+def directional_roughness(
+    surface: xr.DataArray, *, azimuth: float | Sequence[float] = AZIMUTHS
+) -> xr.Dataset:
+    """Return the directional roughness of a surface after Grasselli, from its facets that face the shear.
+
+    The apparent dip of a facet is the angle, in the vertical plane along the shear, by which it rises towards
+    the shear, above the mean plane. The share of the area with an apparent dip of at least theta follows
+    A(theta) = A0 (1 - theta/theta_max)^C, which is fitted for C.
+
+    Parameters
+    ----------
+    surface : DataArray, shape (y, x)
+        Heights, m; cells beside a missing height (NaN) are left out.
+    azimuth : float or sequence of float
+        Directions in which the block above the surface slides, degree (E = 0, anticlockwise). Default: every
+        5 degrees.
+
+    Returns
+    -------
+    Dataset over azimuth
+        area_fraction A0; theta_max, degree; shape C; roughness_metric theta_max/(C+1), degree; mean_dip,
+        the area-weighted mean of the apparent dips that face the shear, degree, which equals the metric where
+        the law is exact.
+
+    Raises
+    ------
+    InvalidInput
+        `surface` is no surface or has no four neighbouring heights, or an azimuth is no number.
+
+    Notes
+    -----
+    Every cell between four heights is divided into two triangles by either of its diagonals, with half the
+    weight each, so that a mirrored surface gives the mirrored result. A0 of opposite azimuths add up to 1
+    where no facet is level. On a fractal surface the dips, and theta_max most of all, grow as the spacing
+    decreases: compare surfaces of equal spacing.
+
+    References
+    ----------
+    Grasselli, Wirth and Egger (2002), Int. J. Rock Mech. Min. Sci. 39:789; Tatone and Grasselli (2009), Rev.
+    Sci. Instrum. 80:125110.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> x = np.arange(401) % 20
+    >>> teeth = np.minimum(x, (20 - x) / 3) * np.ones((5, 1))  # rise by 45 degrees, fall by atan(1/3)
+    >>> surface = fc.surfaces.from_array(1e-3 * teeth, 1e-3)
+    >>> result = fc.joints.directional_roughness(surface, azimuth=[0, 180])
+    >>> result.roughness_metric.values.round(1).tolist()
+    [45.0, 18.4]
+    >>> result.area_fraction.values.round(3).tolist()  # 5 sqrt(2) and 15 sqrt(10/9) of each tooth
+    [0.309, 0.691]
+    """
+    azimuths = float_array(azimuth)
+    facets = _facets(np.asarray(surface.values, dtype=np.float64), read_grid(surface).spacing)
+    measures = np.array([_facing(facets, read_direction(float(angle)).unit) for angle in azimuths])
+    names = ("area_fraction", "theta_max", "shape", "roughness_metric", "mean_dip")
+    result = xr.Dataset(
+        {name: ("azimuth", values) for name, values in zip(names, measures.T, strict=True)},
+        coords={"azimuth": azimuths},
+    )
+    if np.isnan(result["shape"]).any():
+        result["shape"].attrs["reason"] = NO_FACET
+    return result
+
+
+class Facets(NamedTuple):
+    """Slopes along y and x above the mean plane, and area, of every triangle; slopes (y, x) of the plane.
+
+    `rounding` is the greatest slope that is only rounding.
+    """
+
+    slope_y: Array
+    slope_x: Array
+    area: Array
+    plane: tuple[float, float]
+    rounding: float
+
+
+def _facets(heights: Array, spacing: Sequence[float]) -> Facets:
+    """Return the triangles of a plane: four of each cell, two for either diagonal, with half their area."""
+    dy, dx = spacing
+    plane_y, plane_x = slopes(heights, spacing)
+    rounding = ROUNDING * float(np.nanmax(np.abs(heights))) / min(spacing)
+    heights = detrended(heights, 1)[0]
+    along_x, along_y = np.diff(heights, axis=1) / dx, np.diff(heights, axis=0) / dy
+    south, north = along_x[:-1], along_x[1:]  # edges of the cells
+    west, east = along_y[:, :-1], along_y[:, 1:]
+    # a triangle has two edges of its cell; each pair of neighbouring edges occurs once
+    slope_y = np.stack([west, east, west, east])
+    slope_x = np.stack([south, south, north, north])
+    complete = np.isfinite(west + east + south + north)
+    slope_y, slope_x = slope_y[:, complete].ravel(), slope_x[:, complete].ravel()
+    area = 0.25 * np.sqrt(1.0 + (slope_y + plane_y) ** 2 + (slope_x + plane_x) ** 2)
+    return Facets(slope_y, slope_x, area, (plane_y, plane_x), rounding)
+
+
+def _facing(facets: Facets, unit: tuple[float, float]) -> tuple[float, float, float, float, float]:
+    """Return A0, theta_max, C, theta_max/(C+1) and the mean dip (degree) of the facets facing the shear.
+
+    tan theta* = -tan theta cos alpha, with the dip theta of the facet from the mean plane and the angle alpha
+    between the shear and the direction in which it dips (Grasselli et al. 2002). With the normal n of the
+    facet, the normal N of the mean plane and the shear t in that plane it is -(n t)/(n N).
+    """
+    plane_y, plane_x = facets.plane
+    along = unit[0] * plane_y + unit[1] * plane_x  # slope of the mean plane along the shear
+    rise = (unit[0] * facets.slope_y + unit[1] * facets.slope_x) / math.sqrt(1.0 + along**2)
+    square = plane_y**2 + plane_x**2
+    if square > 0.0:
+        overlap = 1.0 + square + plane_y * facets.slope_y + plane_x * facets.slope_x  # times cos(tilt): n N
+        rise *= math.sqrt(1.0 + square) / overlap
+    faces_shear = rise > facets.rounding
+    if not faces_shear.any():
+        return 0.0, 0.0, math.nan, 0.0, 0.0
+    dip = np.arctan(rise[faces_shear])
+    area = facets.area[faces_shear]
+    facing_area, theta_max = float(np.sum(area)), float(dip.max())
+    # A(theta)/A0 at equally spaced thresholds 0 <= theta < theta_max
+    bins = np.minimum((dip * (THRESHOLDS / theta_max)).astype(np.int64), THRESHOLDS - 1)
+    areas = np.bincount(bins, weights=area, minlength=THRESHOLDS)
+    share = np.cumsum(areas[::-1])[::-1] / facing_area
+    shape = _fitted_shape(1.0 - np.arange(THRESHOLDS) / THRESHOLDS, share)
+    return (
+        facing_area / float(np.sum(facets.area)),
+        math.degrees(theta_max),
+        shape,
+        math.degrees(theta_max) / (shape + 1.0),
+        math.degrees(float(np.sum(area * dip)) / facing_area),
+    )
+
+
+def _fitted_shape(remainder: Array, share: Array) -> float:
+    """Return C >= 0 for which remainder^C is nearest to share, by least squares.
+
+    The derivative of the sum of squares over C is zero.
+    """
+    log = np.log(remainder)
+
+    def derivative(shape: float) -> float:
+        power = remainder**shape
+        return float(np.sum(power * log * (power - share)))
+
+    if derivative(0.0) >= -ROUNDING * THRESHOLDS:  # all facets have the same dip
+        return 0.0
+    high = 1.0
+    while derivative(high) < 0.0 and high < LARGEST_SHAPE:
+        high *= 2.0
+    return float(brentq(derivative, 0.0, high, xtol=1e-12)) if derivative(high) > 0.0 else high

@@ -1,0 +1,85 @@
+"""Directional roughness as a polar figure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.validation import Problems
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import result_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SIZE = (5.0, 4.0)  # inches
+COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
+CURVES: dict[str, tuple[str, dict[str, Any]]] = {
+    "roughness_metric": ("$\\theta^*_{max}/(C+1)$", {"color": _style.BLUE, "ls": "-"}),
+    "mean_dip": ("mean dip", {"color": _style.RED, "ls": "--", "lw": 1.0}),
+}
+
+
+@_style.styled
+def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
+    r"""Draw the directional roughness over the azimuth of the shear, in polar coordinates.
+
+    The distance from the centre is an angle: the metric theta_max/(C+1), and dashed the mean apparent dip
+    that faces the shear. The two coincide where the law of the area holds.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.directional_roughness`.
+    ax : Axes, optional
+        Polar axes to draw on; otherwise a new figure is made.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the axes are not polar.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=2e-5, rng=1)
+    >>> result = fc.joints.directional_roughness(surface)
+    >>> ax = fc.plotting.directional_roughness(result).axes[0]
+    >>> [line.get_label() for line in ax.lines]
+    ['$\\theta^*_{max}/(C+1)$', 'mean dip']
+    """
+    data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
+    polar: Any = ax
+    if ax is None:
+        polar = _style.figure_or_new(None, SIZE).add_subplot(projection="polar")
+    with Problems("fc.plotting.directional_roughness") as problems:
+        problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
+    _style.style_axes(polar)
+    azimuth = data["azimuth"].values
+    order = np.argsort(azimuth % 360.0)
+    if _is_full_circle(azimuth):
+        order = np.append(order, order[0])
+    for name, (label, style) in CURVES.items():
+        polar.plot(np.radians(azimuth[order]), data[name].values[order], label=label, **style)
+    greatest = max(float(data[name].max()) for name in CURVES)
+    polar.set_ylim(0.0, 1.12 * greatest or 1.0)
+    polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
+    polar.yaxis.set_major_formatter("{x:g}°")
+    polar.set_rlabel_position(22.5)
+    for tick_label in polar.get_yticklabels():
+        tick_label.set_path_effects(_style.halo())
+    _style.side_legend(polar, polar.lines)
+    return _style.root_figure(polar)
+
+
+def _is_full_circle(azimuth: Any) -> bool:
+    """Return whether no gap between neighbouring azimuths is longer than 90 degrees."""
+    angles = np.sort(np.asarray(azimuth, dtype=np.float64) % 360.0)
+    gaps = np.diff(np.append(angles, angles[0] + 360.0))
+    return bool(gaps.max() <= 90.0)

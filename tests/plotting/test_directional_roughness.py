@@ -1,0 +1,41 @@
+"""Polar figure of the directional roughness."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact import plotting
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return fc.surfaces.fbm((40, 40), 2e-4, hurst=0.8, rms_increment=4e-5, rng=2)
+
+
+def test_curves_are_closed_and_hold_the_values(surface):
+    result = fc.joints.directional_roughness(surface)
+    ax = plotting.directional_roughness(result).axes[0]
+    for line, name in zip(ax.lines, ("roughness_metric", "mean_dip"), strict=True):
+        angle, radius = line.get_data()
+        np.testing.assert_allclose(np.degrees(angle[:-1]), result.azimuth)
+        np.testing.assert_allclose(radius[:-1], result[name])
+        assert (angle[-1], radius[-1]) == (angle[0], radius[0])
+    assert [tick.get_text() for tick in ax.get_xticklabels()][::2] == ["E", "N", "W", "S"]
+    assert ax.get_ylim()[0] == 0
+
+
+def test_a_sector_stays_open_and_is_drawn_in_order(surface):
+    result = fc.joints.directional_roughness(surface, azimuth=[40.0, 0.0, 20.0])
+    angle, radius = plotting.directional_roughness(result).axes[0].lines[0].get_data()
+    np.testing.assert_allclose(np.degrees(angle), [0, 20, 40], atol=1e-12)
+    np.testing.assert_allclose(radius, result.roughness_metric[[1, 2, 0]])
+
+
+def test_axes_that_are_not_polar_are_refused(surface):
+    from matplotlib.figure import Figure
+
+    result = fc.joints.directional_roughness(surface, azimuth=[0.0, 90.0])
+    with pytest.raises(ValueError, match="polar axes"):
+        plotting.directional_roughness(result, ax=Figure().add_subplot())
+    polar = Figure().add_subplot(projection="polar")
+    assert plotting.directional_roughness(result, ax=polar) is polar.figure
