@@ -124,7 +124,8 @@ def fit_exponential(pressure: Array, closure: Array) -> tuple[float, float, floa
     log_pressure, w = np.log(pressure[steps]), closure[steps]
     length, offset = np.polyfit(log_pressure, w, 1)
     misfit = math.sqrt(np.mean((w - length * log_pressure - offset) ** 2))
-    return float(length), math.exp(-offset / length), misfit
+    with np.errstate(over="ignore"):  # faces that are mated again close by rounding only
+        return float(length), float(np.exp(-offset / length)), misfit
 
 
 def fit_hyperbola(pressure: Array, closure: Array) -> tuple[float, float, float]:

@@ -1,4 +1,5 @@
 from ._contents import contents as contents
+from ._paper import paper_criteria as paper_criteria
 from ._paper import paper_table as paper_table
 from ._plan import plan as plan
 from ._report import summary as summary
@@ -11,6 +12,7 @@ __all__ = [
     "Scene",
     "contents",
     "load",
+    "paper_criteria",
     "paper_table",
     "plan",
     "run",

@@ -100,6 +100,7 @@ _ROWS = (
     StageType("contact", _SURFACE, "contact.press", "contact", keeps=CONTACT_MAPS),
     StageType("joints/faces", _SURFACE, "joints.register", "upper"),
     _joint("delta_surface"),
+    _joint("delta_dimension"),
     _joint("rigid_dilatancy", function="dilatancy"),
     _joint("closure", keeps=CONTACT_MAPS),
     _joint("elastic_dilatancy", function="dilatancy"),

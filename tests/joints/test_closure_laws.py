@@ -105,6 +105,13 @@ def test_mated_faces_have_no_law(make_face):
     assert "does not close" in result.closure_length.attrs["reason"]
 
 
+def test_closure_by_rounding_alone_has_a_finite_length():
+    # faces that are mated again after a whole period: p0 = exp(-offset / length) is beyond any double
+    result = fc.joints.closure_laws(law(np.array([1.0, 3.0, 10.0]), -1e-20 + 1e-24 * np.arange(3)))
+    assert abs(result.closure_length) < 1e-23
+    assert result.reference_pressure == np.inf
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_self_affine_faces_close_with_the_known_length(seed):
     # separation over rms height: 0.38 to 0.52 at reduced pressures of 0.01 to 0.1

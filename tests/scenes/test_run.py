@@ -208,7 +208,7 @@ def test_only_a_scene_of_the_paper_is_compared_with_it(tmp_path, paper):
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     tree = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert ("FRAMCOS" in tree.attrs["references"]) == paper
-    assert ("statement of the paper" in fc.scenes.summary(tree)) == paper
+    assert ("claim of the paper" in fc.scenes.summary(tree)) == paper
     names = {path.stem for path in (tmp_path / "out").glob("*.png")}
     closure, other = ("figure_3_closure", "joint_closure") if paper else ("joint_closure", "figure_3_closure")
     assert closure in names
