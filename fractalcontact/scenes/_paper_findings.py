@@ -452,7 +452,7 @@ def resolution(_: xr.DataTree) -> Finding:
 
 
 def elimination(_: xr.DataTree) -> Finding:
-    return Finding("see the scene concrete_crack_1998_part", NOT_TESTED)
+    return Finding("see the elimination method of contact.press", NOT_TESTED)
 
 
 def _finding(result: str, is_true: bool) -> Finding:
