@@ -22,7 +22,7 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import NONE, Problems, float_array, word_tuple
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -73,7 +73,7 @@ def _check(
         chosen = problems.choices("methods", methods, dimensions.methods()) and chosen
     if chosen:
         some = bool(word_tuple(families)) and (methods is None or bool(word_tuple(methods)))
-        problems.require(some, "families / methods", "at least one of each", "none")
+        problems.require(some, "families / methods", "at least one of each", NONE)
     if members is not None:
         counts = np.atleast_1d(members).tolist()
         for count in counts:

@@ -137,7 +137,7 @@ def grid_faults(array: Any, argument: str, dims: Sequence[str] = ("y", "x")) -> 
 def _axis_faults(array: xr.DataArray, dim: str, name: str) -> Iterator[Fault]:
     if dim not in array.coords:
         expected = "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)"
-        yield name, expected, "none"
+        yield name, expected, "no coordinate"
         return
     coordinate = array.coords.variables[dim]  # several times as fast as coords[dim]
     units = coordinate.attrs.get("units", "m")

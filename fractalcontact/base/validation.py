@@ -33,6 +33,13 @@ T = TypeVar("T")
 LARGEST_INTEGER = 1 << 53  # larger integers are not all representable as float64
 
 
+class Words(str):
+    """A description of what was given, which an error message shows without quotation marks."""
+
+
+NONE = Words("none")  # where a value is missing
+
+
 class Problems:
     """Collects the problems of a call and raises them all on leaving the `with` block.
 
@@ -47,12 +54,15 @@ class Problems:
     ----------
     messages : list of str
         One line for each problem, so far.
+    arguments : list of str
+        The arguments that `add` noted, so far.
     """
 
     def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
         self.where = where
         self.error = error
         self.messages: list[str] = []
+        self.arguments: list[str] = []
 
     def __enter__(self) -> Problems:
         return self
@@ -68,6 +78,7 @@ class Problems:
 
     def add(self, argument: str, expected: str, got: object) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
+        self.arguments.append(argument)
         self.messages.append(f"{argument}: expected {expected}, got {_shown(got)}")
 
     @contextmanager
@@ -194,17 +205,17 @@ class Problems:
         if not isinstance(value, str) and (
             not isinstance(value, (Sequence, np.ndarray)) or number_of_axes(value) != 1
         ):
-            self.add(argument, f"a sequence out of {_quoted(words)}", value)
+            self.add(argument, f"a sequence of any of {_quoted(words)}", value)
             return False
         wrong = [word for word in word_list(value) if not isinstance(word, str) or word not in words]
         for word in wrong:
-            self.add(argument, f"words out of {_quoted(words)}{did_you_mean(word, words)}", word)
+            self.add(argument, f"any of {_quoted(words)}{did_you_mean(word, words)}", word)
         return not wrong
 
     def exactly_one(self, **options: object) -> bool:
         """Check that one of the options is given and the others are None; `given_option` returns it."""
         given = [name for name, value in options.items() if value is not None]
-        return self.require(len(given) == 1, " / ".join(options), "exactly one of them", given or "none")
+        return self.require(len(given) == 1, " / ".join(options), "exactly one of them", given or NONE)
 
     def finite(self, argument: str, array: xr.DataArray | np.ndarray, *, remedy: str = "") -> bool:
         """Check that all values are finite; otherwise report how many are not."""
@@ -360,5 +371,6 @@ def _shown(value: object) -> str:
         return f"a {type(value).__name__} with dims {tuple(getattr(value, 'dims', ()))}"
     if isinstance(value, (np.floating, np.integer, np.bool_)):
         value = value.item()
-    text = value if isinstance(value, str) and " " in value else repr(value)
+    in_words = isinstance(value, Words) or (isinstance(value, str) and " " in value)
+    text = str(value) if in_words else repr(value)
     return text if len(text) <= 120 else text[:117] + "..."

@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
@@ -48,7 +48,7 @@ def _check_same_extent(problems: Problems, masks: Sequence[xr.DataArray]) -> Non
     coarsest = max(max(grid.spacing) for grid in grids)
     for k, (mask, grid) in enumerate(zip(masks, grids, strict=True)):
         name = f"masks[{k}]"
-        problems.require(grid.has_coordinates, name, "x and y coordinates", "none")
+        problems.require(grid.has_coordinates, name, "x and y coordinates", NONE)
         own = mask.dims[:-2], mask.shape[:-2]
         problems.require(own == leading, f"{name}.dims", f"leading dims {leading[0]} {leading[1]}", own)
         difference = max(abs(a - b) for a, b in zip(grid.extent, first.extent, strict=True))

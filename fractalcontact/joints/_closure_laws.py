@@ -32,7 +32,7 @@ GREATEST_CORRECTION = 0.2  # of the logarithm of a stiffness: beyond, the closur
 def _check(problems: Problems, *, closure: Any, **_: Any) -> None:
     expected = "the Dataset of fractalcontact.joints.closure"
     if not isinstance(closure, xr.Dataset):
-        problems.add("closure", expected, type(closure).__name__)
+        problems.add("closure", expected, f"an object of type {type(closure).__name__}")
         return
     names = ("interface_closure", "nominal_pressure")
     absent = [name for name in names if name not in closure.variables or "step" not in closure[name].dims]

@@ -97,7 +97,7 @@ class Crack:
     young : float
         Young's modulus of both bodies, Pa.
     poisson : float
-        Poisson's ratio of both bodies, above -1 and below 0.5.
+        Poisson's ratio of both bodies, above -1 and at most 0.5.
     block : float or pair (y, x), optional
         Edge length of the sliding block, m, rounded to the nearest whole number of cells; its first cell is
         (n - b)//2 of `lower`. None: the whole face.
@@ -141,7 +141,7 @@ class Crack:
     def __post_init__(self) -> None:
         with Problems(WHERE) as problems:
             problems.number("young", self.young, above=0)
-            problems.number("poisson", self.poisson, above=-1, below=0.5)
+            problems.number("poisson", self.poisson, above=-1, at_most=0.5)
             problems.number("basic_friction_angle", self.basic_friction_angle, at_least=0, below=90)
             layout = _check_faces(problems, self.lower, self.upper, self.block)
         for name in ("young", "poisson", "basic_friction_angle"):
@@ -222,8 +222,8 @@ def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
         cells = (math.floor(edges[0] / spacing[0] + 0.5), math.floor(edges[1] / spacing[1] + 0.5))
     fits = True
     for name, b, n, step in zip(("y", "x"), cells, face, spacing, strict=True):
-        expected = f"{SMALLEST} to {n} cells along {name}, {SMALLEST * step:g} to {n * step:g} m"
-        fits &= problems.require(SMALLEST <= b <= n, "block", expected, f"{b} cells")
+        expected = f"{SMALLEST * step:g} to {n * step:g} m along {name} ({SMALLEST} to {n} cells)"
+        fits &= problems.require(SMALLEST <= b <= n, "block", expected, f"{b * step:g} m ({b} cells)")
     start = ((face[0] - cells[0]) // 2, (face[1] - cells[1]) // 2)
     return Block(face, cells, start, spacing, (grid.periodic[0], grid.periodic[1])) if fits else None
 
@@ -231,7 +231,7 @@ def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
 def _check_heights(problems: Problems, argument: str, face: xr.DataArray, layout: Block) -> None:
     values = np.asarray(face.values, dtype=np.float64)
     infinite = int(np.count_nonzero(np.isinf(values)))
-    problems.require(infinite == 0, argument, "no infinite heights", f"{infinite}")
+    problems.require(infinite == 0, argument, "no infinite heights", f"{infinite} of them")
     problems.finite(f"{argument} inside the block", values[layout.slices], remedy=FILL)
 
 
@@ -258,7 +258,9 @@ def _check_upper(problems: Problems, upper: xr.DataArray, lower: xr.DataArray, l
 def check_crack(problems: Problems, crack: Any) -> bool:
     """Check for a `Crack`."""
     expected = "a fractalcontact.joints.Crack"
-    return problems.require(isinstance(crack, Crack), "crack", expected, type(crack).__name__)
+    return problems.require(
+        isinstance(crack, Crack), "crack", expected, f"an object of type {type(crack).__name__}"
+    )
 
 
 def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) -> bool:

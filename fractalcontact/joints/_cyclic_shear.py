@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import NONE, Problems, float_array
 from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._friction import (
     ERROR,
@@ -57,7 +57,7 @@ def _check(
 
 def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turns: Array) -> None:
     """Check that the dilatancy covers the path, on both sides where it has negative positions."""
-    if not problems.require("azimuth" in dilatancy.variables, "dilatancy", "an azimuth", "none"):
+    if not problems.require("azimuth" in dilatancy.variables, "dilatancy", "an azimuth", NONE):
         return
     shears = read_dilatancy(dilatancy)[1]
     for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items():

@@ -346,7 +346,7 @@ def check_dilatancy(
     problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
     expected = "the Dataset of fractalcontact.joints.dilatancy"
     if not isinstance(dilatancy, xr.Dataset):
-        problems.add("dilatancy", expected, type(dilatancy).__name__)
+        problems.add("dilatancy", expected, f"an object of type {type(dilatancy).__name__}")
         return False
     name = _dilatancy_name(dilatancy)
     needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])

@@ -19,7 +19,7 @@ import xarray as xr
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Pair = tuple[float, float]
@@ -54,7 +54,7 @@ def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, tilt: A
     for argument, face in (("lower", lower), ("upper", upper)):
         values = np.asarray(face.values, dtype=np.float64)
         problems.require(not np.isinf(values).any(), argument, "no infinite heights", "some")
-        problems.require(bool(np.isfinite(values).any()), argument, "heights", "none")
+        problems.require(bool(np.isfinite(values).any()), argument, "heights", NONE)
     ratio = grid.spacing[0] / grid.spacing[1]
     # a rotation in cells is one in the plane only where the cells are square
     square = not rotation or abs(ratio - 1.0) <= UNIFORM

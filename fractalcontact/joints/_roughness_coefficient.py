@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.joints._compass import Direction, check_directions, direction_coords, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -75,7 +75,7 @@ def _check(
             continue
         cells = _lag_cells(grid.spacing, towards, interval)
         fits = all(abs(n) < size for n, size in zip(cells, grid.shape, strict=True))
-        problems.require(fits, "surface", f"heights {interval:g} m apart towards {towards.name}", "none")
+        problems.require(fits, "surface", f"heights {interval:g} m apart towards {towards.name}", NONE)
 
 
 @public_result(
@@ -170,7 +170,7 @@ def roughness_coefficient(
             if lines.of_profiles.size >= FEWEST_PROFILES:  # JRC grows with Z2: the quantiles correspond
                 limits[:, i] = _coefficient(fitted, np.quantile(lines.of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
-            problems.require(math.isfinite(slopes[i]), "surface", expected, "none")
+            problems.require(math.isfinite(slopes[i]), "surface", expected, NONE)
     position = np.where(coefficient > LARGEST_JRC, ABOVE, np.where(coefficient < 0, BELOW, INSIDE))
     limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
     variables = {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
@@ -101,7 +101,7 @@ def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.D
         datasets = {curve_of(dataset)[1]: dataset}
     datasets = {name: curve for name, curve in datasets.items() if curve_of(curve)[1]}
     with Problems("fc.plotting.dimension_curves") as problems:
-        problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", "none")
+        problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
     return datasets, None if estimates is None else as_dataset(estimates, "dimension_curves")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import closure_laws, contact_area
 from fractalcontact.plotting._contact_maps import contact_domains, maps_height
@@ -95,9 +95,7 @@ def paper_figure(tree: xr.DataTree, number: int) -> Figure:
     with Problems("fc.plotting.paper_figure") as problems:
         if problems.integer("number", number, at_least=1, at_most=5):
             groups = " and ".join(GROUPS[number])
-            problems.require(
-                has_figure(tree, number), "tree", f"data for figure {number} in {groups}", "none"
-            )
+            problems.require(has_figure(tree, number), "tree", f"data for figure {number} in {groups}", NONE)
     drawing = {1: _surfaces, 2: _scheme, 3: _closure, 4: _domains, 5: _dilatancy}[number]
     return drawing(tree)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting._inputs import nearest, table
 from fractalcontact.plotting._style import spread_indices
 from fractalcontact.plotting._units import name_of, scale_for, scale_of, units_of
@@ -87,9 +87,7 @@ def select_path(
         if data.sizes["shear"] > 1 and data.sizes["step"] > 1:
             problems.exactly_one(shear=shear, normal_force=normal_force)
         if normal_force is not None:
-            problems.require(
-                "normal_force" in data.variables, "result", "the variable 'normal_force'", "none"
-            )
+            problems.require("normal_force" in data.variables, "result", "the variable 'normal_force'", NONE)
     if normal_force is not None or (data.sizes["step"] == 1 and shear is None):
         return at_force(data, normal_force).isel(shear=spread_indices(data.sizes["shear"], most)), "shear"
     path = at_shear(data, shear)

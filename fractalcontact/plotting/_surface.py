@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import as_dataset, extent_of
 from fractalcontact.plotting._units import Scale, axis_label, name_of, scale_for, scale_of
@@ -116,7 +116,7 @@ def plane_of(data: Any, where: str, name: str) -> xr.DataArray:
     dataset = as_dataset(data, where)
     variable = name if name in dataset.data_vars else next(iter(dataset.data_vars), "")
     with Problems(f"fc.plotting.{where}") as problems:
-        if problems.require(bool(variable), "result", "a variable with dims (y, x)", "none"):
+        if problems.require(bool(variable), "result", "a variable with dims (y, x)", NONE):
             plane = dataset[variable]
             problems.require({"y", "x"} <= set(plane.dims), str(variable), "dims (y, x)", plane.dims)
             for dim in plane.dims:

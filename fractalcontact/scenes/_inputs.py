@@ -78,9 +78,8 @@ def locate(path: str, folder: Path) -> Path:
     expanded = os.path.expandvars(path)
     if "$" in expanded:
         unset = " and ".join(VARIABLE.findall(expanded))
-        raise InvalidInput(
-            "surface", [f"read: expected {unset} to name a folder, got a variable that is not set"]
-        )
+        remedy = f"set the environment variable {unset} to the folder that holds the file {Path(path).name}"
+        raise InvalidInput("surface", [f"read: {remedy}"])
     for candidate in (folder / expanded, datasets_folder() / expanded):
         if candidate.is_file():
             return candidate

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from fractalcontact.base.tables import table
+from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
@@ -202,23 +203,20 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     return tuple(maps)
 
 
-def check_loads(scene: Scene) -> list[str]:
-    """Return what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
-    problems = []
+def check_loads(scene: Scene, problems: Problems) -> None:
+    """Note what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
     for stage in stages_of(scene):
         name = stage.name.partition("/")[2]
         if not stage.name.startswith("joints/") or name == "faces":
             continue
         given = scene.stage_options(stage.row, ("shear", "direction", *LOADS))
         if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in given:
-            problems.append(f"joint.shear: expected a value for {name} ({stage.reason}), got none")
+            problems.add("joint.shear", f"a value for {name} ({stage.reason})", NONE)
         if name == "elastic_dilatancy" and "normal_force" not in given:
-            problems.append(f"joint.normal_force: expected a value for {name}, got none")
+            problems.add("joint.normal_force", f"a value for {name}", NONE)
         direction = given.get("direction", "E")
         if name in ("closure", "delta_surface", "decorrelation_length") and isinstance(direction, list):
-            problems.append(f"joint.direction: expected one direction for {name}, got {direction}")
+            problems.add("joint.direction", f"one direction for {name}", direction)
         if name == "closure" and len(loads := scene.joint.loads) != 1:
-            words = "a closure, normal_force or nominal_pressure"
-            got = ", ".join(loads) or "none"
-            problems.append(f"joint.closure: expected one of {words} ({stage.reason}), got {got}")
-    return problems
+            expected = f"one of a closure, normal_force or nominal_pressure ({stage.reason})"
+            problems.add("joint.closure", expected, Words(", ".join(loads)) or NONE)

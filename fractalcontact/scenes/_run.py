@@ -119,7 +119,7 @@ def _run(
 def _check_workers(workers: int, client: Any) -> None:
     with Problems("fractalcontact.scenes.run") as problems:
         if problems.integer("workers", workers, at_least=0) and workers:
-            problems.require(client is None, "workers / client", "one of them", "both")
+            problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)
 
 

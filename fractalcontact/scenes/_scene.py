@@ -51,7 +51,7 @@ class MaterialTable:
     """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa)."""
 
     young: float | None = _number(above=0.0)
-    poisson: float | None = _number(above=-1.0, below=0.5)
+    poisson: float | None = _number(above=-1.0, at_most=0.5)
     basic_friction_angle: float | None = _number(at_least=0.0, below=90.0)
     hardness: float | None = _number(above=0.0)
 

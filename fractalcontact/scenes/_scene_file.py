@@ -13,7 +13,7 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-from fractalcontact.base.validation import Problems, did_you_mean
+from fractalcontact.base.validation import NONE, Problems, did_you_mean
 from fractalcontact.scenes._plan import check_loads
 from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, WANT_KEYS, MaterialTable, Scene, Table
 from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, WANTED, arguments_of
@@ -71,13 +71,15 @@ def load(path: str | os.PathLike[str]) -> Scene:
     12
     """
     scene, problems = parse(path)
-    if problems:
-        raise InvalidInput(f"scene {scene.name}", problems)
+    if problems.messages:
+        raise InvalidInput(problems.where, problems.messages)
     return scene
 
 
-def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
-    """Read a scene; return it with a list of its problems."""
+def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
+    """Read a scene; return it with its problems."""
+    with Problems("fractalcontact.scenes.load") as problems:
+        problems.path("path", path)
     source = _find(Path(path))
     try:
         tables = tomllib.loads(source.read_text(encoding="utf-8-sig"))
@@ -88,8 +90,8 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, list[str]]:
     scene = Scene(source.stem, tables, source.resolve().parent)
     _check(scene, problems)
     if not problems.messages:
-        problems.messages += check_loads(scene)
-    return scene, problems.messages
+        check_loads(scene, problems)
+    return scene, problems
 
 
 def _find(path: Path) -> Path:
@@ -119,7 +121,7 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
     expected = f"a number (a range has {', '.join(words)})"
     checks = [
         problems.number(f"{key}.{word}", value[word])
-        if problems.require(word in value, f"{key}.{word}", expected, "none")
+        if problems.require(word in value, f"{key}.{word}", expected, NONE)
         else False
         for word in words
     ]
@@ -146,7 +148,7 @@ def _check(scene: Scene, problems: Problems) -> None:
     for name in not_tables:
         problems.add(name, "a table", scene.tables[name])
     if not_tables:
-        return
+        raise InvalidInput(problems.where, problems.messages)
     _check_surface(scene.table("surface"), "surface", problems)
     if "upper" in scene.tables:
         _check_surface(scene.table("upper"), "upper", problems)
@@ -166,7 +168,7 @@ def _check(scene: Scene, problems: Problems) -> None:
 
 def _check_settings(tables: Table, problems: Problems) -> None:
     if "error" in tables and "budget" in tables:
-        problems.add("error / budget", "one of them", "both")
+        problems.add("error / budget", "one of them", "both of them")
     if "error" in tables:
         problems.number("error", tables["error"], above=0, below=1)
     if "budget" in tables:
@@ -177,14 +179,14 @@ def _check_settings(tables: Table, problems: Problems) -> None:
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
     sources = [source for source in ("read", "sample", "generate") if source in table]
     if len(sources) != 1:
-        problems.add(name, "one of `read`, `sample` or `generate`", sources or "none")
+        problems.add(name, "one of `read`, `sample` or `generate`", sources or NONE)
     elif sources == ["generate"]:
         if problems.choice(f"{name}.generate", table["generate"], GENERATORS):
             generator = table["generate"]
             keys, required = arguments_of(f"surfaces.{generator}")
             _check_keys(table, (*keys, "generate", "level"), name, problems)
             for key in sorted(required - set(table)):
-                problems.add(f"{name}.{key}", f"a value for {generator}", "none")
+                problems.add(f"{name}.{key}", f"a value for {generator}", NONE)
         if "members" in table:
             problems.integer(f"{name}.members", table["members"], at_least=1)
     else:
@@ -226,7 +228,7 @@ def _check_stages(
 def _check_want(scene: Scene, problems: Problems) -> None:
     table = scene.table("want")
     if not table:
-        problems.add("want", "a table that names at least one result", "none")
+        problems.add("want", "a table that names at least one result", NONE)
     _check_keys(table, WANT_KEYS, "want", problems)
     valid = [
         problems.choices(f"want.{name}", table[name], words)
@@ -248,14 +250,14 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     contact, material = scene.table("contact"), scene.table("material")
     if scene.wanted("joints") or (scene.wanted("domains") and not scene.wanted("contact")):
         for key in ("young", "poisson"):
-            problems.require(key in material, f"material.{key}", "a value", "none")
+            problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):
         expected = "a value, or young and poisson in [material]"
         given = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
-        problems.require(given, "contact.contact_modulus", expected, "none")
+        problems.require(given, "contact.contact_modulus", expected, NONE)
         expected = "exactly one of closure, normal_force, nominal_pressure"
         one_load = sum(key in contact for key in LOADS) == 1
-        problems.require(one_load, "contact", expected, sorted(contact) or "none")
+        problems.require(one_load, "contact", expected, sorted(contact) or NONE)
 
 
 def _check_numbers(table: Table, name: str, problems: Problems) -> None:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._inputs import (
     PRESSING,
@@ -66,45 +65,35 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     >>> fc.scenes.validate("rigid_sliding").name
     'rigid_sliding'
     """
+    with Problems("fractalcontact.scenes.validate") as problems:
+        expected = "a Scene or the path of a TOML file"
+        problems.require(isinstance(scene, (Scene, str, os.PathLike)), "scene", expected, scene)
     if isinstance(scene, Scene):
-        _validate(scene)
-        return scene
-    scene, problems = parse(scene)
-    if not problems:
-        _validate(scene)
-        return scene
-    try:
-        _validate(scene)
-    except InvalidInput as error:
-        problems += [line for line in error.problems if not _is_listed(line, problems)]
-    except Exception:  # invalid values may fail anywhere, in any way; their own problems are listed already
-        pass
-    raise InvalidInput(f"scene {scene.name}", problems)
-
-
-def _is_listed(line: str, problems: list[str]) -> bool:
-    """Return whether a problem of a surface or of the joint is already listed under its key in the scene."""
-    key, separator, _ = line.partition(": expected")
-    listed = (problem.partition(": expected")[0] for problem in problems)
-    return bool(separator) and any(other.endswith(key.rpartition(" ")[2]) for other in listed)
-
-
-def _validate(scene: Scene) -> None:
-    with Problems(f"scene {scene.name}") as problems:
+        problems = Problems(f"scene {scene.name}")
+    else:
+        scene, problems = parse(scene)
+    with problems:
         surfaces = _validate_surfaces(scene, problems)
-        joint_presses = bool(scene.want.domains) and not scene.want.contact
-        if not problems.messages and (scene.want.joints or joint_presses):
-            _validate_shears(scene, surfaces, problems)
+        if _is_valid(problems, "want", "material", "joint.block"):
+            _validate_crack(scene, surfaces, problems)
         if not problems.messages:
             _validate_calls(scene, surfaces, problems)
     warn(implausible_input(scene, surfaces["surface"]))
+    return scene
+
+
+def _is_valid(problems: Problems, *keys: str) -> bool:
+    """Return whether these keys of the scene, with their tables and sub-tables, passed the checks so far."""
+    pairs = [(f"{key}.", f"{failed}.") for key in keys for failed in problems.arguments]
+    return not any(key.startswith(failed) or failed.startswith(key) for key, failed in pairs)
 
 
 def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArray]:
-    """Return the surfaces of the scene; of an ensemble one."""
+    """Return the valid surfaces of the scene; of an ensemble one."""
     surfaces = {}
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
-        if table is not None and (name == "surface" or scene.want.joints):
+        is_read = name == "surface" or (_is_valid(problems, "want") and scene.want.joints)
+        if table is not None and is_read and _is_valid(problems, name):
             with problems.collect(f"{name}: "):
                 if table.generate is not None:
                     _validate_call(f"surfaces.{table.generate}", **generator_options(table))
@@ -126,13 +115,18 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
     return surfaces.from_array(np.zeros(shape), table.options["spacing"])
 
 
-def _validate_shears(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
+def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
     """Check the block and the shears, which must not push it off its face."""
     from fractalcontact import joints
 
+    joint_presses = bool(scene.want.domains) and not scene.want.contact
+    if not (scene.want.joints or joint_presses):
+        return
+    if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
+        return
     with problems.collect("joint: "):
         crack = joints.Crack(surfaces["surface"], surfaces.get("upper"), **crack_options(scene))
-        for stage in stages_of(scene):
+        for stage in stages_of(scene) if _is_valid(problems, "joint") else ():
             name = stage.name.partition("/")[2]
             if stage.name.startswith("joints/") and name in JOINT_STAGES:
                 given = scene.stage_options(stage.row, ("shear", "direction"))

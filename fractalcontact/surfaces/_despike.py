@@ -11,7 +11,7 @@ from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -27,7 +27,7 @@ def _check(problems: Problems, *, surface: Any, threshold: Any, window: Any) -> 
         largest = min(read_grid(surface).shape)
         infinite = int(np.count_nonzero(np.isinf(surface.values)))
         problems.require(infinite == 0, "surface", "no infinite heights", f"{infinite}")
-        problems.require(bool(np.isfinite(surface.values).any()), "surface", "heights", "none")
+        problems.require(bool(np.isfinite(surface.values).any()), "surface", "heights", NONE)
     if problems.integer("window", window, at_least=3, at_most=largest):
         problems.require(window % 2 == 1, "window", "an odd number of cells", window)
 

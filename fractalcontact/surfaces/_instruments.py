@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import file_suffix, open_bytes
 from fractalcontact.surfaces._units import UNITS, in_metres
 
@@ -184,10 +184,10 @@ def _check(
     name = f"channel {chosen.name!r}"
     problems.require(bool(chosen.is_uniform), name, "points on a uniform grid", "scattered points")
     if unit not in UNITS:
-        stated = "none" if unit is None else unit
+        stated = NONE if unit is None else unit
         problems.add(f"{name}, unit", 'a unit of length; give `units` ("m", "um" ...)', stated)
     if spacing is None and size is None:
-        problems.add(f"{name}, size", "a lateral size; give `spacing` in metres", "none")
+        problems.add(f"{name}, size", "a lateral size; give `spacing` in metres", NONE)
     elif spacing is None and lateral not in UNITS:
         problems.add(f"{name}, lateral unit", "a unit of length; give `spacing` in metres", lateral)
 

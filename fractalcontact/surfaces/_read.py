@@ -18,7 +18,7 @@ from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFil
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import EmptyTable, NotATable, file_suffix, read_npy, read_table
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
 from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
@@ -255,7 +255,7 @@ def _in_metres(array: xr.DataArray, units: str | None, spacing: Any, problems: P
     stated = array.attrs.get("units")
     unit = units or ("m" if stated in METRES else stated)
     expected = 'a unit of length, or give `units` ("m", "um" ...)'
-    if problems.require(unit in UNITS, f"{array.name}.units", expected, stated or "none"):
+    if problems.require(unit in UNITS, f"{array.name}.units", expected, stated or NONE):
         array = array.copy(data=in_metres(np.asarray(array.values, dtype=np.float64), str(unit)))
     array.attrs["units"] = "m"
     for dim in set(core) & set(array.coords):

@@ -14,7 +14,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
-from fractalcontact.base.validation import Problems, float_array, given_option
+from fractalcontact.base.validation import NONE, Problems, float_array, given_option
 from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
@@ -219,7 +219,7 @@ def _check_modes(problems: Problems, band: _Band, shape: Any, spacing: Any) -> N
     waves_y = waves[0][:, None] if len(sizes) == 2 else np.zeros((1, 1))
     has_modes = any(band.amplitude(row, waves[-1]).any() for row in waves_y)
     expected = "at least one mode of the grid between them"
-    problems.require(has_modes, "long_cutoff / short_cutoff", expected, "none")
+    problems.require(has_modes, "long_cutoff / short_cutoff", expected, NONE)
 
 
 def _multiply(heights: Array, factor: float) -> float:

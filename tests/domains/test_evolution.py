@@ -140,7 +140,7 @@ def test_only_what_is_wanted_is_measured():
     assert "box_count" not in result
     assert "births" not in result
     assert set(result.dims) == {"step", "box_size"}
-    with pytest.raises(ValueError, match="want: expected words out of"):
+    with pytest.raises(ValueError, match="want: expected any of"):
         fc.domains.evolution(as_mask(planes), want=["gaps"])
 
 

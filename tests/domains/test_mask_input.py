@@ -198,5 +198,5 @@ def test_reasons_of_nan_and_of_refusals():
     assert "two steps" in fc.domains.boundary_dimension(strip).boundary_dimension.comment
     single_size = fc.domains.box_dimension(as_mask(np.eye(30, dtype=bool)), scales=4).box_dimension
     assert single_size.comment == "NaN: one size of box gives no slope"
-    with pytest.raises(ValueError, match="keep: expected a sequence out of 'label'"):
+    with pytest.raises(ValueError, match="keep: expected a sequence of any of 'label'"):
         fc.domains.islands(strip, keep=None)

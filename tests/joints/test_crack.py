@@ -53,11 +53,23 @@ def test_contact_modulus_of_two_equal_bodies(make_face):
     assert crack.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
 
 
+def test_incompressible_material_is_allowed(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((4, 4))), young=3e6, poisson=0.5)
+    assert crack.contact_modulus == pytest.approx(3e6 / (2 * (1 - 0.25)), rel=1e-15)
+    with pytest.raises(ValueError, match=r"poisson: expected .* <= 0.5, got 0.51"):
+        fc.joints.Crack(make_face(np.zeros((4, 4))), young=3e6, poisson=0.51)
+
+
+def test_length_of_a_block_that_does_not_fit_is_reported_in_metres(make_face):
+    with pytest.raises(ValueError, match=r"block: expected .* got 1 m \(1000 cells\)"):
+        fc.joints.Crack(make_face(np.zeros((8, 8)), 1e-3), block=1, **MATERIAL)
+
+
 def test_all_problems_are_reported_together(make_face):
     face = make_face(np.zeros((8, 8)))
     with pytest.raises(fc.base.errors.InvalidInput) as caught:
         fc.joints.Crack(
-            face, make_face(np.zeros((7, 8))), young=-1, poisson=0.5, block=20.0, basic_friction_angle=95
+            face, make_face(np.zeros((7, 8))), young=-1, poisson=0.6, block=20.0, basic_friction_angle=95
         )
     text = str(caught.value)
     for word in ("young", "poisson", "block", "basic_friction_angle", "upper"):

@@ -118,12 +118,47 @@ def test_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, ne
     assert not (tmp_path / "out").exists()
 
 
+def test_incompressible_material_is_allowed(write):
+    assert fc.scenes.validate(write(SOUND.replace("poisson = 0.2", "poisson = 0.5"))).material.poisson == 0.5
+    with pytest.raises(InvalidInput, match=r"material.poisson: expected .* <= 0.5"):
+        fc.scenes.load(write(SOUND.replace("poisson = 0.2", "poisson = 0.51")))
+
+
+def test_problems_of_the_valid_tables_are_listed_with_those_of_the_file(write):
+    text = SOUND.replace("block = 2.4e-3", "block = 1.0\nblokk = 2")
+    with pytest.raises(InvalidInput) as caught:
+        fc.scenes.validate(write(text))
+    assert [problem.partition(": expected")[0] for problem in caught.value.problems] == [
+        "joint.blokk",
+        "joint: block",
+        "joint: block",
+    ]
+
+
+def test_problem_of_a_table_is_listed_once(write):
+    text = SOUND.replace("hurst = 0.8", "hurst = 1.8\nhirst = 1").replace("young = 30e9", "young = -1.0")
+    with pytest.raises(InvalidInput) as caught:
+        fc.scenes.validate(write(text))
+    listed = [problem.partition(": expected")[0] for problem in caught.value.problems]
+    assert listed == ["surface.hirst", "material.young"]
+
+
+@pytest.mark.parametrize("function", [fc.scenes.run, fc.scenes.validate])
+def test_scene_of_a_wrong_type_is_refused(function):
+    with pytest.raises(InvalidInput, match="scene: expected a Scene or the path of a TOML file"):
+        function({"surface": {"generate": "fbm"}})
+    with pytest.raises(InvalidInput, match="path: expected the path of a file"):
+        fc.scenes.load({"surface": {}})
+
+
 def test_unset_variable_and_missing_file_are_named(write, tmp_path):
     for name in ("${NO_SUCH_VARIABLE}/a.npy", "nothing.npy"):
         text = f"[surface]\nread = '{name}'\nspacing = 1e-4\n[want]\nsurfaces = ['describe']\n"
         done = command("run", write(text), "-o", tmp_path / "out")
         assert done.returncode == 2
         assert name.removeprefix("${").partition("}")[0] in done.stderr
+        if "$" in name:
+            assert "set the environment variable NO_SUCH_VARIABLE to the folder" in done.stderr
 
 
 def test_plan_is_printed_and_nothing_runs(write, tmp_path):
