@@ -102,6 +102,9 @@ CALLS = {
     "joints.friction": lambda: fc.joints.friction(slid()),
     "joints.register": lambda: fc.joints.register(rough(), rough() + 1e-5),
     "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(rough(), lag=4e-4),
+    "joints.strength_envelope": lambda: fc.joints.strength_envelope(
+        rough(), nominal_pressure=[1e5, 1e6], wall_strength=1e8, basic_friction_angle=30
+    ),
     "joints.transmissivity": lambda: fc.joints.transmissivity(gap()),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
     "domains.area_dimension": lambda: fc.domains.area_dimension(

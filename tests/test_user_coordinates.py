@@ -69,6 +69,9 @@ FUNCTIONS = {
     "cyclic_shear": lambda z: fc.joints.cyclic_shear(annotated(sheared(z)), [0.0, 1e-4, -1e-4]),
     "register": lambda z: fc.joints.register(z, z + 1e-5),
     "roughness_coefficient": fc.joints.roughness_coefficient,
+    "strength_envelope": lambda z: fc.joints.strength_envelope(
+        z, nominal_pressure=1e6, wall_strength=1e8, basic_friction_angle=30
+    ),
     "directional_roughness": fc.joints.directional_roughness,
     "transmissivity": lambda z: fc.joints.transmissivity(z - z.min()),
 }

@@ -57,6 +57,9 @@ CALLS = {
     "joints.friction": {"dilatancy": SHEARED},
     "joints.cyclic_shear": {"dilatancy": SHEARED, "path": [0.0, 1e-4, 0.0], "nominal_pressure": 1e6},
     "joints.roughness_coefficient": {"surface": SURFACE, "lag": 1e-4},
+    "joints.strength_envelope": {
+        "surface": SURFACE, "nominal_pressure": 1e6, "wall_strength": 1e8, "basic_friction_angle": 30,
+    },
     "joints.transmissivity": {"gap": SURFACE - SURFACE.min()},
     "joints.bandis_closure": {"nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4},
     "joints.bandis_constants": {"roughness": 10, "wall_strength": 1e8, "aperture": 1e-4},

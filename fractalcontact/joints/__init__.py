@@ -14,8 +14,9 @@ transmissivity        the flow through the open part of the joint
 register              two measured faces brought into mated position, before all others
 
 For comparison with practice: the `roughness_coefficient` (JRC) and the `directional_roughness` of a surface,
-the criteria `barton_choubey_strength`, `barton_bandis_scaled`, `bandis_constants`, `bandis_closure` and
-`PARK_PAULAY`, and the size effects `self_weight_strength` and `size_effect`.
+the `strength_envelope` by several criteria, the criteria `barton_choubey_strength`, `barton_bandis_scaled`,
+`bandis_constants`, `bandis_closure` and `PARK_PAULAY`, and the size effects `self_weight_strength` and
+`size_effect`.
 
 Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is +x and N is +y.
 """

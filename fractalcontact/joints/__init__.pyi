@@ -17,6 +17,7 @@ from ._strength_criteria import barton_bandis_scaled as barton_bandis_scaled
 from ._strength_criteria import barton_choubey_strength as barton_choubey_strength
 from ._strength_criteria import self_weight_strength as self_weight_strength
 from ._strength_criteria import size_effect as size_effect
+from ._strength_envelope import strength_envelope as strength_envelope
 from ._transmissivity import transmissivity as transmissivity
 
 __all__ = [
@@ -39,5 +40,6 @@ __all__ = [
     "roughness_coefficient",
     "self_weight_strength",
     "size_effect",
+    "strength_envelope",
     "transmissivity",
 ]

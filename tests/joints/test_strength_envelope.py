@@ -1,0 +1,131 @@
+"""Strength envelopes at worked values and limits."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+S = 0.508e-3
+MPA = 1e6
+
+
+@pytest.fixture(scope="module")
+def surface(make_face):
+    """Readings of JRC = 10 after Tse and Cruden."""
+    slope = 10 ** ((10 - 32.2) / 32.47)
+    return make_face(slope * S * (np.arange(1000) % 2) * np.ones((4, 1)), S)
+
+
+def strength(surface, criterion, pressure, **options):
+    options = {"wall_strength": 100 * MPA, "basic_friction_angle": 30} | options
+    result = fc.joints.strength_envelope(
+        surface, nominal_pressure=np.multiply(pressure, MPA), criterion=criterion, **options
+    )
+    return result.shear_strength.values[0] / MPA, result.in_range.values[0]
+
+
+def test_patton_is_bilinear(surface):
+    # the lines meet at 20/(tan 50 - tan 30) = 32.552 MPa
+    found, _ = strength(surface, "patton", [30, 32.552, 40], asperity_angle=20, cohesion=20 * MPA)
+    np.testing.assert_allclose(found, [35.7526, 38.794, 43.0940], rtol=1e-4)
+
+
+def test_ladanyi_archambault_by_hand(surface):
+    # at 10 MPa: a = 1 - 0.9^1.5 = 0.146185, v = 0.9^4 tan 20 = 0.238802, s_r = 100 (sqrt 11 - 1)/10 sqrt 2
+    # = 32.7620: (10 * 0.853815 * 0.816152 + 0.146185 * 32.7620)/(1 - 0.853815 * 0.238802 * 0.577350)
+    found, inside = strength(surface, "ladanyi_archambault", [10], asperity_angle=20)
+    np.testing.assert_allclose(found, [13.3265], rtol=1e-4)
+    assert inside.all()
+
+
+def test_limits_of_ladanyi_archambault(surface):
+    found, inside = strength(surface, "ladanyi_archambault", [1e-6, 100, 200], asperity_angle=20)
+    # as the stress vanishes a = 1.5 sigma/JCS: the sheared share adds 1.5 * 0.2316625/(1 - tan 20 tan 30) =
+    # 0.439943 to tan 50 = 1.191754; all asperities are sheared off at the wall strength
+    assert found[0] / 1e-6 == pytest.approx(1.631697, rel=1e-5)
+    assert found[1] == pytest.approx(100 * (np.sqrt(11) - 1) / 10 * np.sqrt(11), rel=1e-12)
+    assert inside.tolist() == [True, True, False]
+    # a ratio of compressive to tensile strength of 5: (sqrt 6 - 1)/5 = 0.289898 instead of 0.2316625
+    tough, _ = strength(surface, "ladanyi_archambault", [1e-6], asperity_angle=20, tensile_strength=20 * MPA)
+    assert tough[0] / 1e-6 == pytest.approx(1.742289, rel=1e-5)
+
+
+def test_barton_choubey_and_its_limit_of_70_degrees(surface):
+    # JRC 10, JCS 100, phi_r 28: tan 48 at 1 MPa; 70 degrees at 100 * 10^-4.2 = 0.00631 MPa
+    found, inside = strength(
+        surface, "barton_choubey", [1, 10, 0.006, 0.001, 200], residual_friction_angle=28
+    )
+    expected = np.array([1.11061, 10 * np.tan(np.radians(38)), 0.0164849, 0.00274748, 106.342])
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+    assert inside.tolist() == [True, True, False, False, False]
+
+
+def test_barton_bandis_takes_the_length(surface):
+    # JRC = 10 * 10^-0.2 = 6.310 and JCS = 100 * 10^-0.3 = 50.12 MPa: 28 + 6.310 * 1.7 = 38.73 degrees
+    found, _ = strength(surface, "barton_bandis", [1.0], residual_friction_angle=28, length=1.0)
+    np.testing.assert_allclose(found, [0.80185], rtol=1e-3)
+    short, _ = strength(surface, "barton_bandis", [1.0], residual_friction_angle=28, length=0.1)
+    plain, _ = strength(surface, "barton_choubey", [1.0], residual_friction_angle=28)
+    assert short == pytest.approx(plain, rel=1e-12)
+
+
+def test_default_criteria_are_those_with_their_arguments(surface):
+    options = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30}
+    assert fc.joints.strength_envelope(surface, **options).criterion.values.tolist() == [
+        "ladanyi_archambault",
+        "barton_choubey",
+    ]
+    result = fc.joints.strength_envelope(surface, **options, cohesion=MPA, length=1.0)
+    assert result.sizes == {"criterion": 4, "nominal_pressure": 1}
+    assert (result.shear_strength > MPA * np.tan(np.radians(30))).all()
+    tangent = np.tan(np.radians(result.friction_angle)) * result.nominal_pressure
+    np.testing.assert_allclose(tangent, result.shear_strength)
+    assert all(len(text) > 10 for text in result.assumption.values)
+
+
+def test_asperity_angle_is_the_mean_dip_towards_the_shear(make_face):
+    x = np.arange(401) % 20
+    teeth = make_face(np.minimum(x, (20 - x) / 3) * 1e-3 * np.ones((5, 1)), 1e-3)
+    options = {"nominal_pressure": 1.0, "wall_strength": 1e12, "basic_friction_angle": 20}
+    options |= {"criterion": "patton", "cohesion": 1e9}  # no asperity is sheared off
+    for direction, angle in (("E", 45.0), ("W", 18.43)):
+        result = fc.joints.strength_envelope(teeth, direction=direction, **options)
+        assert result.asperity_angle.item() == pytest.approx(angle, abs=0.05)
+        assert result.friction_angle[0].item() == pytest.approx(20 + angle, abs=0.05)
+    with pytest.raises(ValueError, match="less than 90 degrees"):
+        fc.joints.strength_envelope(teeth, **options | {"basic_friction_angle": 50})
+
+
+def test_roughness_beyond_the_scale_is_out_of_range(make_face, rough):
+    steep = make_face(2e-3 * rough((64, 64), 3), 1e-4)
+    result = fc.joints.strength_envelope(
+        steep, nominal_pressure=5e6, wall_strength=1e8, basic_friction_angle=20, asperity_angle=30
+    )
+    assert result.roughness_coefficient > 20
+    assert "standard profiles" in result.roughness_coefficient.attrs["comment"]
+    assert not result.in_range.sel(criterion="barton_choubey").any()
+    assert "in_range" in result.shear_strength.attrs["comment"]
+
+
+def test_a_plane_has_the_basic_strength(make_face):
+    plane = make_face(np.zeros((30, 30)), S)
+    found, inside = strength(plane, ["barton_choubey"], [1.0, 5.0])
+    np.testing.assert_allclose(found, np.tan(np.radians(30)) * np.array([1.0, 5.0]))
+    assert not inside.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"criterion": "patton"}, "cohesion: expected a value, for criterion 'patton'"),
+        ({"criterion": "barton_bandis"}, "length: expected a value"),
+        ({"criterion": "barton_chubey"}, "did you mean 'barton_choubey'"),
+        ({"criterion": []}, "at least one"),
+        ({"nominal_pressure": 0.0}, "nominal_pressure: expected .*>= 1e-30"),
+        ({"direction": "up"}, "direction"),
+    ],
+)
+def test_wrong_arguments_are_named(surface, options, message):
+    given = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30} | options
+    with pytest.raises(ValueError, match=message):
+        fc.joints.strength_envelope(surface, **given)
