@@ -107,7 +107,7 @@ class ContactSystem:
         body = problem.body
         operator = body.operator(dtype)
         # a periodic body shares its wavenumbers, and with them the array of the modes
-        preconditioner = ExtensionPreconditioner(body, dtype, getattr(operator, "wavenumbers", None))
+        preconditioner = ExtensionPreconditioner(body, dtype, getattr(operator, "multiplier", None))
         scale = problem.local_compliance if local_compliance is None else local_compliance
         return cls(problem.gap, problem.p_max, operator, preconditioner, scale, dtype)
 

@@ -27,6 +27,8 @@ from fractalcontact.contact._scaled_problem import Control, Problem, Solution
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_NODES = 8192  # of the dense system: half a gigabyte
+# of one step: each round removes a node at least, and a dozen are usual; a step that takes more is reported
+# as "iteration_limit"
 MAX_ROUNDS = 1000
 
 
@@ -35,10 +37,6 @@ class Elimination:
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self.problem, self.tolerance, self.matrix = problem, tolerance, InfluenceMatrix(problem)
-
-    def lower_surface(self, gap: Array) -> None:
-        """Refuse a surface that has yielded: the method has no hardness."""
-        raise NotImplementedError("elimination has no hardness")
 
     def solve(self, control: Control) -> Solution:
         """Solve one step of a path."""
@@ -53,7 +51,7 @@ class Elimination:
         gap = matrix.gap + displacement - balance.closure
         shape = self.problem.body.shape
         error = residual(pressure, displacement, gap, self.problem.body.spacing)
-        reason = "rounding" if balance.rounds <= MAX_ROUNDS else "iteration_limit"
+        reason = "converged" if error <= self.tolerance else "rounding"
         return Solution(
             pressure=pressure.reshape(shape),
             displacement=displacement.reshape(shape),
@@ -61,7 +59,7 @@ class Elimination:
             force=float(balance.pressure.sum()),
             iterations=balance.rounds,
             residual=error,
-            reason="converged" if error <= self.tolerance else reason,
+            reason=reason if balance.rounds <= MAX_ROUNDS else "iteration_limit",
             work=float(np.sum(pressure * displacement)),
         )
 
@@ -114,7 +112,7 @@ def eliminate_at_closure(influence: InfluenceMatrix, nodes: Array, closure: floa
         right = np.stack([closure - influence.gap[nodes], np.ones(nodes.size)], axis=1)
         solution = solve_dense(influence.between(nodes, nodes), right, assume_a="pos", check_finite=False)
         pressure = solution[:, 0]
-        if pressure.min() >= 0:
+        if pressure.min() >= 0 or rounds > MAX_ROUNDS:
             break
         nodes = nodes[pressure > 0]
     return Balance(nodes, pressure, closure, 1.0 / float(solution[:, 1].sum()), rounds)
@@ -133,13 +131,15 @@ def eliminate_at_force(influence: InfluenceMatrix, nodes: Array, force: float) -
         right[:n, 0], right[n] = -influence.gap[nodes], (force, 1.0)
         solution = solve_dense(matrix, right, check_finite=False)
         pressure = solution[:n, 0]
-        if pressure.min() >= 0:
+        if pressure.min() >= 0 or rounds > MAX_ROUNDS:
             break
         nodes = nodes[pressure > 0]
     return Balance(nodes, pressure, float(solution[n, 0]), float(solution[n, 1]), rounds)
 
 
-def verified(influence: InfluenceMatrix, nodes: Array, eliminate: Callable[[Array], Balance]) -> Balance:
+def eliminate_and_restore(
+    influence: InfluenceMatrix, nodes: Array, eliminate: Callable[[Array], Balance]
+) -> Balance:
     """Eliminate from `nodes`, take back what overlaps by more than rounding, until nothing does."""
     rounds = 0
     while True:
@@ -162,7 +162,7 @@ def solve_force(influence: InfluenceMatrix, force: float) -> Balance:
     while True:
         check_size(trial)
         nodes = np.sort(order[:trial])
-        balance = verified(influence, nodes, partial(eliminate_at_force, influence, force=force))
+        balance = eliminate_and_restore(influence, nodes, partial(eliminate_at_force, influence, force=force))
         if trial == influence.gap.size or balance.closure <= influence.gap[order[trial]]:
             return balance
         trial = min(4 * trial, influence.gap.size)
@@ -173,12 +173,14 @@ def solve_closure(influence: InfluenceMatrix, closure: float) -> Balance:
     if not influence.periodic:
         nodes = np.flatnonzero(influence.gap < closure)
         check_size(nodes.size)
-        return verified(influence, nodes, partial(eliminate_at_closure, influence, closure=closure))
+        return eliminate_and_restore(
+            influence, nodes, partial(eliminate_at_closure, influence, closure=closure)
+        )
     check_size(influence.gap.size)
     force = 0.5 * closure / float(influence.table[0, 0])
     nodes, rounds, last = np.arange(influence.gap.size), 0, np.inf
     while True:
-        balance = verified(influence, nodes, partial(eliminate_at_force, influence, force=force))
+        balance = eliminate_and_restore(influence, nodes, partial(eliminate_at_force, influence, force=force))
         rounds += balance.rounds
         same_set, miss = np.array_equal(nodes, balance.nodes), closure - balance.closure
         rounded = abs(miss) <= 1e-15 * closure or (same_set and abs(miss) >= 0.5 * last)
@@ -189,7 +191,11 @@ def solve_closure(influence: InfluenceMatrix, closure: float) -> Balance:
 
 
 def check_size(nodes: int) -> None:
-    """Refuse a dense system that would not fit."""
+    """Refuse a dense system that would not fit.
+
+    `press` cannot check this beforehand: under an imposed force the number of nodes that may touch is known
+    only once the closure is.
+    """
     if nodes > MAX_NODES:
         expected = f"'fast' for more than {MAX_NODES} nodes that may touch"
         raise InvalidInput(
@@ -198,7 +204,11 @@ def check_size(nodes: int) -> None:
 
 
 def residual(pressure: Array, displacement: Array, gap: Array, spacing: tuple[float, float]) -> float:
-    """Return the scale-free residual of a pressure, as the solver of the fast method defines it."""
+    """Return the scale-free residual of a pressure.
+
+    It is step (2) of `_constrained_cg`, written a second time on purpose: a check of the fast method must
+    not share its code.
+    """
     force = float(pressure.sum())
     overlap = max(0.0, -float(np.min(gap, initial=0.0)))
     if force <= 0:

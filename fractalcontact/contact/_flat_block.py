@@ -7,7 +7,7 @@ closure of every surface of that extent needs it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -83,17 +83,17 @@ def flat_stiffness(
     """
     with Problems("fractalcontact.contact.flat_stiffness") as problems:
         problems.number("contact_modulus", contact_modulus, above=0)
-        known_boundary = problems.choice("boundary", boundary, BOUNDARIES)
+        has_boundary = problems.choice("boundary", boundary, BOUNDARIES)
         problems.choice("loading", loading, ("rigid", "uniform"))
         has_shape = problems.require(_has_two_entries(shape), "shape", "(ny, nx)", shape)
         has_shape = has_shape and all(problems.integer("shape", n, at_least=3) for n in shape)
         has_spacing = problems.numbers("spacing", spacing, above=0, at_most=1e100) and problems.require(
             float_array(spacing).size in (1, 2), "spacing", "one length or (dy, dx)", spacing
         )
-        word = boundary if known_boundary else None
-        options = problems.construct(ContactOptions, word, influence, disc_radius)
-        if known_boundary and has_shape and has_spacing and options is not None:
-            options.check_grid(_grid(shape, spacing, boundary), problems)
+        # without the boundary, which is checked above: here it may not be None
+        options = problems.construct(ContactOptions, influence=influence, disc_radius=disc_radius)
+        if has_boundary and has_shape and has_spacing and options is not None:
+            replace(options, boundary=boundary).check_grid(_grid(shape, spacing, boundary), problems)
     options, grid = ContactOptions(boundary, influence, disc_radius), _grid(shape, spacing, boundary)
     cells, pair = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
     body = scaled_body(cells, pair, boundary == "periodic", options.influence_on(grid), options.disc_radius)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -195,8 +195,8 @@ def solve_path(path: ScaledPath) -> Iterator[Step]:
         if step.new_indentation is not None:
             history = step.history_after
             problem = replace(problem, gap=path.gap + history.indentation - history.first_touch)
-            if solver is not None:
-                solver.lower_surface(problem.gap)
+            if solver is not None:  # only the fast method has a hardness, see `ContactOptions`
+                cast("WindowSolver", solver).lower_surface(problem.gap)
 
 
 def scaled_control(path: ScaledPath, value: float, first_touch: float) -> Control:
@@ -247,7 +247,9 @@ def flat_contact(problem: Problem, control: Control) -> Solution | None:
     block = flat_block(problem.body)
     stiffness = 1.0 / block.compliance if block.compliance > 0 else np.inf
     force = control.closure * stiffness if control.closure is not None else control.value
-    if problem.body.periodic:  # uniform pressure; any closure makes it yield, any force closes it by nothing
+    if problem.body.periodic:
+        # a periodic flat body has no compliance: a positive closure loads it to p_max, a force leaves the
+        # closure at 0
         pressure = np.full(problem.body.shape, min(force / problem.gap.size, problem.p_max))
         force = float(pressure[0, 0]) * problem.gap.size
         return Solution(pressure, block.displacement, control.closure or 0.0, force)

@@ -2,8 +2,9 @@
 
 Most iterations of a cold start on the fine grid would be spent on finding out which part of the surface
 touches at all. On a grid of half the points along each axis that is four times cheaper, and so on down. The
-solution of each grid is the start on the next finer one (nested iteration of the multigrid literature; for
-contact the cascade of Bemporad and Paggi 2015, Int. J. Solids Struct. 69:184).
+solution of each grid is the start on the next finer one: nested iteration in the multigrid literature, and
+for contact the cascade multi-resolution of Bemporad and Paggi (2015), "Optimization algorithms for the
+solution of the frictionless normal contact between rough surfaces", Int. J. Solids Struct. 69-70:94-105.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def cold_start(problem: Problem, control: Control, dtype: Any) -> tuple[Array, f
         if control.closure is None:
             return np.ones(problem.body.shape, dtype=dtype), float(problem.gap.max())
         return np.maximum(control.closure - problem.gap, 0.0).astype(dtype), control.closure
-    coarse = coarsened(problem, factors)
+    coarse = coarsen(problem, factors)
     share = coarse.gap.size / problem.gap.size
     coarse_control = Control(None if control.force is None else control.force * share, control.closure)
     start = cold_start(coarse, coarse_control, dtype)[0]
@@ -42,7 +43,7 @@ def cold_start(problem: Problem, control: Control, dtype: Any) -> tuple[Array, f
     return finer, solution.closure
 
 
-def coarsened(problem: Problem, factors: tuple[int, ...]) -> Problem:
+def coarsen(problem: Problem, factors: tuple[int, ...]) -> Problem:
     """Return the problem of the mean gap over cells of `factors` nodes; the extent stays what it is."""
     body = problem.body
     shape = (-(-body.shape[0] // factors[0]), -(-body.shape[1] // factors[1]))

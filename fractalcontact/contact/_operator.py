@@ -21,7 +21,7 @@ class Operator(Protocol):
     transforms: int
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement under `pressure`, both (ny, nx); it may be written into `out`."""
+        """Return the displacement under `pressure`, both (ny, nx); an operator may write it into `out`."""
         ...
 
 
@@ -29,13 +29,13 @@ class PeriodicOperator:
     """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        self.wavenumbers = Wavenumbers(shape, spacing)
+        self.multiplier = WavenumberMultiplier(shape, spacing)
         self.transforms = 0
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, without its mean."""
         self.transforms += 1
-        return self.wavenumbers.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
+        return self.multiplier.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
 
 
 class FreeOperator:
@@ -48,6 +48,7 @@ class FreeOperator:
         self.modes: Array | None = None
         self.transforms = 0
 
+    # `out` is of no use: the displacement is cropped from the padded plane, which is held anyway
     def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Return the displacement under `pressure`."""
         from fractalcontact.contact._kernels import multiply_modes
@@ -71,6 +72,7 @@ class PairSum:
         self.all_nodes = np.arange(iy.size)
         self.transforms = 0
 
+    # `out` is of no use: these arrays are small
     def apply(self, value: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Return the sum over all nodes of table[offset] times value, for every node."""
         return self.sum_at(value, self.all_nodes)
@@ -87,7 +89,7 @@ class PairSum:
         return out.reshape(value.shape)
 
 
-class Wavenumbers:
+class WavenumberMultiplier:
     """Multiplies the modes of a plane by |q| or 1/|q|, without a table of |q| (another array)."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:

@@ -18,10 +18,13 @@ Array = np.ndarray[Any, np.dtype[Any]]
 BOUNDARIES = ("free", "periodic")
 INFLUENCES = ("disc", "square", "spectral")
 METHODS = ("fast", "elimination")
-CONTROLS = ("closure", "normal_force", "nominal_pressure")
+CONTROL_UNITS = {"closure": "m", "normal_force": "N", "nominal_pressure": "Pa"}
+CONTROLS = tuple(CONTROL_UNITS)
 SMALLEST_RADIUS = 1e-9  # of the spacing: a smaller plate is a point force, which has no stiffness
-REACH = 2.0**300  # of forces and closures over their scales, so that no product leaves the range of a double
-UNIT_RANGE = (2.0**-900, 2.0**900)
+# largest force, closure or hardness over its scale (its inverse is the smallest): products of three such
+# numbers must stay below 1e308
+LARGEST_RATIO = 2.0**300
+SCALE_RANGE = (2.0**-900, 2.0**900)  # of the scales in SI units: doubles end near 2**-1022 and 2**1024
 FORCE_ROUNDING = 1e-12  # relative rounding allowed in a force of exactly hardness times area
 
 
@@ -137,9 +140,8 @@ class ContactOptions:
         problems.require(
             least > 0,
             "disc_radius",
-            "plates small enough for a positive operator (or influence='square')",
-            f"radius {plate.radius * length_unit(spacing):.4g} m, with a symbol down to {least:.3g}"
-            " of that of the half-space",
+            "a smaller radius (plates this large make the elastic operator indefinite) or influence='square'",
+            f"{plate.radius * length_unit(spacing):.4g} m",
         )
 
     def check_load(self, load: LoadPath, nominal_area: float, problems: Problems) -> bool:
@@ -153,7 +155,7 @@ class ContactOptions:
             capacity = self.hardness * nominal_area
             expected = f"a force of at most hardness times area, {capacity:.6g} N"
         borne = largest <= capacity * (1 + FORCE_ROUNDING)
-        return problems.require(borne, load.control, expected, largest)
+        return problems.require(borne, load.control, expected, f"{largest:.6g} {CONTROL_UNITS[load.control]}")
 
 
 @dataclass(frozen=True)
@@ -216,24 +218,31 @@ def check_scale(
     control, values = load.solver_values(grid.nominal_area)
     spacing = (grid.spacing[0], grid.spacing[1])
     units = make_units(spacing, height_range, contact_modulus, control, float(values.max()))
-    sizes = (units.length, units.height, units.modulus, units.pressure, units.force, units.energy)
-    if not problems.require(
-        all(UNIT_RANGE[0] < size < UNIT_RANGE[1] for size in sizes),
-        "surface / contact_modulus",
-        "spacing, heights and modulus whose products a double can hold",
-        f"scales {sizes}",
-    ):
-        return False
+    scales = {
+        "spacing": (units.length, "m"),
+        "range of heights": (units.height, "m"),
+        "modulus": (units.modulus, "Pa"),
+        "modulus * heights / spacing": (units.pressure, "Pa"),
+        "modulus * heights * spacing": (units.force, "N"),
+        "modulus * heights^2 * spacing": (units.energy, "J"),
+    }
     before = len(problems.messages)
+    for product, (scale, unit_name) in scales.items():
+        if not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
+            expected = "spacing, heights and modulus whose products a double can hold"
+            problems.add("surface / contact_modulus", expected, f"{product} = {scale:.3g} {unit_name}")
+            return False
     if hardness is not None:
-        low, high = units.pressure / REACH, units.pressure * REACH
-        expected = f"None or between {low:.3g} and {high:.3g} for this surface"
-        problems.require(low < hardness < high, "hardness", expected, hardness)
+        low, high = units.pressure / LARGEST_RATIO, units.pressure * LARGEST_RATIO
+        expected = f"None or between {low:.3g} and {high:.3g} Pa for this surface"
+        problems.require(low < hardness < high, "hardness", expected, f"{hardness:g} Pa")
     unit = units.height if control == "closure" else units.force
     scale = unit / (grid.nominal_area if load.control == "nominal_pressure" else 1.0)
-    expected = f"0 or between {scale / REACH:.3g} and {scale * REACH:.3g} for this surface and modulus"
+    low, high, unit_name = scale / LARGEST_RATIO, scale * LARGEST_RATIO, CONTROL_UNITS[load.control]
+    expected = f"0 or between {low:.3g} and {high:.3g} {unit_name} for this surface and modulus"
     for given, value in zip(load.values, values, strict=True):
-        problems.require(value == 0 or unit / REACH < value < unit * REACH, load.control, expected, given)
+        in_range = value == 0 or unit / LARGEST_RATIO < value < unit * LARGEST_RATIO
+        problems.require(in_range, load.control, expected, f"{given:g} {unit_name}")
     return len(problems.messages) == before
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
-from fractalcontact.contact._operator import PairSum, Wavenumbers
+from fractalcontact.contact._operator import PairSum, WavenumberMultiplier
 from fractalcontact.contact._scaled_problem import Body
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -64,13 +64,13 @@ class ExtensionPreconditioner:
     solver fills them in the pass that selects the free set.
     """
 
-    def __init__(self, body: Body, dtype: Any, wavenumbers: Wavenumbers | None = None) -> None:
+    def __init__(self, body: Body, dtype: Any, wavenumbers: WavenumberMultiplier | None = None) -> None:
         self.rows, self.columns = (bin_edge(body, axis) for axis in (0, 1))
         self.plane = body.shape
         if not body.periodic:
             self.plane = (padded_plane(body.shape[0], self.rows), padded_plane(body.shape[1], self.columns))
         self.bins = (-(-self.plane[0] // self.rows), -(-self.plane[1] // self.columns))
-        self.wavenumbers = wavenumbers or Wavenumbers(self.plane, body.spacing)
+        self.wavenumbers = wavenumbers or WavenumberMultiplier(self.plane, body.spacing)
         edge = (self.rows * body.spacing[0], self.columns * body.spacing[1])
         q = np.hypot(
             fft.wavenumbers(self.bins[0], edge[0])[:, None],
@@ -169,7 +169,7 @@ def stiffness_table(body: Body) -> Array:
     impulse = np.zeros(plane)
     impulse[0, 0] = 1.0
     extent = float(np.sqrt(ny * body.spacing[0] * nx * body.spacing[1]))
-    waves = Wavenumbers(plane, body.spacing)
+    waves = WavenumberMultiplier(plane, body.spacing)
     return np.ascontiguousarray(waves.apply(impulse, 0.5, invert=False, mean=1.0 / extent)[:ny, :nx])
 
 

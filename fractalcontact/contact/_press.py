@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,8 +81,9 @@ def press(
     """Press a rigid flat down on a rough elastic surface, without friction or adhesion.
 
     At every node gap >= 0 and pressure >= 0, and one of them is zero, with
-    gap = (top - height) + displacement - closure. Heights count up, closure and displacement down; pressure
-    is positive in compression. Theory, error control and measured accuracy: page `theory_contact`.
+    gap = (top - height) + displacement - closure and top the greatest height. Heights count up, closure and
+    displacement down; pressure is positive in compression. Theory, error control and measured accuracy: page
+    `theory_contact`.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def press(
         Bound on `residual`, the scale-free optimality error.
     method : {"fast", "elimination"}
         Constrained conjugate gradients, or the dense active set of the 1998 paper for small surfaces.
-    keep : sequence out of "state", "pressure", "gap", "displacement", "residual_height"
+    keep : any of "state", "pressure", "gap", "displacement", "residual_height"
         Maps (step, y, x) to return: flags open, contact, yielded; Pa; m; m; heights after unloading (m).
     progress : bool
         Show a progress bar over the steps.
@@ -131,9 +132,10 @@ def press(
 
     References
     ----------
-    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3; Polonsky and Keer (1999), Wear 231:206;
-    Stanley and Kato (1997), J. Tribol. 119:481; Bugnicourt et al. (2018), Tribol. Lett. 66:29; Yastrebov,
-    Anciaux and Molinari (2017), Tribol. Int. 114:161 (perimeter correction).
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3 ("elimination"); Polonsky and Keer (1999), Wear
+    231:206 ("fast"); Stanley and Kato (1997), J. Tribol. 119:481 (2/(E* |q|) of periodic bodies); Love
+    (1929), Phil. Trans. A 228:377 ("square"); Yastrebov, Anciaux and Molinari (2017), Tribol. Int. 114:161
+    (perimeter correction of the contact fraction).
 
     Examples
     --------
@@ -161,10 +163,12 @@ def press(
     for step in track(solve_path(path), progress, "press", total=len(path.values)):
         scalars.append(_scalars(step, grid, path.body.periodic))
         for name in names:
-            maps[name].append(_map(step, name, heights))
+            maps[name].append(np.asarray(MAPS[name](step, heights)))
     result = _dataset(surface, grid, path, scalars, maps)
     _add_reasons(result)
     _warn(result)
+    # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
+    # the result has none, and here each step has its own
     result.attrs = {
         "boundary": "periodic" if path.body.periodic else "free",
         "influence": path.body.influence,
@@ -173,20 +177,21 @@ def press(
     return result
 
 
-def _map(step: Step, name: str, heights: Array) -> Array:
-    """Return one map of a step."""
-    if name == "state":
-        return _state(step)
-    if name == "residual_height":
-        return np.asarray(heights - step.indentation)
-    return np.asarray(getattr(step, name))
-
-
 def _state(step: Step) -> Array:
     """Return the flags open, contact, yielded."""
     state = np.where(step.contact, np.int8(CONTACT), np.int8(OPEN))
     state[step.contact & step.yielded] = YIELDED
     return state
+
+
+# each map of a step, from the step and the heights of the surface
+MAPS: dict[str, Callable[[Step, Array], Array]] = {
+    "state": lambda step, _: _state(step),
+    "pressure": lambda step, _: step.pressure,
+    "gap": lambda step, _: step.gap,
+    "displacement": lambda step, _: step.displacement,
+    "residual_height": lambda step, heights: heights - step.indentation,
+}
 
 
 def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:

@@ -138,10 +138,10 @@ def test_failing_preconditioner_is_dropped(monkeypatch, fault, boundary):
     surface = rough(48)
     options = {"nominal_pressure": 1e6, "boundary": boundary, "tolerance": 1e-9}
     sound = press(surface, **options)
-    honest, rng = ExtensionPreconditioner.apply, np.random.default_rng(0)
+    original, rng = ExtensionPreconditioner.apply, np.random.default_rng(0)
 
     def faulty(self, x):
-        plane, extra = honest(self, x)
+        plane, extra = original(self, x)
         return (-plane, -extra) if fault == "sign" else (rng.normal(size=plane.shape), extra)
 
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)

@@ -129,11 +129,11 @@ def test_memory_below_eight_arrays():
 @pytest.fixture
 def grids(monkeypatch):
     """Return the shapes of the grids that are solved on, in turn."""
-    seen, honest = [], ConstrainedCG.solve
+    seen, original = [], ConstrainedCG.solve
 
     def solve(self, *arguments, **options):
         seen.append(self.h.shape)
-        return honest(self, *arguments, **options)
+        return original(self, *arguments, **options)
 
     monkeypatch.setattr(ConstrainedCG, "solve", solve)
     return seen

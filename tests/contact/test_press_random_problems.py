@@ -103,10 +103,10 @@ def test_elimination_matches_fast_on_random_problems(seed):
     np.testing.assert_allclose(paper["normal_force"][sure], fast["normal_force"][sure], rtol=1e-10)
     for step in np.flatnonzero(sure):
         one, other = fast.isel(step=step), paper.isel(step=step)
-        doubtful = (one["pressure"] <= 1e-10 * one["pressure"].max()) & (
+        at_rounding = (one["pressure"] <= 1e-10 * one["pressure"].max()) & (
             one["gap"] <= 1e-10 * max(float(one["gap"].max()), float(one["closure"]))
         )
-        np.testing.assert_array_equal(one["state"].where(~doubtful), other["state"].where(~doubtful))
+        np.testing.assert_array_equal(one["state"].where(~at_rounding), other["state"].where(~at_rounding))
 
 
 @pytest.mark.parametrize("seed", range(400, 416))
