@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import ndimage
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -68,6 +67,8 @@ def cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
 
 
 def _median_cells(mask: Array) -> float:
+    from scipy import ndimage  # only for this caveat: other summaries need no scipy
+
     labels, count = ndimage.label(mask)
     return float(np.median(np.bincount(labels.ravel())[1:])) if count else float("nan")
 

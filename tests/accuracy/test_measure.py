@@ -77,7 +77,7 @@ MEASURES = {
         "closure": "closure of the interface",
     },
 }
-UNMEASURED = {"box_counts", "describe", "evolution", "lineage"}  # of domains
+UNMEASURED = {"box_counts", "describe", "evolution", "lineage", "read_mask"}  # of domains
 
 
 def test_every_measure_of_a_domain_and_every_flow_has_a_method():

@@ -76,16 +76,16 @@ FFT = "fft"  # stands for the library that does the transforms
 ALWAYS = ("lazy_loader", "numpy", "xarray", "netCDF4", "tabulate")
 WITH_KERNELS = ("numba", "scipy.linalg")
 
-# group of kernels: subpackage, and how many of them a study compiles at most
+# group of kernels: subpackage, and how many of them a study compiles at most, from an empty cache
 KERNELS = {
     "contact solver": ("contact", 12),
     "increment sums": ("dimensions", 1),
     "minimum cover": ("domains", 1),
     "mean cover": ("domains", 1),
     "distances": ("domains", 2),
-    "boundary": ("domains", 1),
+    "boundary": ("domains", 2),
     "gliding boxes": ("domains", 1),
-    "islands": ("domains", 2),
+    "islands": ("domains", 3),
 }
 OF_MASKS = tuple(name for name, (subpackage, _) in KERNELS.items() if subpackage == "domains")
 

@@ -117,7 +117,7 @@ def test_no_word_loads_or_compiles_more_than_required(tmp_path):
             *(f"{name}: no kernel" for name in limits if name not in subpackages),
         ]
         if problems:
-            wrong[word] = problems
+            wrong[word] = (problems, report)
     assert wrong == {}
 
 
