@@ -20,6 +20,7 @@ from ._lacunarity import lacunarity as lacunarity
 from ._paper import paper_figure as paper_figure
 from ._partial_slip import slip_domains as slip_domains
 from ._shear_scheme import sliding_scheme as sliding_scheme
+from ._strength_envelope import strength_envelope as strength_envelope
 from ._surface import field as field
 from ._surface import surface as surface
 from ._transmissivity import hydraulic_aperture as hydraulic_aperture
@@ -49,5 +50,6 @@ __all__ = [
     "rigid_dilatancy",
     "sliding_scheme",
     "slip_domains",
+    "strength_envelope",
     "surface",
 ]

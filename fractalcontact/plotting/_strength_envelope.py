@@ -1,0 +1,76 @@
+"""Shear strength against the normal stress by several criteria."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import result_of, words
+from fractalcontact.plotting._units import axis_label, scale_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is out of its range
+
+
+@_style.styled
+def strength_envelope(result: Any, *, ax: Axes | None = None) -> Figure:
+    r"""Draw the peak shear strength against the normal stress, one curve per criterion.
+
+    A curve is dotted where its criterion is used out of its range.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.strength_envelope`.
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> result = fc.joints.strength_envelope(
+    ...     surface, nominal_pressure=[1e6, 2e6, 4e6], wall_strength=60e6, basic_friction_angle=30
+    ... )
+    >>> print(fc.plotting.strength_envelope(result).axes[0].get_ylabel())
+    shear strength $\tau$ (MPa)
+    """
+    figure, ax = _style.axes_or_new(ax)
+    data = result_of(result, "strength_envelope", ("shear_strength", "in_range", "criterion"), ("criterion",))
+    data = data.sortby("nominal_pressure")
+    pressure = data["nominal_pressure"]
+    strength = data["shear_strength"].transpose("criterion", "nominal_pressure")
+    in_range = data["in_range"].transpose("criterion", "nominal_pressure").values
+    # one unit on both axes, so that a slope can be read as a friction coefficient
+    scale = scale_for("Pa", np.concatenate([pressure.values, strength.values.ravel()]))
+    x = scale(pressure)
+    entries = []
+    for i, name in enumerate(words(data["criterion"])):
+        colour = _style.CYCLE[i % len(_style.CYCLE)]
+        y = scale(strength.values[i])
+        ax.plot(x, y, color=colour, **OUTSIDE_LINE)
+        ax.plot(x, np.where(in_range[i], y, np.nan), color=colour)
+        authors = " and ".join(part.capitalize() for part in name.split("_"))
+        entries.append(_style.legend_line(authors, color=colour))
+    if not in_range.all():
+        entries.append(_style.legend_line("out of range", **OUTSIDE_LINE))
+    ax.set_xlim(left=0)
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel(axis_label(pressure, scale))
+    ax.set_ylabel(axis_label(data["shear_strength"], scale))
+    _style.side_legend(ax, entries)
+    return figure
