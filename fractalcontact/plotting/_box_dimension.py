@@ -8,11 +8,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
-from fractalcontact.plotting._units import axis_label, name_of, scale_for, scale_of
+from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

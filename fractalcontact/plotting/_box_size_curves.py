@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import table
 from fractalcontact.plotting._paths import (
@@ -18,7 +19,7 @@ from fractalcontact.plotting._paths import (
     shear_text,
     shear_words,
 )
-from fractalcontact.plotting._units import name_of, scale_for, scale_of
+from fractalcontact.plotting._units import name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

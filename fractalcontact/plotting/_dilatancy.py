@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._directions import direction_styles, limit_shear, select_direction
 from fractalcontact.plotting._inputs import nearest, result_of, table
 from fractalcontact.plotting._paths import load_words
-from fractalcontact.plotting._units import axis_label, scale_for, scale_of
+from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import Scale, quantity_text
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._units import Scale, quantity_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import closure_laws, contact_area
@@ -17,7 +18,6 @@ from fractalcontact.plotting._inputs import extent_of, nearest, result_of, words
 from fractalcontact.plotting._paths import at_shear, loaded_steps, select_path
 from fractalcontact.plotting._shear_scheme import shear_step_of, sliding_scheme
 from fractalcontact.plotting._surface import surface
-from fractalcontact.plotting._units import quantity_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting._inputs import nearest, table
 from fractalcontact.plotting._style import spread_indices
-from fractalcontact.plotting._units import name_of, scale_for, scale_of, units_of
+from fractalcontact.plotting._units import name_of, scale_of, units_of
 
 SMALL = 0.1  # a load below this many units of its path is written in a unit of its own
 SAME = 5e-3  # loads with a smaller relative difference count as equal

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import quantity_text, scale_for
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._directions import direction_name
 from fractalcontact.plotting._inputs import extent_of, result_of, words
 from fractalcontact.plotting._surface import draw_outline, label_axes, plane_of, plane_scale
-from fractalcontact.plotting._units import quantity_text, scale_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

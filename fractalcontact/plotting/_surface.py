@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import Scale, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import as_dataset, extent_of
-from fractalcontact.plotting._units import Scale, axis_label, name_of, scale_for, scale_of
+from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

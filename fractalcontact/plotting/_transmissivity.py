@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table, words
 from fractalcontact.plotting._paths import load_of, shear_words
-from fractalcontact.plotting._units import axis_label, scale_for, scale_of
+from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,22 +1,11 @@
-"""Units and names on axes: the SI prefix that suits the values, and a short label."""
+"""Names on axes and the scale of a variable; the SI prefixes are those of `base.units`."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-
-Array = np.ndarray[Any, np.dtype[Any]]
-
-PREFIXES = {12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p"}
-SMALLEST = 0.5  # the largest value on an axis is at least this many of the shown units
-PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3)$")
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+from fractalcontact.base.units import Scale, scale_for
 
 # names on axes, where the long name of the schema is too long
 SHORT = {
@@ -55,22 +44,6 @@ SHORT = {
 PERCENT = frozenset({"contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage"})
 
 
-@dataclass(frozen=True)
-class Scale:
-    """A conversion for display: shown value = value / factor, in `unit`."""
-
-    factor: float
-    unit: str
-
-    def __call__(self, values: Any) -> Array:
-        """Return the values to show."""
-        return np.asarray(values, dtype=np.float64) / self.factor
-
-    def label(self, text: str) -> str:
-        """Return `text` with the unit after it."""
-        return f"{text} ({self.unit})" if self.unit else text
-
-
 def units_of(data: xr.DataArray) -> str:
     """Return the units of a variable: its own attribute, else those of its name in the schema."""
     units = data.attrs.get("units")
@@ -87,30 +60,6 @@ def scale_of(data: xr.DataArray) -> Scale:
     return scale_for(units_of(data), data.values)
 
 
-def scale_for(units: str, values: Any) -> Scale:
-    """Return the scale for values in `units`; prefixes only for the units in `PREFIXED`."""
-    if units in ("", "1"):
-        return Scale(1.0, "")
-    if units == "degree":
-        return Scale(1.0, "°")
-    if not PREFIXED.match(units):
-        return Scale(1.0, raise_exponents(units))
-    power = int(units[-1]) if units[-1].isdigit() else 1
-    largest = _largest(values)
-    if largest == 0:
-        return Scale(1.0, raise_exponents(units))
-    fitting = [e for e in PREFIXES if largest >= SMALLEST * 10.0 ** (e * power)]
-    exponent = max(fitting) if fitting else min(PREFIXES)
-    if units == "s":
-        exponent = min(exponent, 0)
-    return Scale(10.0 ** (exponent * power), PREFIXES[exponent] + raise_exponents(units))
-
-
-def raise_exponents(units: str) -> str:
-    """Return UDUNITS text with raised exponents: `Pa m-1` becomes `Pa m⁻¹`."""
-    return re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda match: match.group().translate(SUPERSCRIPT), units)
-
-
 def name_of(data: xr.DataArray) -> str:
     """Return the name of a variable on axes and in legends."""
     name = str(data.name)
@@ -122,16 +71,3 @@ def name_of(data: xr.DataArray) -> str:
 def axis_label(data: xr.DataArray, scale: Scale) -> str:
     """Return the label of an axis that shows `data` at `scale`."""
     return scale.label(name_of(data))
-
-
-def quantity_text(value: float, units: str, digits: int = 3) -> str:
-    """Return one value with its unit, for example `30 kN`."""
-    scale = scale_for(units, value)
-    return f"{value / scale.factor:.{digits}g} {scale.unit}".rstrip()
-
-
-def _largest(values: Any) -> float:
-    """Return the largest finite magnitude, 0 if there is none."""
-    size = np.abs(np.asarray(values, dtype=np.float64))
-    size = size[np.isfinite(size)]
-    return float(size.max()) if size.size else 0.0

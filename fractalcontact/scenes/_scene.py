@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -48,12 +48,16 @@ class SurfaceTable:
 
 @dataclass(frozen=True)
 class MaterialTable:
-    """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa)."""
+    """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa).
+
+    `yield_pressure` (Pa, one value or a range) changes no result: the summary compares true pressures with it.
+    """
 
     young: float | None = _number(above=0.0)
     poisson: float | None = _number(above=-1.0, at_most=0.5)
     basic_friction_angle: float | None = _number(at_least=0.0, below=90.0)
     hardness: float | None = _number(above=0.0)
+    yield_pressure: float | Sequence[float] | None = _number(above=0.0)
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,8 @@ def _check_material(table: Table, problems: Problems) -> None:
     _check_keys(table, MATERIAL_KEYS, "material", problems)
     for entry in fields(MaterialTable):
         if entry.name in table:
-            problems.number(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
+            check = problems.numbers if entry.name == "yield_pressure" else problems.number
+            check(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
 
 
 def _joint_keys() -> tuple[str, ...]:

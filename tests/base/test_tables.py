@@ -1,5 +1,7 @@
 """Text tables: aligned columns, also without rows."""
 
+import pytest
+
 from fractalcontact.base.tables import table
 
 
@@ -16,3 +18,23 @@ def test_numbers_keep_their_digits():
 
 def test_table_without_rows_has_its_head():
     assert table([("method", "error")]).splitlines()[0].split() == ["method", "error"]
+
+
+@pytest.mark.parametrize("width", [60, 80, 160])
+def test_table_is_not_wider_than_asked_for(width):
+    rows = [("stage", "needs", "reason"), ("figures", "all stored results", "figures are wanted " * 20)]
+    text = table(rows, width)
+    assert max(map(len, text.splitlines())) <= width
+    assert text.count("wanted") == 20
+
+
+def test_table_is_not_wider_than_the_screen(monkeypatch):
+    rows = [("words",), ("many words " * 30,)]
+    for columns in (40, 90):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        assert columns - 15 < max(map(len, table(rows).splitlines())) <= columns
+
+
+def test_narrow_table_is_the_same_at_any_width():
+    rows = [("method", "error"), ("fast", "1e-08")]
+    assert table(rows, 40) == table(rows, 400)

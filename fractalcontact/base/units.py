@@ -1,0 +1,146 @@
+"""Numbers beside units, in text and on axes: the SI prefix that suits the values, and few digits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+PREFIXES = {
+    18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
+}  # fmt: skip
+SMALLEST = 0.5  # the largest value is at least this many of the shown units
+PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3)$")
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A conversion for display: shown value = value / factor, in `unit`."""
+
+    factor: float
+    unit: str
+
+    def __call__(self, values: Any) -> Array:
+        """Return the values to show."""
+        return np.asarray(values, dtype=np.float64) / self.factor
+
+    def label(self, text: str) -> str:
+        """Return `text` with the unit after it."""
+        return f"{text} ({self.unit})" if self.unit else text
+
+    def text(self, value: Any, digits: int = 3) -> str:
+        """Return one value with its unit."""
+        shown = float(value) / self.factor
+        return f"{number(shown, digits)} {self.unit}".rstrip() if np.isfinite(shown) else "-"
+
+
+_recorded: list[list[tuple[str, Scale]]] = []
+_replayed: list[Iterator[tuple[str, Scale]]] = []
+
+
+def scale_for(units: str, values: Any) -> Scale:
+    """Return the scale for values in `units`; prefixes only for the units in `PREFIXED`."""
+    for entries in _replayed:
+        same = next((scale for name, scale in entries if name == units), None)
+        if same is not None:
+            return same
+    scale = _scale_for(units, values)
+    for record in _recorded:
+        record.append((units, scale))
+    return scale
+
+
+@contextmanager
+def recorded_scales() -> Iterator[list[tuple[str, Scale]]]:
+    """Within this context note every scale in the order in which it was chosen."""
+    record: list[tuple[str, Scale]] = []
+    _recorded.append(record)
+    try:
+        yield record
+    finally:
+        _recorded.remove(record)
+
+
+@contextmanager
+def replayed_scales(record: list[tuple[str, Scale]]) -> Iterator[None]:
+    """Within this context the same calls as those of a record get its scales, whatever the values."""
+    entries = iter(record)
+    _replayed.append(entries)
+    try:
+        yield
+    finally:
+        _replayed.remove(entries)
+
+
+def _scale_for(units: str, values: Any) -> Scale:
+    if units in ("", "1"):
+        return Scale(1.0, "")
+    if units == "degree":
+        return Scale(1.0, "°")
+    if not PREFIXED.match(units):
+        return Scale(1.0, raise_exponents(units))
+    power = int(units[-1]) if units[-1].isdigit() else 1
+    largest = _largest(values)
+    if largest == 0:
+        return Scale(1.0, raise_exponents(units))
+    fitting = [e for e in PREFIXES if largest >= SMALLEST * 10.0 ** (e * power)]
+    exponent = max(fitting) if fitting else min(PREFIXES)
+    if units == "s":
+        exponent = min(exponent, 0)
+    return Scale(10.0 ** (exponent * power), PREFIXES[exponent] + raise_exponents(units))
+
+
+def raise_exponents(units: str) -> str:
+    """Return UDUNITS text with raised exponents: `Pa m-1` becomes `Pa m⁻¹`."""
+    return re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda match: match.group().translate(SUPERSCRIPT), units)
+
+
+def quantity_text(value: Any, units: str, digits: int = 3) -> str:
+    """Return one value with its unit and SI prefix, "-" where there is none.
+
+    Examples
+    --------
+    >>> quantity_text(1e6, "Pa"), quantity_text(-2.4e-5, "m"), quantity_text(999.9, "N")
+    ('1 MPa', '-24 µm', '1 kN')
+    """
+    return _scale_for(units, value).text(value, digits)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits, without an exponent where it is between 1e-4 and 1e7.
+
+    Examples
+    --------
+    >>> number(1234567.0), number(-0.0), number(0.12345), number(2.5e-9)
+    ('1230000', '0', '0.123', '2.5e-09')
+    """
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e7:
+        text = f"{float(text):.0f}"
+    return "0" if text == "-0" else text
+
+
+def fixed(value: float, decimals: int, *, sign: bool = False) -> str:
+    """Return a number with so many decimals, and zero without a sign.
+
+    Examples
+    --------
+    >>> fixed(-0.001, 2), fixed(-0.006, 2), fixed(0.02, 1, sign=True), fixed(0.02, 2, sign=True)
+    ('0.00', '-0.01', '0.0', '+0.02')
+    """
+    text = f"{value:+.{decimals}f}" if sign else f"{value:.{decimals}f}"
+    return text if text.strip("+-0.") else text.lstrip("+-")
+
+
+def _largest(values: Any) -> float:
+    """Return the largest finite magnitude, 0 if there is none."""
+    size = np.abs(np.asarray(values, dtype=np.float64))
+    size = size[np.isfinite(size)]
+    return float(size.max()) if size.size else 0.0
