@@ -66,5 +66,9 @@ class ConvergenceWarning(FractalContactWarning):
     """At least one load step did not reach its tolerance; see the variable `converged`."""
 
 
+class SmallStrainWarning(FractalContactWarning):
+    """The slopes of a pressed surface are beyond small strains; see the variable `rms_slope`."""
+
+
 def _count(number: int) -> str:
     return "1 problem" if number == 1 else f"{number} problems"

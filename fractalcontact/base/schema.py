@@ -33,6 +33,7 @@ class Quantity:
 
 
 OPEN, CONTACT, YIELDED = 0, 1, 2
+STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
 SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
 _STATE = {
     "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),

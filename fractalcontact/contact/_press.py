@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges, read_grid
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STOP_REASONS, YIELDED
+from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
@@ -22,6 +22,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
+BEYOND_SMALL_STRAINS = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -118,7 +119,8 @@ def press(
         Coordinates closure, normal_force, nominal_pressure; contact_area, contact_fraction,
         corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
         transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
-        disc_radius (for "disc"). NaN where a periodic body is closed beyond its mean plane.
+        rms_slope of the surface, disc_radius ("disc"). NaN where a periodic body is closed beyond its
+        mean plane.
 
     Raises
     ------
@@ -129,6 +131,9 @@ def press(
     -----
     ConvergenceWarning
         A step stopped before its tolerance was met, or its force is not determined.
+    SmallStrainWarning
+        The rms slope of the surface is above 0.3: strains are about half of it where asperities are
+        flattened, and terms of the order of its square, a tenth, are left out.
 
     References
     ----------
@@ -165,8 +170,14 @@ def press(
         for name in names:
             maps[name].append(np.asarray(MAPS[name](step, heights)))
     result = _dataset(surface, grid, path, scalars, maps)
+    result["rms_slope"] = rms_slope(heights, grid)
     _add_reasons(result)
     _warn(result)
+    if result["rms_slope"] > STEEP:
+        message = (
+            f"fractalcontact.contact.press: the surface has an rms slope of {float(result['rms_slope']):.2g}"
+        )
+        warnings.warn(f"{message}; {BEYOND_SMALL_STRAINS}", SmallStrainWarning, stacklevel=3)
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     result.attrs = {
@@ -175,6 +186,18 @@ def press(
         "achieved_residual": float(np.fmax.reduce(result["residual"].values)),
     }
     return result
+
+
+def rms_slope(heights: Array, grid: Grid) -> float:
+    """Return the root mean square gradient, from the differences of neighbours."""
+    square = 0.0
+    for axis, (spacing, wraps) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
+        steps = np.diff(
+            heights, axis=axis, append=heights.take([0], axis) if wraps else heights.take([], axis)
+        )
+        largest = float(np.abs(steps).max()) or 1.0  # heights of any unit: no square leaves the range
+        square += float(np.mean((steps / largest) ** 2)) * (largest / spacing) ** 2
+    return float(np.sqrt(square))
 
 
 def _state(step: Step) -> Array:

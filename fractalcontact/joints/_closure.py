@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
@@ -121,7 +121,8 @@ def closure(
     -------
     Dataset over (shear, step), or (direction, shear, step)
         closure, bulk_closure, interface_closure (m), normal_force (N), nominal_pressure (Pa), the other
-        scalars of `press`, the maps in `keep`; nominal_area (m2); interpolation_error (m, rms) over shear.
+        scalars of `press`, the maps in `keep`; nominal_area (m2); over shear interpolation_error (m, rms)
+        and the rms_slope of the delta-surface.
 
     Raises
     ------
@@ -153,6 +154,7 @@ def closure(
     pressed = [press_sheared(crack, shears, towards, pressing, progress) for towards in directions]
     for towards, columns in zip(directions, pressed, strict=True):
         warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
+    warn_steep(pressed, WHERE, stacklevel=4)
     result = _dataset(crack, shears, directions, pressed)
     if is_single(direction):
         result = result.isel(direction=0)
@@ -167,6 +169,7 @@ def _dataset(
 ) -> xr.Dataset:
     """Return the columns of all directions over (direction, shear, step), and maps over (..., y, x)."""
     columns = {name: np.stack([each[name] for each in pressed]) for name in pressed[0]}
+    columns["rms_slope"] = columns["rms_slope"][..., 0]
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
     variables["interpolation_error"] = dims[:2], interpolation_errors(crack, shears, directions)
@@ -202,6 +205,18 @@ def warn_unconverged(
     )
     more = f"; and {len(failed) - STEPS_SHOWN} more" if len(failed) > STEPS_SHOWN else ""
     warnings.warn(f"{where}: not converged: {shown}{more}", ConvergenceWarning, stacklevel=stacklevel)
+
+
+def warn_steep(pressed: Sequence[dict[str, Array]], where: str, *, stacklevel: int) -> None:
+    """Warn once, of all shears and directions, of delta-surfaces beyond small strains."""
+    slope = max(float(columns["rms_slope"].max()) for columns in pressed)
+    if slope > STEEP:
+        warnings.warn(
+            f"{where}: the delta-surface has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are "
+            "not small, and linear elasticity is an approximation",
+            SmallStrainWarning,
+            stacklevel=stacklevel,
+        )
 
 
 @dataclass(frozen=True)
@@ -281,6 +296,7 @@ class ShearedContact:
         pressed = self._solve(load, keep)
         scalars = SCALARS if self.options.hardness is None else (*SCALARS, "plastic_work")
         columns = {name: pressed[name].values for name in (*scalars, *keep)}
+        columns["rms_slope"] = np.full(pressed.sizes["step"], float(pressed["rms_slope"]))
         # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
         has_bulk = np.isfinite(self.stiffness)
         bulk = columns["normal_force"] / self.stiffness if has_bulk else 0.0 * columns["closure"]
@@ -289,7 +305,9 @@ class ShearedContact:
     def _solve(self, load: fc.contact.LoadPath, keep: Sequence[str]) -> xr.Dataset:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ConvergenceWarning)  # one warning follows for all shears
+                # one warning follows for all shears
+                for category in (ConvergenceWarning, SmallStrainWarning):
+                    warnings.simplefilter("ignore", category)
                 return fc.contact.press(
                     self.surface,
                     contact_modulus=self.modulus,

@@ -19,6 +19,7 @@ from fractalcontact.joints._closure import (
     ShearedContact,
     check_pressing,
     press_sheared,
+    warn_steep,
     warn_unconverged,
 )
 from fractalcontact.joints._compass import COMPASS, Direction, direction_coords, read_directions
@@ -156,6 +157,7 @@ def dilatancy(
             columns = press_against_spring(crack, shears, lifted, towards, pressing, stiffness, progress)
         pressed.append(columns)
         warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
+    warn_steep(pressed, WHERE, stacklevel=4)
     result = _with_forces(rigid, crack, pressed, has_spring=normal_stiffness is not None)
     if normal_stiffness is not None:
         result = result.assign(normal_stiffness=float(normal_stiffness))
@@ -233,6 +235,7 @@ def _with_forces(
 ) -> xr.Dataset:
     """Add what was computed under force: scalars over (direction, shear, step), and maps."""
     columns = {name: np.stack([each[name] for each in pressed]) for name in pressed[0]}
+    columns["rms_slope"] = columns["rms_slope"][..., 0]
     dims = ("direction", "shear", "step", "y", "x")
     by_force: dict[str, Any] = {}
     for name in ("normal_force", "nominal_pressure", "bulk_closure"):

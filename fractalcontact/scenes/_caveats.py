@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.schema import STEEP
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
 PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
-MAX_SLOPE = 0.3  # rms slope up to which strains, some half of it, and rotations are small
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
 
@@ -100,9 +101,9 @@ def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
     if "rms_slope" not in pressed:
         return
     slope = float(pressed["rms_slope"].max())
-    if slope > MAX_SLOPE:
+    if slope > STEEP:
         yield (
-            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {MAX_SLOPE:g} strains are not "
+            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are not "
             "small, and linear elasticity is an approximation."
         )
 

@@ -7,6 +7,7 @@ may run anywhere and in any order; the joined result is the same.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.scenes._inputs import contact_options, crack_options, joint_options, read_surface
 from fractalcontact.scenes._plan import Stage
@@ -239,5 +241,7 @@ def _crack(scene: Scene, results: Results) -> Crack:
 
 def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:
     """Call a public function by name, so that the call can be sent to another process."""
-    result: xr.Dataset | xr.DataArray = public_function(function)(*arguments, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SmallStrainWarning)  # the summary says it once for all parts
+        result: xr.Dataset | xr.DataArray = public_function(function)(*arguments, **options)
     return as_dataset(result) if isinstance(result, xr.DataArray) else result

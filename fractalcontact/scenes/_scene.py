@@ -50,7 +50,7 @@ class SurfaceTable:
 class MaterialTable:
     """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa).
 
-    `yield_pressure` (Pa, one value or a range) changes no result: the summary compares true pressures with it.
+    `yield_pressure` (Pa, one value or a range) changes no result: true pressures are compared with it.
     """
 
     young: float | None = _number(above=0.0)
