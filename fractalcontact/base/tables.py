@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Sequence
 
 from tabulate import tabulate
 
 WIDTH = 110  # where the output is no terminal
-MIN_COLUMN = 9  # characters: a narrower column would break the words of its head
+WORD = 24  # characters: a longer word may be broken
 GAP = 2  # between columns
+GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
+# the spaces of a quantity; where these make a table too wide, it may break before its ±
+QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])|(?<=±) ")
 
 
 def screen_width() -> int:
@@ -20,7 +24,8 @@ def screen_width() -> int:
 def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
     """Return rows of text as aligned columns; the first row is the head.
 
-    Where the table would be wider than `width` (by default the screen), its widest cells take several lines.
+    Where the table would be wider than `width` (by default the screen), its widest cells take several lines;
+    a number keeps its unit.
 
     Examples
     --------
@@ -29,23 +34,40 @@ def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
     --------  -------
     fast      1e-08
     """
-    head, *body = rows
-    widths = _column_widths(rows, screen_width() if width is None else width)
+    limit = screen_width() if width is None else width
+    for spaces in QUANTITY:
+        glued = [[re.sub(spaces, GLUE, cell) for cell in row] for row in rows]
+        widths = _column_widths(glued, limit)
+        if _total(widths) <= limit:
+            break
+    head, *body = glued
     text = tabulate(
         body,
-        headers=list(head),
+        headers=head,
         tablefmt="simple",
         disable_numparse=True,
         maxcolwidths=widths if body else None,
-        maxheadercolwidths=widths,
+        maxheadercolwidths=[size - GAP for size in widths],  # heads are padded
     )
-    return "\n".join(line.rstrip() for line in text.splitlines())
+    return "\n".join(line.rstrip() for line in text.replace(GLUE, " ").splitlines())
 
 
 def _column_widths(rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """Return the width of every column: that of its longest cell, the widest columns cut until all fit."""
-    # the library makes every column two characters wider than its head
-    widths = [max(len(row[0]) + GAP, *(len(cell) for cell in row)) for row in zip(*rows, strict=True)]
-    while sum(widths) + GAP * (len(widths) - 1) > width and max(widths) > MIN_COLUMN:
-        widths[widths.index(max(widths))] -= 1
+    columns = list(zip(*rows, strict=True))
+    widths = [max(len(head) + GAP, *map(len, cells), 0) for head, *cells in columns]
+    shortest = [max(_longest_word(head) + GAP, *map(_longest_word, cells), 0) for head, *cells in columns]
+    while _total(widths) > width:
+        room = [size - least for size, least in zip(widths, shortest, strict=True)]
+        if max(room) <= 0:
+            break
+        widths[max((i for i, spare in enumerate(room) if spare > 0), key=lambda i: widths[i])] -= 1
     return widths
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + GAP * (len(widths) - 1)
+
+
+def _longest_word(cell: str) -> int:
+    return min(WORD, max((len(word) for word in re.split(r" |(?<=-)", cell)), default=0))

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.netcdf_header import Header, read_headers
-from fractalcontact.base.tables import table
+from fractalcontact.base.tables import screen_width, table
 
-WIDTH = 110
 REASONS = ("comment", "reason")  # attributes with a reason for each method, as JSON
 
 
@@ -95,7 +94,7 @@ def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
 def note(text: str, indent: int = 2) -> str:
     """Return a remark below a table, wrapped to the width of the screen."""
     first, rest = " " * indent, " " * (indent + 2)
-    return textwrap.fill(text, WIDTH, initial_indent=first, subsequent_indent=rest)
+    return textwrap.fill(text, screen_width(), initial_indent=first, subsequent_indent=rest)
 
 
 def _are_stages(stages: Any) -> bool:
@@ -151,7 +150,17 @@ def _variable_lines(group: Header) -> Iterable[str]:
         rows.append((name, f"({dims})" if dims else "", f"{attributes.get('long_name', '')}{unit}"))
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, dims, words in rows:
-        yield f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
+        line = f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
+        yield from _wrapped(line, min(6 + widths[0] + widths[1], screen_width() // 2))
+
+
+def _wrapped(line: str, indent: int) -> Iterable[str]:
+    """Yield a line in columns in the width of the screen, the rest of it below its last column."""
+    if len(line) <= screen_width():
+        return [line]
+    cut = line.rfind(" ", 0, screen_width() + 1)
+    rest = textwrap.wrap(line[cut:].strip(), screen_width() - indent)
+    return [line[:cut].rstrip(), *(" " * indent + part for part in rest)]
 
 
 def _is_achieved(name: str) -> bool:

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import table
+from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 from fractalcontact.scenes._caveats import caveats, group_of
 from fractalcontact.scenes._contents import note, reasons, stage_table
 from fractalcontact.scenes._paper import paper_table
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MEMBER = "member"
+ROUNDING = 1e-12  # a spread below it is none: the same load for every member
+FRACTIONS = frozenset({"contact_fraction", "corrected_contact_fraction"})
 
 
 def summary(tree: xr.DataTree) -> str:
     r"""Return the main results of a study with the achieved errors and the run time of every stage.
 
-    Of an ensemble, the results are those of the first member. A study whose scene says ``paper = true`` is
-    compared with the paper of 1998.
+    Of an ensemble, every number is the mean over the members with its standard deviation. A study whose scene
+    says ``paper = true`` is compared with the paper of 1998, an ensemble by its member 0.
 
     Parameters
     ----------
@@ -38,9 +47,10 @@ def summary(tree: xr.DataTree) -> str:
     -----------------  -------  -----------  ------------
     E                  10 mm    1.15 mm      +0.0264
     """
-    tree = first_member(tree)
+    members = member_count(tree)
     sections = [
         str(tree.attrs.get("title", tree.name or "result")),
+        _ensemble(members),
         _selected(tree),
         _dimensions(tree),
         _contact(tree),
@@ -50,10 +60,15 @@ def summary(tree: xr.DataTree) -> str:
         _friction(tree),
         _contact_set(tree),
         "\n".join(note(caveat) for caveat in caveats(tree)),
-        paper_table(tree) if compares_with_paper(tree) else "",
+        _paper(tree, members) if compares_with_paper(tree) else "",
         stage_table(tree),
     ]
     return "\n\n".join(section for section in sections if section)
+
+
+def _paper(tree: xr.DataTree, members: int) -> str:
+    compared = paper_table(first_member(tree))
+    return f"member 0 of {members}:\n{compared}" if members and compared else compared
 
 
 def first_member(tree: xr.DataTree) -> xr.DataTree:
@@ -72,19 +87,70 @@ def compares_with_paper(tree: xr.DataTree) -> bool:
     return isinstance(scene, dict) and scene.get("paper") is True
 
 
+def member_count(tree: xr.DataTree) -> int:
+    """Return the number of members of an ensemble; 0 for a single study."""
+    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
+
+
+def _ensemble(members: int) -> str:
+    if not members:
+        return ""
+    return f"ensemble of {members} members: mean ± standard deviation over the members"
+
+
+def amount(data: Any, digits: int = 3) -> str:
+    """Return a value with its unit and SI prefix; of an ensemble mean and standard deviation."""
+    name = str(data.name)
+    units = data.attrs.get("units") or QUANTITIES[name].units or ""
+    if name in FRACTIONS:
+        scale = Scale(0.01, "%")
+    else:
+        scale = scale_for(units, float(_finite(data).mean()) if _finite(data).size else np.nan)
+    unit = f" {scale.unit}".rstrip()
+    return _over_members(scale(data.values), lambda value: number(value, digits), _decimals_of, unit)
+
+
+def plain(data: Any, decimals: int, *, sign: bool = False) -> str:
+    """Return a number with so many decimals; of an ensemble mean and standard deviation."""
+    return _over_members(
+        data.values,
+        lambda value: fixed(value, decimals, sign=sign),
+        lambda _: decimals,
+    )
+
+
+def _over_members(
+    values: Any, text: Callable[[float], str], decimals: Callable[[float], int], unit: str = ""
+) -> str:
+    """Return the value of all, or mean ± standard deviation with the number of members that have one.
+
+    `text` writes a single value; `decimals` gives those of the mean and of the deviation from the deviation.
+    """
+    values = np.asarray(values, dtype=float)
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return "-"
+    share = f" ({known.size} of {values.size})" if known.size < values.size else ""
+    if values.ndim == 0 or float(np.ptp(known)) <= ROUNDING * float(np.abs(known).max()):
+        return text(float(known[0])) + unit + share
+    spread = float(np.std(known, ddof=1))
+    digits, sign = decimals(spread), text(float(known.mean())).startswith("+")
+    return f"{fixed(float(known.mean()), digits, sign=sign)} ± {fixed(spread, digits)}{unit}{share}"
+
+
+def _decimals_of(spread: float) -> int:
+    """Return the decimals that show a standard deviation with two digits."""
+    return max(0, 1 - int(np.floor(np.log10(spread))))
+
+
+def _finite(data: Any) -> Array:
+    values = np.asarray(data.values, dtype=float)
+    return values[np.isfinite(values)]
+
+
 def length(value: Any) -> str:
     """Return a length in metres with the prefix that suits it."""
-    metres = float(value)
-    if not np.isfinite(metres):
-        return "-"
-    for factor, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm"), (1e-6, "um")):
-        if abs(metres) >= factor:
-            return f"{metres / factor:.3g} {unit}"
-    return f"{metres * 1e9:.3g} nm"
-
-
-def _percent(value: Any) -> str:
-    return f"{float(value) * 100:.3g} %"
+    return quantity_text(value, "m")
 
 
 def _selected(tree: xr.DataTree) -> str:
@@ -98,23 +164,26 @@ def _dimensions(tree: xr.DataTree) -> str:
     if estimates is None or "method" not in estimates.dims:
         return ""
     rows = [("fractal dimension", "D", "95 % interval of D", "range of scales", "goodness of fit")]
+    largest = estimates["fractal_dimension"] + estimates["hurst"]
     for method in estimates["method"].values:
-        estimate = estimates.sel({"method": method})
-        low, high, dimension, hurst = (
-            float(estimate[name]) for name in ("ci_low", "ci_high", "fractal_dimension", "hurst")
-        )
-        misfit, largest = float(estimate["misfit"]), dimension + hurst
+        estimate, top = (data.sel({"method": method}) for data in (estimates, largest))
+        low, high = (top - estimate[end] for end in ("ci_high", "ci_low"))
+        misfit = plain(np.abs(estimate["misfit"]), 1)
         rows.append(
             (
                 str(method),
-                f"{dimension:.3f}",
-                f"{largest - high:.3f} ... {largest - low:.3f}" if np.isfinite(low) else "none",
-                f"{length(estimate['scale_min'])} ... {length(estimate['scale_max'])}",
-                f"z = {abs(misfit):.1f}" if np.isfinite(misfit) else "",
+                plain(estimate["fractal_dimension"], 3),
+                f"{plain(low.mean(), 3)} ... {plain(high.mean(), 3)}" if _finite(low).size else "none",
+                f"{amount(estimate['scale_min'].mean(keep_attrs=True))} ... "
+                f"{amount(estimate['scale_max'].mean(keep_attrs=True))}",
+                "" if misfit == "-" else f"z = {misfit}",
             )
         )
     remarks = reasons(estimates["hurst"].attrs, "comment") | reasons(estimates["ci_low"].attrs, "reason")
-    return "\n".join([table(rows), *(note(f"{names}: {reason}") for names, reason in remarks.items())])
+    lines = [table(rows), *(note(f"{names}: {reason}") for names, reason in remarks.items())]
+    if MEMBER in estimates.dims:
+        lines.append(note("The intervals are those of one surface: the means of their ends."))
+    return "\n".join(lines)
 
 
 def _contact(tree: xr.DataTree) -> str:
@@ -122,17 +191,10 @@ def _contact(tree: xr.DataTree) -> str:
     if contact is None:
         return ""
     rows = [("step", "nominal pressure", "closure", "contact area", "area, perimeter-corrected")]
+    names = ("nominal_pressure", "closure", "contact_fraction", "corrected_contact_fraction")
     for step in range(contact.sizes["step"]):
         state = contact.isel(step=step)
-        rows.append(
-            (
-                str(step),
-                f"{float(state['nominal_pressure']):.3g} Pa",
-                length(state["closure"]),
-                _percent(state["contact_fraction"]),
-                _percent(state["corrected_contact_fraction"]),
-            )
-        )
+        rows.append((str(step), *(amount(state[name]) for name in names)))
     return table(rows)
 
 
@@ -141,9 +203,9 @@ def _mated_position(tree: xr.DataTree) -> str:
     if upper is None or "mismatch" not in upper:
         return ""
     lines = [
-        f"mated position: shift {length(upper['shift_x'])} along x and {length(upper['shift_y'])} along y, "
-        f"rotation {float(upper['rotation']):.3g} degree",
-        f"mismatch {length(upper['mismatch'])} rms, correlation {float(upper['correlation']):.3f}",
+        f"mated position: shift {amount(upper['shift_x'])} along x and {amount(upper['shift_y'])} along y, "
+        f"rotation {amount(upper['rotation'])}",
+        f"mismatch {amount(upper['mismatch'])} rms, correlation {plain(upper['correlation'], 3)}",
     ]
     if lower is not None and "height" in lower:
         aperture = upper["height"] - lower["height"]
@@ -157,30 +219,20 @@ def _closure(tree: xr.DataTree) -> str:
     closure = group_of(tree, "joints/closure")
     if closure is None:
         return ""
-    last = closure.isel(step=-1)
-    rows = [
-        (
-            "closure at shear",
-            "normal force",
-            "closure",
-            "interface closure",
-            "contact area",
-            "area, perimeter-corrected",
-        )
-    ]
-    for shear in np.atleast_1d(last["shear"].values):
-        state = last.sel(shear=shear) if "shear" in last.dims else last
-        rows.append(
-            (
-                f"{shear * 1e3:.3g} mm",
-                f"{float(state['normal_force']) / 1e3:.3g} kN",
-                f"{float(state['closure']) * 1e6:.4g} um",
-                f"{float(state['interface_closure']) * 1e6:.4g} um",
-                _percent(state["contact_fraction"]),
-                _percent(state["corrected_contact_fraction"]),
-            )
-        )
+    names = ("normal_force", "closure", "interface_closure", "contact_fraction", "corrected_contact_fraction")
+    head = ("closure at shear", "normal force", "closure", "interface closure", "contact area")
+    rows = [(*head, "area, perimeter-corrected")]
+    for shear, state in _at_shears(closure.isel(step=-1)):
+        rows.append((shear, *(amount(state[name]) for name in names)))
     return table(rows)
+
+
+def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Yield every shear as text with its results."""
+    if "shear" not in data.coords:
+        yield "", data
+    for shear in np.atleast_1d(data["shear"].values) if "shear" in data.coords else ():
+        yield length(shear), data.sel(shear=shear) if "shear" in data.dims else data
 
 
 def _dilatancy(tree: xr.DataTree) -> str:
@@ -191,14 +243,8 @@ def _dilatancy(tree: xr.DataTree) -> str:
     last = rigid.isel(shear=-1)
     for direction in np.atleast_1d(rigid["direction"].values):
         state = last.sel(direction=direction) if "direction" in last.dims else last
-        rows.append(
-            (
-                str(direction),
-                f"{float(state['shear']) * 1e3:.3g} mm",
-                f"{float(state['rigid_dilatancy']) * 1e3:.3g} mm",
-                f"{float(state['mean_slope']):+.4f}" if "mean_slope" in state else "",
-            )
-        )
+        slope = plain(state["mean_slope"], 4, sign=True) if "mean_slope" in state else ""
+        rows.append((str(direction), amount(state["shear"]), amount(state["rigid_dilatancy"]), slope))
     return table(rows)
 
 
@@ -206,44 +252,48 @@ def _friction(tree: xr.DataTree) -> str:
     friction = group_of(tree, "joints/friction")
     if friction is None or "peak_shear_strength" not in friction:
         return ""
-    over = float(friction["peak_distance"]) * 1e3
-    column = f"from shear, over {over:.3g} mm"
+    column = f"from shear, over {length(friction['peak_distance'].max())}"
     rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", column)]
-    for direction in friction["direction"].values:
+    names = ("peak_shear_strength", "peak_friction_angle", "peak_shear")
+    for direction in np.atleast_1d(friction["direction"].values):
+        towards = friction.sel(direction=direction) if "direction" in friction.dims else friction
         for step in range(friction.sizes["step"]):
-            state = friction.sel(direction=direction).isel(step=step)
-            strength = float(state["peak_shear_strength"])
-            rows.append(
-                (
-                    str(direction),
-                    f"{float(state['nominal_pressure']) / 1e6:.3g} MPa",
-                    f"{strength / 1e6:.4g} MPa" if np.isfinite(strength) else "none: the faces lock",
-                    f"{float(state['peak_friction_angle']):.1f} degree" if np.isfinite(strength) else "",
-                    f"{float(state['peak_shear']) * 1e3:.3g} mm" if np.isfinite(strength) else "",
-                )
-            )
+            state = towards.isel(step=step)
+            strength = state["peak_shear_strength"]
+            state = state.where(np.isfinite(strength))
+            values = [amount(state[name]) for name in names] if _finite(strength).size else None
+            pressure = amount(towards["nominal_pressure"].isel(step=step))
+            rows.append((str(direction), pressure, *(values or ("none: the faces lock", "", ""))))
     comment = friction["peak_friction_angle"].attrs.get("comment")
-    return table(rows) + (f"\nThe peak friction angle {comment}." if comment else "")
+    return "\n".join([table(rows), *([note(f"The peak friction angle {comment}.")] if comment else [])])
 
 
 def _contact_set(tree: xr.DataTree) -> str:
     boxes = group_of(tree, "domains/box_dimension")
     if boxes is None:
         return ""
-    rows = [
-        ("contact domain, last step", "box dimension", "95 % interval", "random null", "differs from null")
-    ]
+    rows = [("contact domain, last step", "box dimension", "95 % interval", "of random sets")]
     last = boxes.isel(step=-1) if "step" in boxes.dims else boxes
-    for shear in np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]:
-        state = last.sel(shear=shear) if shear is not None and "shear" in last.dims else last
-        low, high = float(state["ci_low"]), float(state["ci_high"])
+    for shear, state in _at_shears(last):
+        low, high = state["ci_low"].mean(), state["ci_high"].mean()
         rows.append(
             (
-                "" if shear is None else f"shear {float(shear) * 1e3:.3g} mm",
-                f"{float(state['box_dimension']):.2f}",
-                f"{low:.2f} ... {high:.2f}" if np.isfinite(low) else "none",
-                f"{float(state['null_dimension']):.2f}",
-                "yes" if bool(state["differs_from_random"]) else "no",
+                f"shear {shear}" if shear else "",
+                plain(state["box_dimension"], 2),
+                f"{plain(low, 2)} ... {plain(high, 2)}" if np.isfinite(low) else "none",
+                plain(state["null_dimension"], 2),
             )
         )
-    return table(rows)
+    return "\n".join([table(rows), note(_counts_beside_null(last))])
+
+
+def _counts_beside_null(boxes: xr.Dataset) -> str:
+    """Return how many sets have box counts that random sets of equal coverage do not have.
+
+    The counts are far more precise than the slope fitted to them: they may differ where the dimensions agree.
+    """
+    differs = np.asarray(boxes["differs_from_random"].values, dtype=bool)
+    few = (
+        "The counts of boxes of 2, 3 and 4 cells, not the dimensions, are tested against random sets of equal"
+    )
+    return f"{few} coverage: {int(differs.sum())} of {differs.size} sets differ."

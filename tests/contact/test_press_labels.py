@@ -1,11 +1,13 @@
 """What `press` returns: labels, files, provenance, scalars that are consistent with the maps."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.errors import SmallStrainWarning
 
 MODULUS = 2e9
 
@@ -96,3 +98,28 @@ def test_mated_periodic_path_is_written(tmp_path, compliance):
     assert np.isnan(float(beyond["residual"][0]))
     pressed = fc.contact.press(flat, contact_modulus=MODULUS, normal_force=[0.0, 2.0], keep=keep)
     np.testing.assert_array_equal(pressed["closure"], [0.0, 0.0])
+
+
+def sine(slope, cells=64):
+    """A sine along x whose rms slope is known in closed form for many cells."""
+    phase = 2 * np.pi * np.arange(cells) / cells
+    amplitude = slope * np.sqrt(2) / (2 * np.pi)
+    return fc.surfaces.from_array(np.tile(amplitude * np.sin(phase), (8, 1)), 1 / cells, periodic=True)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_rms_slope_is_that_of_a_sine(unit):
+    surface = sine(0.1) * unit
+    surface = surface.assign_coords({d: surface[d] * unit for d in ("y", "x")})
+    for dim in ("y", "x"):
+        surface[dim].attrs = {"units": "m", "period": surface.sizes[dim] * unit / 64}
+    pressed = fc.contact.press(surface, contact_modulus=1.0, nominal_pressure=1e-3)
+    assert float(pressed.rms_slope) == pytest.approx(0.1, rel=1e-3)
+
+
+def test_steep_surfaces_warn_and_flat_ones_do_not():
+    with pytest.warns(SmallStrainWarning, match="rms slope of 0.4"):
+        fc.contact.press(sine(0.4), contact_modulus=1.0, nominal_pressure=1e-3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fc.contact.press(sine(0.29), contact_modulus=1.0, nominal_pressure=1e-3)

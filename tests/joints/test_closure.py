@@ -1,9 +1,12 @@
 """Closure: limits that are exact, orderings of the paper, agreement with `press`."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.errors import SmallStrainWarning
 
 E, NU = 30e9, 0.2
 MODULUS = 15.625e9
@@ -205,3 +208,24 @@ def test_closure_does_not_depend_on_the_starting_point(make_face, rough, seed):
         alone = fc.joints.closure(crack, normal_force=force, **options).closure.values[:, 0]
         np.testing.assert_allclose(along.closure[:, i], alone, rtol=1e-9)
         np.testing.assert_allclose(down.closure[:, 2 - i], alone, rtol=1e-9)
+
+
+def test_steep_delta_surfaces_warn_once():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.5, rms_increment=5e-5, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-4)
+    for call in (fc.joints.closure, fc.joints.dilatancy):
+        with pytest.warns(SmallStrainWarning) as caught:
+            result = call(crack, shear=[1e-4, 2e-4, 4e-4], normal_force=[1.0], direction=["E", "W"])
+        assert len(caught) == 1
+        delta = fc.joints.delta_surface(crack, 4e-4, "W").values
+        square = sum(np.mean((np.diff(delta, axis=axis) / 1e-4) ** 2) for axis in (0, 1))
+        assert float(result.rms_slope.sel(direction="W", shear=4e-4)) == pytest.approx(np.sqrt(square))
+        assert f"up to {float(result.rms_slope.max()):.2g}" in str(caught[0].message)
+
+
+def test_mated_faces_have_no_slope_and_no_warning():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.5, rms_increment=5e-5, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fc.joints.closure(crack, shear=0.0, normal_force=1.0).rms_slope.item() == 0

@@ -1,0 +1,127 @@
+"""The summary: mean and deviation of the members, numbers that can be read, as wide as the screen."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from study import SOUND, command
+
+import fractalcontact as fc
+
+ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
+    'joints = ["closure", "rigid_dilatancy"]',
+    'dimensions = ["default"]\njoints = ["closure", "elastic_dilatancy", "friction"]\n'
+    'domains = ["box_dimension"]\n',
+)
+
+
+@pytest.fixture(autouse=True)
+def wide_screen(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+
+
+@pytest.fixture(scope="module")
+def ensemble(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ensemble")
+    (folder / "study.toml").write_text(ENSEMBLE, encoding="utf-8")
+    return fc.scenes.run(folder / "study.toml", progress=False)
+
+
+def rows(text, head):
+    """Return the cells of the rows of the table with this head."""
+    lines = text[text.index(head) :].split("\n\n")[0].splitlines()
+    return [re.split(r"  +", line) for line in lines[2:] if not line.startswith("  ")]
+
+
+def test_summary_shows_mean_and_deviation_of_the_members(ensemble):
+    text = fc.scenes.summary(ensemble)
+    assert "ensemble of 4 members: mean ± standard deviation" in text
+    percent = ensemble["joints/closure"].contact_fraction.isel(step=-1).values * 100
+    for column, cells in enumerate(rows(text, "closure at shear")):
+        mean, spread = (float(word) for word in cells[4].removesuffix(" %").split(" ± "))
+        assert mean == pytest.approx(percent[:, column].mean(), rel=0.05)
+        assert spread == pytest.approx(percent[:, column].std(ddof=1), rel=0.05)
+    dimension = ensemble["dimensions"].fractal_dimension.values[:, 0]
+    assert rows(text, "fractal dimension")[0][1] == f"{dimension.mean():.3f} ± {dimension.std(ddof=1):.3f}"
+
+
+def test_loads_of_all_members_have_no_deviation(ensemble):
+    assert rows(fc.scenes.summary(ensemble), "closure at shear")[0][1] == "10 N"
+
+
+def test_single_study_names_no_members(ensemble):
+    single = ensemble.map_over_datasets(lambda dataset: dataset.isel(member=1, missing_dims="ignore"))
+    text = fc.scenes.summary(single)
+    assert "members" not in text
+    assert "±" not in text
+    fraction = float(single["joints/closure"].contact_fraction[0, -1])
+    assert rows(text, "closure at shear")[0][4] == f"{fraction * 100:.3g} %"
+
+
+def test_members_without_a_value_are_counted(ensemble):
+    holed = ensemble.copy()
+    closing = holed["joints/closure"].to_dataset()
+    closing["closure"] = closing["closure"].where(closing["member"] != 2)
+    closing["interface_closure"] = closing["interface_closure"].where(False)
+    holed["joints/closure"] = xr.DataTree(closing)
+    cells = rows(fc.scenes.summary(holed), "closure at shear")[0]
+    assert cells[2].endswith("µm (3 of 4)")
+    assert cells[3] == "-"
+
+
+def test_member_compared_with_the_paper_is_named(ensemble):
+    tree = ensemble.copy()
+    scene = json.loads(tree.attrs["provenance"])
+    scene["parameters"]["scene"]["paper"] = True
+    tree.attrs["provenance"] = json.dumps(scene)
+    assert "member 0 of 4" in fc.scenes.summary(tree)
+
+
+@pytest.mark.parametrize("columns", [80, 160])
+def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    path = fc.save(ensemble, tmp_path / "result.nc")
+    plan = str(fc.scenes.plan(fc.scenes.load("concrete_crack")))
+    for text in (fc.scenes.summary(ensemble), fc.scenes.contents(path), plan):
+        assert max(map(len, text.splitlines())) <= columns
+
+
+def test_command_fits_the_screen(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "72")
+    done = command("run", "--plan", "concrete_crack")
+    assert max(map(len, done.stdout.splitlines())) <= 72
+
+
+def test_units_follow_the_values():
+    surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
+    pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    text = fc.scenes.summary(xr.DataTree.from_dict({"contact": pressed}))
+    assert [cells[1] for cells in rows(text, "step")] == ["1 MPa", "10 MPa"]
+    assert rows(text, "step")[0][2].endswith(" nm")
+    assert "e+0" not in text
+
+
+def test_small_forces_are_not_zero_kilonewton():
+    face = fc.surfaces.fbm((32, 32), 1e-7, hurst=0.8, rms_increment=3e-9, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-7)
+    closing = fc.joints.closure(crack, shear=[2e-7], normal_force=[2e-6])
+    cells = rows(fc.scenes.summary(xr.DataTree.from_dict({"joints/closure": closing})), "closure at shear")[0]
+    assert cells[:2] == ["200 nm", "2 µN"]
+
+
+def test_no_negative_zero_and_no_contradiction_beside_the_dimension():
+    mask = np.zeros((2, 64, 64), bool)
+    mask[:, ::16, ::16] = True
+    mask[1, 20:24, 20:24] = True
+    state = xr.DataArray(mask, dims=("shear", "y", "x"), coords={"shear": [1e-4, 2e-4]})
+    for dim in ("y", "x"):
+        state = state.assign_coords({dim: (dim, np.arange(64) * 1e-5, {"units": "m"})})
+    boxes = fc.domains.box_dimension(state)
+    text = fc.scenes.summary(xr.DataTree.from_dict({"domains/box_dimension": boxes}))
+    assert "-0.00" not in text
+    words = " ".join(text.split())
+    number = int(boxes.differs_from_random.sum())
+    assert f"{number} of 2 sets differ" in words
+    assert "yes" not in words
