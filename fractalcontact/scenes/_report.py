@@ -272,7 +272,7 @@ def _contact_set(tree: xr.DataTree) -> str:
     boxes = group_of(tree, "domains/box_dimension")
     if boxes is None:
         return ""
-    rows = [("contact domain, last step", "box dimension", "95 % interval", "of random sets")]
+    rows = [("contact domain, last step", "box dimension", "95 % interval", "random null")]
     last = boxes.isel(step=-1) if "step" in boxes.dims else boxes
     for shear, state in _at_shears(last):
         low, high = state["ci_low"].mean(), state["ci_high"].mean()
