@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, words
-from fractalcontact.plotting._units import axis_label, scale_for
+from fractalcontact.plotting._units import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

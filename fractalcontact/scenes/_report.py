@@ -145,7 +145,7 @@ def _decimals_of(spread: float) -> int:
 
 def _finite(data: Any) -> Array:
     values = np.asarray(data.values, dtype=float)
-    return values[np.isfinite(values)]
+    return np.asarray(values[np.isfinite(values)])
 
 
 def length(value: Any) -> str:
@@ -190,7 +190,9 @@ def _contact(tree: xr.DataTree) -> str:
     contact = group_of(tree, "contact")
     if contact is None:
         return ""
-    rows = [("step", "nominal pressure", "closure", "contact area", "area, perimeter-corrected")]
+    rows: list[tuple[str, ...]] = [
+        ("step", "nominal pressure", "closure", "contact area", "area, perimeter-corrected")
+    ]
     names = ("nominal_pressure", "closure", "contact_fraction", "corrected_contact_fraction")
     for step in range(contact.sizes["step"]):
         state = contact.isel(step=step)
@@ -221,7 +223,7 @@ def _closure(tree: xr.DataTree) -> str:
         return ""
     names = ("normal_force", "closure", "interface_closure", "contact_fraction", "corrected_contact_fraction")
     head = ("closure at shear", "normal force", "closure", "interface closure", "contact area")
-    rows = [(*head, "area, perimeter-corrected")]
+    rows: list[tuple[str, ...]] = [(*head, "area, perimeter-corrected")]
     for shear, state in _at_shears(closure.isel(step=-1)):
         rows.append((shear, *(amount(state[name]) for name in names)))
     return table(rows)
