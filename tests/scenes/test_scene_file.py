@@ -87,7 +87,9 @@ def test_unreadable_scene_is_refused(write, tmp_path):
         fc.scenes.load(tmp_path / "none.toml")
 
 
-@pytest.mark.parametrize("name", ["concrete_crack", "rigid_sliding", "jacksboro_fault", "freiberg_gneiss"])
+@pytest.mark.parametrize(
+    "name", ["concrete_crack", "concrete_crack_1998", "rigid_sliding", "jacksboro_fault", "freiberg_gneiss"]
+)
 def test_shipped_scenes_are_found_by_name_and_valid(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for way in (name, f"{name}.toml", f"datasets/{name}.toml"):
