@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ _FEW_POINTS = 1 << 14
 _SLIGHT = 0.01  # share of missing points for which one probe is enough
 _SMALL = 1 << 16  # modes up to which the covariance of the score takes all probes
 _SEED = 20260801
+_SMOOTH = 1.1  # H above which the expected power is summed from differences: no fractal is so smooth
+_NEAR = 24.0  # spacings up to which second differences are taken directly
+_DERIVATIVES = 4  # half the highest order of the derivatives beyond
 
 
 @dataclass(frozen=True)
@@ -187,8 +191,17 @@ def expected_power(lattice: Lattice, hurst: float) -> Array:
 
     Multiply by half the variance of the increment over one x spacing, times (1 - H), for a surface in
     other units.
+
+    The sums over a covariance cancel beyond double precision where the longest waves of a large and smooth
+    surface have 1e16 times the power of the shortest. So beyond H = `_SMOOTH` the cosine modes are written as
+    sine modes of the differences over one step along both axes, which is exact:
+    sum_i cos(q (i + 1/2)) z_i = -sum_i sin(q i) (z_i - z_(i-1)) / (2 sin(q / 2)).
     """
-    return _along(_along(lattice.covariance(hurst), 1), 0)
+    if hurst <= _SMOOTH:
+        return _along(_along(lattice.covariance(hurst), 1), 0)
+    power = _along(_along(_difference_covariance(lattice, hurst), 1, differences=True), 0, differences=True)
+    sy, sx = (np.sin(0.5 * np.pi * np.arange(1, n) / n) ** 2 for n in lattice.shape)
+    return np.asarray(power / (16.0 * sy[:, None] * sx))
 
 
 def wavelengths(lattice: Lattice) -> Array:
@@ -203,10 +216,11 @@ def _wavenumber_ratio(lattice: Lattice) -> Array:
     return np.asarray(ky[:, None] / kx)
 
 
-def _along(covariance: Array, axis: int) -> Array:
+def _along(covariance: Array, axis: int, *, differences: bool = False) -> Array:
     """Sum covariance(i - j) c_k(i) c_k(j) over i, j along one axis, for modes k = 1 to n - 1.
 
-    The sum over pairs of lag u is (n - u) cos(pi k u / n) - sin(pi k u / n) / sin(pi k / n), over n.
+    The sum over pairs of lag u is (n - u) cos(pi k u / n) - sin(pi k u / n) / sin(pi k / n), over n. For the
+    n - 1 differences and sine modes it is (n - u) cos(pi k u / n) + sin(pi k u / n) / tan(pi k / n).
     """
     n = covariance.shape[axis]
     shape = [1, 1]
@@ -219,7 +233,57 @@ def _along(covariance: Array, axis: int) -> Array:
     tapered[tuple(first)] = covariance * np.arange(n, 0, -1.0).reshape(shape)
     cosine = fft.dct(tapered, 1, (axis,))[tuple(inner)]
     sine = fft.dst(covariance[tuple(inner)], 1, (axis,))
-    return np.asarray((cosine - sine / np.sin(np.pi * np.arange(1, n) / n).reshape(shape)) / n)
+    angle = (np.pi * np.arange(1, n) / n).reshape(shape)
+    if differences:
+        return np.asarray((cosine + sine / np.tan(angle)) / n)
+    return np.asarray((cosine - sine / np.sin(angle)) / n)
+
+
+def _difference_covariance(lattice: Lattice, hurst: float) -> Array:
+    """Return the covariance of the differences of heights over one step along both axes, at every lag.
+
+    It is the second difference along y and x of -r^2H / (1 - H). At long lags, where the differences of r^2H
+    cancel, they are summed from its derivatives: the relative error of the cut is 1e-8 at 24 spacings.
+    """
+    ny, nx = lattice.shape
+    y2, x2 = ((np.arange(n) * d) ** 2 for n, d in zip(lattice.shape, lattice.spacing, strict=True))
+    squares = y2[:, None] + x2
+    squares[0, 0] = 1.0
+    share = y2[:, None] / squares
+    covariance = np.zeros(lattice.shape)
+    for order in range(_DERIVATIVES, 1, -1):
+        covariance += np.polynomial.polynomial.polyval(share, _derivative(lattice.spacing, hurst, order))
+        covariance /= squares
+    covariance /= squares
+    covariance *= squares**hurst
+    near = [
+        min(n, int(_NEAR * max(lattice.spacing) / d) + 1)
+        for n, d in zip((ny, nx), lattice.spacing, strict=True)
+    ]
+    y, x = (np.abs(np.arange(-1, n + 1)) * d for n, d in zip(near, lattice.spacing, strict=True))
+    power = (y[:, None] ** 2 + x**2) ** hurst
+    covariance[: near[0], : near[1]] = np.diff(np.diff(power, 2, 0), 2, 1)
+    return np.asarray(covariance / (hurst - 1.0))
+
+
+def _derivative(spacing: tuple[float, float], hurst: float, order: int) -> Array:
+    """Return the derivatives of r^2H of one order in the second difference along both axes.
+
+    Coefficients of powers of y^2 / r^2; derivatives of order 2p along y and 2q along x, p + q equal to
+    `order`, times r^(2 order - 2H), and weighted as in the Taylor series of a second difference.
+    """
+    total = np.polynomial.Polynomial([0.0])
+    along_y = np.polynomial.Polynomial([0.0, 1.0])
+    for p in range(1, order):
+        q = order - p
+        weight = 4.0 * spacing[0] ** (2 * p) * spacing[1] ** (2 * q)
+        for i in range(p + 1):
+            for j in range(q + 1):
+                falling = float(np.prod(hurst - np.arange(2 * order - i - j)))
+                ways = factorial(i) * factorial(2 * p - 2 * i) * factorial(j) * factorial(2 * q - 2 * j)
+                factor = weight * falling * 4.0 ** (order - i - j) / ways
+                total += factor * along_y ** (p - i) * (1.0 - along_y) ** (q - j)
+    return np.asarray(total.coef)
 
 
 class Filling:

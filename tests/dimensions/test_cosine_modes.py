@@ -105,3 +105,29 @@ def test_gapped_modes_equal_dense_algebra(holes):
     result = gapped.score_covariance(weights, hurst)
     np.testing.assert_allclose(np.diag(result), np.diag(exact), rtol=0.05)
     assert abs(result[0, 1] - exact[0][1]) < 0.1 * np.sqrt(exact[0][0] * exact[1][1])
+
+
+@pytest.mark.parametrize("shape", [(9, 9), (40, 31)])
+@pytest.mark.parametrize("ratio", [1.0, 2.5])
+@pytest.mark.parametrize("hurst", [1.11, 1.5, 1.95])
+def test_expected_power_of_smooth_surface_equals_dense_covariance(shape, ratio, hurst):
+    lattice = _cosine_modes.Lattice.of(shape, (ratio, 1.0))
+    modes = orthonormal_modes(shape)
+    dense = squares(shape, (ratio, 1.0)) ** hurst / (hurst - 1.0)
+    expected = np.einsum("ki,ki->k", modes @ dense, modes)
+    np.testing.assert_allclose(_cosine_modes.expected_power(lattice, hurst).ravel(), expected, rtol=2e-6)
+
+
+@pytest.mark.parametrize("shape", [(800, 800), (1024, 1024), (1025, 1131)])
+def test_expected_power_of_large_smooth_surface(shape):
+    """Short waves have a power that does not depend on the size, the longest one as size^(2 H + 2)."""
+    small, large = (
+        _cosine_modes.expected_power(_cosine_modes.Lattice.of(s, (1.0, 1.0)), 1.95) for s in ((65, 65), shape)
+    )
+    assert large[-1, -1] == pytest.approx(small[-1, -1], rel=0.02)
+    square = _cosine_modes.expected_power(_cosine_modes.Lattice.of((shape[0] // 8,) * 2, (1.0, 1.0)), 1.95)
+    larger = _cosine_modes.expected_power(
+        _cosine_modes.Lattice.of((shape[0] // 8 * 8,) * 2, (1.0, 1.0)), 1.95
+    )
+    assert larger[0, 0] / square[0, 0] == pytest.approx(8.0**5.9, rel=0.01)
+    assert (large > 0.0).all()

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
 
@@ -135,3 +136,14 @@ def test_unfitted_noise_on_profile_widens_interval():
     assert "white noise" in note
     assert hurst < 0.85
     assert low < 0.9 < high
+
+
+@pytest.mark.parametrize("shape", [(800, 800), (1024, 1024), (1025, 1131)])
+@pytest.mark.parametrize("noise", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_large_smooth_surface_is_estimated(shape, noise):
+    """Here the expected power of a smooth surface once cancelled below zero."""
+    smooth = gaussian_filter(brownian(0.7, 7, shape), 0.7)
+    hurst, low, _, note = estimated(smooth, "likelihood", noise=noise)
+    assert np.isfinite(hurst)
+    assert np.isnan(low) or low <= 0.7
+    assert "changes with scale" in note or "negative" in note
