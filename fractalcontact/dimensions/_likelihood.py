@@ -175,6 +175,13 @@ def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     if chunk < smallest:
         return undefined(f"{chunk} points, at least {smallest} are needed")
     fit = _profile_likelihood.fit_profile(heights, noise=noise, chunk=chunk)
+    window: dict[str, Any] = {
+        "scale_min": stride * dx,
+        "scale_max": (chunk - 1) * stride * dx,
+        "window": "exact likelihood of all increments" if scales is None else _ASKED,
+    }
+    if fit.low > 1.0:
+        return Estimate(fit.hurst, ci_low=fit.low, ci_high=fit.high, **window)
     moments = increment_moments([(heights[None], 1)], (heights.size,))
     blocks = heterogeneity(moments, (1.0,), fit.hurst)
     low, high = blocks.widened(fit.hurst, fit.low, fit.high)
@@ -190,12 +197,10 @@ def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
         fit.standard_error * blocks.widening,
         low,
         high,
-        scale_min=stride * dx,
-        scale_max=(chunk - 1) * stride * dx,
         rms_increment=fit.rms_increment * float(stride) ** -fit.hurst * surface.unit,
         noise_height=float(np.sqrt(fit.noise)) * surface.unit if noise else np.nan,
-        window="exact likelihood of all increments" if scales is None else _ASKED,
         note=joined(noise_note, blocks.note, rounding_note),
+        **window,
     )
 
 

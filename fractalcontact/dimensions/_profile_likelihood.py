@@ -20,12 +20,18 @@ CHUNK = 256
 SMALLEST = 8  # observed points
 QUANTILE = 3.841458820694124  # 95 % quantile of chi square with one degree of freedom
 _LOWEST, _HIGHEST = 1e-3, 0.999
+_AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smoother than fractal ones
+_SMOOTHEST = 1.9
+_TILT = 20.0  # variance of a random tilt that is eliminated, in units of the largest covariance of increments
 _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
 
 
 @dataclass(frozen=True)
 class ProfileFit:
-    """Estimate of H; the interval is that of the profile likelihood, inside (0, 1)."""
+    """Estimate of H; the interval is that of the profile likelihood.
+
+    It lies inside (0, 1), unless the whole interval lies beyond 1: the profile is smoother than a fractal.
+    """
 
     hurst: float
     standard_error: float
@@ -58,12 +64,24 @@ def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> P
         return cache[hurst]
 
     hurst = minimum(lambda h: best(h)[0], _LOWEST, _HIGHEST)
+    if hurst > _AT_LIMIT:
+        smoother = minimum(lambda h: best(h)[0], 1.0 / _HIGHEST, _SMOOTHEST, 1e-3, points=5)
+        if best(smoother)[0] < best(_HIGHEST)[0] - QUANTILE:
+            return _smooth_fit(lambda h: best(h)[0], smoother)
     least, amplitude, level = best(hurst)
     low = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _LOWEST, 0.0)
     high = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _HIGHEST, 1.0)
     return ProfileFit(
         hurst, _standard_error(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
     )
+
+
+def _smooth_fit(deviance: Callable[[float], float], hurst: float) -> ProfileFit:
+    """Return the fit of a profile smoother than a fractal one; its increments do not scale with H."""
+    least = deviance(hurst)
+    low = crossing(lambda h: deviance(h) - least - QUANTILE, hurst, 1.0 / _HIGHEST, 1.0 / _HIGHEST)
+    high = crossing(lambda h: deviance(h) - least - QUANTILE, hurst, _SMOOTHEST, _SMOOTHEST)
+    return ProfileFit(hurst, np.nan, low, high, np.nan, np.nan)
 
 
 def _best_noise(increments: ProfileIncrements, hurst: float) -> tuple[float, float, float]:
@@ -137,7 +155,13 @@ class ProfileIncrements:
 def _covariance(positions: Array, hurst: float, noise: float) -> Array:
     """Return the covariance of the increments of each chunk: (chunks, size - 1, size - 1)."""
     distance = np.abs(positions[:, :, None] - positions[:, None, :]).astype(float)
-    heights = -0.5 * distance ** (2.0 * hurst)
+    if hurst < 1.0:
+        heights = -0.5 * distance ** (2.0 * hurst)
+    else:
+        # beyond H = 1 only contrasts without a tilt have a variance: a random tilt, eliminated later,
+        # keeps the matrix positive
+        tilt = _TILT * distance.max() ** (2.0 * hurst - 2.0)
+        heights = 0.5 * (distance ** (2.0 * hurst) - tilt * distance**2) / (hurst - 1.0)
     if noise:
         heights += noise * np.eye(positions.shape[1])
     return np.ascontiguousarray(

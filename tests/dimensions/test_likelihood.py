@@ -82,3 +82,21 @@ def test_short_rolloff_of_profile():
     covered = (result["ci_low"] <= 0.5) & (result["ci_high"] >= 0.5)
     assert float(covered.mean()) > 0.85
     assert abs(float(result["hurst"].mean()) - 0.5) < 0.04
+
+
+@pytest.mark.parametrize("noise", [False, True])
+def test_profile_smoother_than_fractal_has_no_interval(noise):
+    places = np.arange(200)
+    for heights in (np.sin(0.05 * places), (places - 80.0) ** 2):
+        result = estimate_one(surface_of(heights), noise=noise)
+        assert float(result.hurst) == 1.0
+        assert float(result.fitted_hurst) > 1.0
+        assert np.isnan([float(result[name]) for name in ("standard_error", "ci_low", "ci_high")]).all()
+        assert "no fractal" in result.ci_low.attrs["reason"]
+
+
+def test_smoothest_fractal_profiles_keep_their_interval():
+    profiles = fc.surfaces.fbm(256, 1e-3, hurst=0.95, rms_increment=1e-6, rng=8, members=10)
+    result = estimate(profiles)
+    assert (result.fitted_hurst < 1.0).all()
+    assert int(((result.ci_low <= 0.95) & (result.ci_high >= 0.95)).sum()) >= 8

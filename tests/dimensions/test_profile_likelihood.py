@@ -47,3 +47,22 @@ def test_threads_change_no_bit():
         with threads.limit(count):
             result.append(_profile_likelihood.fit_profile(heights))
     assert result[0] == result[1]
+
+
+def test_deviance_of_smooth_profile_equals_dense_contrasts():
+    """Second differences with weights that vanish on a straight line, of heights with the covariance r^2H."""
+    heights = np.cumsum(np.cumsum(np.random.default_rng(12).standard_normal(50)))
+    places = np.arange(50.0)
+    contrasts = np.diff(np.eye(50), 2, axis=0)
+    increments = _profile_likelihood.ProfileIncrements(heights)
+
+    def dense(hurst):
+        covariance = contrasts @ np.abs(places[:, None] - places) ** (2 * hurst) @ contrasts.T
+        covariance *= 0.5 / (hurst - 1.0)
+        values = contrasts @ heights
+        square = values @ np.linalg.solve(covariance, values)
+        return np.linalg.slogdet(covariance)[1] + values.size * np.log(square / values.size)
+
+    known = dense(1.2) - increments.solve(1.2, 0.0)[0]  # a constant: another choice of contrasts
+    for hurst in (1.05, 1.5, 1.85):
+        assert dense(hurst) - increments.solve(hurst, 0.0)[0] == pytest.approx(known, abs=1e-5)
