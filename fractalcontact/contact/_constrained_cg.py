@@ -14,21 +14,38 @@ Symbols are those of Polonsky and Keer where they have one:
     G      sum z g over the free set         beta   share of the last direction that is kept
     I_c    free set: 0 < p < p_max           p_max  hardness, infinite for an elastic surface
 
-One iteration takes these steps; the code cites them by number:
+One iteration takes these steps; the code cites them by number. What the paper does in the same place is on
+the right, in words, where it differs:
 
-    (1)  closure = sum p (u + h) / sum p over p < p_max under force control; objective 1/2 p u + p h
-    (2)  residual: (sum p max(g, 0) / sum p + largest overlap) / scale
-    (3)  free set I_c: 0 < p < p_max, and where admitted the nodes outside that violate the conditions
-    (4)  z = M (g - mean g) on I_c, less its mean under force control; z = g - mean g in the paper
-    (5)  G = sum z g; beta = G / G_old while the set does not change (delta in the paper), else 0
+    (1)  closure = sum p (u + h) / sum p over p < p_max under        mean of u + h over I_c
+         force control; objective 1/2 p u + p h
+    (2)  residual: (sum p max(g, 0) / sum p + largest overlap)       change of p in the last iteration
+         / scale
+    (3)  free set I_c: 0 < p < p_max, and where admitted the nodes   p > 0; overlapping nodes are given the
+         outside that violate the conditions                         pressure -tau g at the end of the step
+    (4)  z = M (g - mean g) on I_c, less its mean under force        z = g - mean g
+         control
+    (5)  G = sum z g; beta = G / G_old while the set does not        beta = delta G / G_old, delta = 0 after
+         change, else 0                                              nodes overlapped, else 1
     (6)  t = z + beta t on I_c, 0 elsewhere
-    (7)  r = K t
+    (7)  r = K t                                                     less the mean of r over I_c
     (8)  tau = sum t g / sum t r
-    (9)  p = p - tau t, projected onto 0 <= p <= p_max, with the force restored by a factor
-    (10) u = u - tau r where nothing was projected, else u = K p anew
+    (9)  p = p - tau t, projected onto 0 <= p <= p_max, with the     projected onto 0 <= p
+         force restored by a factor
+    (10) u = u - tau r where nothing was projected, else u = K p     u = K p anew
+         anew
 
-Differences from the paper: the preconditioner M, the rule (3) for new nodes, closure control, the bound
-p_max, step (10), which saves a transform, and a residual that bounds the error. What was tried:
+Differences from the paper:
+
+- The preconditioner M, closure control, the bound p_max, the rule (3) for new nodes, step (10), which saves a
+  transform, and the residual (2), which bounds the error.
+- The closure (1) is the mean of u + h weighted by the pressure, where the paper subtracts the plain mean gap
+  over I_c. At the solution both are the closure; before it, the weighted mean makes sum p g vanish over
+  p < p_max. The plain mean of g is still subtracted in (4).
+- No mean of r is subtracted for (8): under force control t adds up to zero, so that a constant in r does not
+  change sum t r.
+
+What was tried:
 
 - An iteration takes three pairs of transforms at most: K t, the preconditioner, and K p only where the step
   was projected. Otherwise the displacement follows the step, and two pairs do.
@@ -40,7 +57,7 @@ p_max, step (10), which saves a transform, and a residual that bounds the error.
   the set settles in a few changes. ADMIT_RATIO from 0.1 to 0.8 and FEW from 0.0003 to 0.01 give the same
   number of transforms within a tenth.
 - Conjugacy is kept while the set changes by less than SLIGHT_CHANGE; at n = 2048 that saves a sixth of the
-  transforms.
+  transforms. (Bugnicourt et al. 2018, Tribol. Lett. 66:29, never restart.)
 - Leaving slightly negative pressures unprojected, to save K p, saves a tenth of the transforms at best and
   cycles at worst: rejected.
 - Taking the last measured length for a step that will be projected, to save K t, makes an iteration cost two
@@ -64,8 +81,8 @@ from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped_simplex import project_onto_capped_simplex, uniform_on_lowest
-from fractalcontact.contact._operator import Operator
-from fractalcontact.contact._preconditioner import ExtensionPreconditioner, Preconditioner
+from fractalcontact.contact._operator import Operator, PeriodicOperator
+from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet, Preconditioner
 from fractalcontact.contact._scaled_problem import Control, Problem, Solution, sum_by_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -106,27 +123,28 @@ class ContactSystem:
         """Return the system of all nodes of a problem."""
         body = problem.body
         operator = body.operator(dtype)
-        # a periodic body shares its wavenumbers, and with them the array of the modes
-        preconditioner = ExtensionPreconditioner(body, dtype, getattr(operator, "multiplier", None))
+        # that of a periodic body serves both, with its array of the modes
+        multiplier = operator.multiplier if isinstance(operator, PeriodicOperator) else None
+        preconditioner = ExtensionPreconditioner(body, dtype, multiplier)
         scale = problem.local_compliance if local_compliance is None else local_compliance
         return cls(problem.gap, problem.p_max, operator, preconditioner, scale, dtype)
 
 
 @dataclass
-class Objective:
+class Evaluation:
     """The objective at the current pressure, with the sums and the closure that come with it."""
 
-    value: float
-    rounding: float  # of the value
+    objective: float
+    objective_rounding: float
     force: float  # sum p
-    work: float  # sum p u
+    work: float  # sum p u, twice the elastic energy
     closure: float
     scale: float  # of the error, a length
     residual_floor: float  # residual that rounding allows
 
 
 @dataclass
-class SetError:
+class GapSums:
     """The gap summed over a set of nodes: their number, sum g, sum g^2."""
 
     count: float
@@ -153,9 +171,17 @@ class Progress:
 class ConstrainedCG:
     """One run of the iteration.
 
-    The arrays are h, p, u, t, the modes inside a transform, and `work_array`, which holds in turn z (a free
-    body has a wider plane for it, `wide`), r = K t, and the pressure before a step that was projected. These
-    are all the arrays there are, so that a solution takes less than eight arrays beyond the heights.
+    The arrays are h, p, u, t, the modes inside a transform, and `work_array`, which holds several things in
+    turn, so that a solution takes less than eight arrays beyond the heights:
+
+        step                     p                     work_array
+        (1) to (3)               pressure              last p if its step was projected, else of no use
+        (4) to (6)               pressure              z (a free body has a wider plane for it, `wide`)
+        (7), (8)                 pressure              r = K t
+        (9), (10)                p - tau t             r
+        (9), (10) projected      projected p - tau t   p before the step: the two arrays are swapped
+
+    Going back from a projected step swaps the two again, and takes half the step in the same way.
     """
 
     def __init__(self, system: ContactSystem, control: Control, start: Array) -> None:
@@ -165,16 +191,17 @@ class ConstrainedCG:
         self.force_controlled = control.force is not None
         self.epsilon = float(np.finfo(self.dtype).eps)
         self.transforms_before = self.operator.transforms + self.preconditioner.transforms
-        self.blocks = self.preconditioner.bins[0]
+        self.blocks = self.preconditioner.bin_shape[0]
         self.block_sums = np.zeros((self.blocks, 8))
 
         shape = self.h.shape
         self.p = np.zeros(shape, dtype=self.dtype)  # pressure
         self.u = RELEASED  # displacement, see `update_displacement`
         self.t = np.zeros(shape, dtype=self.dtype)  # search direction
-        self.work_array = np.zeros(shape, dtype=self.dtype)  # z, r, or the pressure before a projected step
-        same_plane = self.preconditioner.plane == shape
-        self.wide = None if same_plane else np.zeros(self.preconditioner.plane, dtype=self.dtype)
+        self.work_array = np.zeros(shape, dtype=self.dtype)  # see the table above
+        plane = self.preconditioner.plane
+        self.wide = None if plane == shape else np.zeros(plane, dtype=self.dtype)
+        self.free_set = FreeSet.empty(plane, self.preconditioner.bin_shape, self.dtype)
         self.tau, self.G = 0.0, 0.0
         self.u_is_exact = False  # u = K p to rounding, not updated by steps
         self.projected = False  # the last step left the bounds and was projected
@@ -188,24 +215,24 @@ class ConstrainedCG:
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
         while iteration <= MAX_ITERATIONS:
-            objective = self.objective()  # (1)
-            if self.overshot(objective, progress):
+            evaluation = self.evaluate()  # (1)
+            if self.overshot(evaluation, progress):
                 self.backtrack()
                 continue
-            self.last_objective, self.halvings, self.projected = objective.value, 0, False
-            inside, outside, residual = self.kkt_residual(objective)  # (2)
+            self.last_objective, self.halvings, self.projected = evaluation.objective, 0, False
+            inside, outside, residual = self.kkt_residual(evaluation)  # (2)
             if residual <= tolerance:
                 if self.u_is_exact or not certify:
                     reason = "converged"
                     break
                 self.update_displacement()
                 continue
-            least_fall = SMALLEST_FALL * objective.rounding / (8 * self.epsilon)
-            progress.update(residual, objective.value, least_fall)
-            at_rounding = residual <= objective.residual_floor
+            least_fall = SMALLEST_FALL * evaluation.objective_rounding / (8 * self.epsilon)
+            progress.update(residual, evaluation.objective, least_fall)
+            at_rounding = residual <= evaluation.residual_floor
             iteration += 1
             patience = PATIENCE // 8 if at_rounding else PATIENCE
-            if progress.stalled <= patience and self.find_step(objective, inside, outside):  # (3) to (8)
+            if progress.stalled <= patience and self.find_step(evaluation, inside, outside):  # (3) to (8)
                 self.take_step()  # (9), (10)
             elif at_rounding or not self.preconditioned:
                 reason = "rounding" if at_rounding else "stagnated"
@@ -214,19 +241,19 @@ class ConstrainedCG:
                 self.preconditioned, self.G, progress.stalled = False, 0.0, 0
         if certify and not self.u_is_exact:
             self.update_displacement()
-            objective = self.objective()
-            residual = self.kkt_residual(objective)[2]
+            evaluation = self.evaluate()
+            residual = self.kkt_residual(evaluation)[2]
         transforms = self.operator.transforms + self.preconditioner.transforms - self.transforms_before
         return Solution(
             self.p,
             self.u,
-            objective.closure,
-            objective.force,
+            evaluation.closure,
+            evaluation.force,
             iteration,
             transforms,
             residual,
             reason,
-            objective.work,
+            evaluation.work,
         )
 
     # start
@@ -270,25 +297,26 @@ class ConstrainedCG:
 
     # objective and error
 
-    def objective(self) -> Objective:
+    def evaluate(self) -> Evaluation:
         """Return closure and objective (1), and the scale of the error."""
         sums = self.pass_sums(_kernels.objective_sums, self.h, self.u, self.p, self.p_max)
-        force, p_u, p_h, force_below, level = sums[:5]
-        value = 0.5 * p_u + p_h
+        force, p_u, p_h, force_below, p_level_below = sums[:5]  # below: over the nodes with p < p_max
+        objective = 0.5 * p_u + p_h
         if self.force_controlled:
-            closure = level / force_below if force_below > 0 else self.saturated_closure()
+            closure = p_level_below / force_below if force_below > 0 else self.saturated_closure()
         else:
             closure = self.control.value
-            value -= closure * force
+            objective -= closure * force
         scale = max(p_u / force if force > 0 else 0.0, force * self.local_compliance)
         rounding = 8 * self.epsilon * (abs(p_u) + abs(p_h) + abs(closure) * force)
         floor = 64 * self.epsilon * abs(closure) / scale if scale > 0 else 0.0
-        return Objective(value, rounding, force, p_u, closure, scale, floor)
+        return Evaluation(objective, rounding, force, p_u, closure, scale, floor)
 
     def saturated_closure(self) -> float:
-        """Return the least closure at which every loaded node is at p_max.
+        """Return the closure where every loaded node is at p_max: the greatest level u + h of those nodes.
 
-        Where an unloaded node is below a loaded one, which must change places: between the two.
+        Where an open node has a smaller level, return the mean of both; the next step then moves pressure
+        from the loaded node to the open one.
         """
         loaded, level = self.p > 0, self.u + self.h
         highest_loaded = float(level.max(where=loaded, initial=-np.inf))
@@ -297,19 +325,19 @@ class ConstrainedCG:
             return 0.0
         return highest_loaded if highest_loaded <= lowest_open else 0.5 * (highest_loaded + lowest_open)
 
-    def kkt_residual(self, objective: Objective) -> tuple[SetError, SetError, float]:
-        """Return the error inside the free set and outside of it, and the residual (2)."""
-        closure = self.dtype(objective.closure)
-        sums = self.pass_sums(_kernels.residual_sums, self.h, self.u, self.p, self.p_max, closure)
-        overlap = float(self.block_sums[:, 1].max())
-        inside, outside = SetError(*sums[2:5]), SetError(*sums[5:8])
-        if objective.force <= 0:
+    def kkt_residual(self, evaluation: Evaluation) -> tuple[GapSums, GapSums, float]:
+        """Return the gaps that should vanish, inside the free set and outside of it, and the residual (2)."""
+        state = (self.h, self.u, self.p, self.p_max, self.dtype(evaluation.closure))
+        sums, maxima = self.pass_sums_and_maxima(_kernels.residual_sums, *state)
+        overlap = float(maxima[1])
+        inside, outside = GapSums(*sums[2:5]), GapSums(*sums[5:8])
+        if evaluation.force <= 0:
             return inside, outside, float(overlap > 0)
-        return inside, outside, (float(sums[0]) / objective.force + overlap) / objective.scale
+        return inside, outside, (float(sums[0]) / evaluation.force + overlap) / evaluation.scale
 
     # search direction and step length
 
-    def find_step(self, objective: Objective, inside: SetError, outside: SetError) -> bool:
+    def find_step(self, evaluation: Evaluation, inside: GapSums, outside: GapSums) -> bool:
         """Find direction (3 to 6) and step length (7, 8); False where there is none."""
         mean_part = inside.g**2 / inside.count if self.force_controlled and inside.count else 0.0
         spread = max(inside.g2 - mean_part, 0.0)
@@ -319,43 +347,52 @@ class ConstrainedCG:
             count, g_sum = inside.count + outside.count, inside.g + outside.g
         if count == 0:
             return False
-        t_sum, t_g = self.search_direction(self.dtype(objective.closure), admit, count, g_sum)
-        self.tau = self.step_length(t_g)
+        t_sum, t_g = self.search_direction(self.dtype(evaluation.closure), admit, count, g_sum)
+        tau = self.step_length(t_g)
         if not self.force_controlled and t_g > 0 and t_sum > 0:
-            # full contact of a periodic body costs nothing to relieve: no further than to no force at all
-            self.tau = min(self.tau, 1.01 * objective.force / t_sum)
-        return self.tau < np.inf
+            # At full contact K t = 0 for uniform t, so tau is unbounded: limit the step to the one that
+            # removes the whole force (1 % more, so that it is clipped).
+            limit = 1.01 * evaluation.force / t_sum
+            tau = limit if tau is None else min(tau, limit)
+        if tau is None or not np.isfinite(tau):
+            return False
+        self.tau = tau
+        return True
 
     def search_direction(self, closure: Any, admit: bool, count: float, g_sum: float) -> tuple[float, float]:
-        """Set t = z + beta t on the free set (6), with the mean of z taken off; return sum t and sum t g."""
-        z, mean, beta = self.preconditioned_residual(closure, admit, count, g_sum)
-        mask, factors = self.preconditioner.mask, (self.dtype(mean), self.dtype(beta))
+        """Set t = z - constant + beta t on the free set (6); return sum t and sum t g."""
+        z, constant, beta = self.preconditioned_residual(closure, admit, count, g_sum)
+        mask, factors = self.free_set.mask, (self.dtype(constant), self.dtype(beta))
         sums = self.pass_sums(_kernels.search_direction, mask, z, *factors, self.h, self.u, closure, self.t)
         return sums[0], sums[1]
 
     def preconditioned_residual(
         self, closure: Any, admit: bool, count: float, g_sum: float
     ) -> tuple[Array, float, float]:
-        """Return z (3, 4), what is to be taken off it, and beta (5).
+        """Return z (3, 4), the constant to subtract from it, and beta (5).
 
-        Taken off is its mean under force control, and a negative number where the mean must be driven; beta
-        is zero where the set has changed.
+        Force control: its mean. Closure control of a periodic body: minus the uniform pressure that closes
+        the mean gap.
         """
-        pre, shift = self.preconditioner, self.dtype(g_sum / count if self.force_controlled else 0.0)
+        shift = self.dtype(g_sum / count if self.force_controlled else 0.0)
+        bin_columns, free = self.preconditioner.bin_columns, self.free_set
         plane = self.work_array if self.wide is None else self.wide
         if self.wide is not None:  # the margin of a free body
             plane[self.h.shape[0] :] = 0
             plane[:, self.h.shape[1] :] = 0
         state = (self.h, self.u, self.p, self.p_max, closure, admit, shift)
-        bins = (pre.mask, plane, pre.sums, pre.counts)
-        changes = self.pass_sums(_kernels.select_free_set, pre.columns, *state, *bins)[0]  # (3)
-        plane, extra = pre.apply(plane) if self.preconditioned else (plane, np.zeros_like(pre.sums))
+        written = (free.mask, plane, free.bin_sums, free.bin_counts)
+        changes = self.pass_sums(_kernels.select_free_set, bin_columns, *state, *written)[0]  # (3)
+        if self.preconditioned:
+            plane, extra = self.preconditioner.apply(plane, free)
+        else:
+            extra = np.zeros_like(free.bin_sums)
         if self.wide is None:
             self.work_array = plane
         else:
             self.wide = plane
         arrays = (self.h, self.u, self.t, closure, plane)
-        z_sum, z_g, t_sum = self.pass_sums(_kernels.add_bins, pre.columns, pre.mask, extra, *arrays)[:3]
+        z_sum, z_g, t_sum = self.pass_sums(_kernels.add_bins, bin_columns, free.mask, extra, *arrays)[:3]
         mean = z_sum / count if self.force_controlled else -self.uniform_pressure(g_sum)
         G_old, self.G = self.G, float(z_g - mean * g_sum)  # (5), z with its mean taken off
         beta = self.G / G_old if changes <= SLIGHT_CHANGE * count and G_old > 0 else 0.0
@@ -368,16 +405,16 @@ class ConstrainedCG:
         The elastic operator of a periodic body leaves out the mean, whose stiffness grows without bound
         towards full contact.
         """
-        displacement = self.preconditioner.mean_displacement()
-        return g_sum / displacement if displacement > 0 else 0.0
+        displacement = self.preconditioner.summed_displacement(self.free_set)
+        return g_sum / displacement if displacement is not None and displacement > 0 else 0.0
 
-    def step_length(self, t_g: float) -> float:
-        """Compute r = K t (7) and return tau = sum t g / sum t r (8); infinite where t does not descend."""
+    def step_length(self, t_g: float) -> float | None:
+        """Compute r = K t (7) and return tau = sum t g / sum t r (8); None where t does not descend."""
         out = self.work_array if fft.writes_in_place() else None
         self.work_array = RELEASED
         self.work_array = self.operator.apply(self.t, out)  # r (7)
         t_r = self.pass_sums(_kernels.curvature, self.t, self.work_array)[0]
-        return float(t_g / t_r) if t_r > 0 and t_g > 0 else np.inf
+        return float(t_g / t_r) if t_r > 0 and t_g > 0 else None
 
     # step
 
@@ -397,7 +434,7 @@ class ConstrainedCG:
     def project_onto_bounds(self, force: float) -> None:
         """Take the projected step, whose sum is `force`, and restore the imposed force (9).
 
-        The pressure before the step is kept in `work_array`.
+        The new pressure is written into `work_array`, which then changes places with p.
         """
         imposed = self.control.value
         if self.force_controlled and self.p_max < np.inf:
@@ -414,22 +451,24 @@ class ConstrainedCG:
 
     def project_onto_capped_simplex(self, imposed: float) -> None:
         """Take the projected step under a bound p_max; the free set shares the force that this takes off."""
-        free = self.preconditioner.mask[: self.h.shape[0], : self.h.shape[1]]
+        free = self.free_set.mask[: self.h.shape[0], : self.h.shape[1]]
         np.copyto(self.work_array, self.p)
         values = self.p[free] - self.tau * self.t[free].astype(np.float64)
         rest = sum_by_rows(np.where(free, 0, self.p))
         self.work_array[free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
 
-    def overshot(self, objective: Objective, progress: Progress) -> bool:
+    def overshot(self, evaluation: Evaluation, progress: Progress) -> bool:
         """Return whether the last projected step has raised the objective and can be halved."""
         if not self.projected or self.halvings >= MAX_HALVINGS:
             return False
-        # nodes may change places without end at one level of the objective: then it must fall
-        slack = objective.rounding if progress.stalled < PATIENCE // 4 else -objective.rounding
-        return objective.value > self.last_objective + slack
+        # Near a stall, require a strict decrease; otherwise nodes may enter and leave in a cycle at constant
+        # objective.
+        rounding = evaluation.objective_rounding
+        slack = rounding if progress.stalled < PATIENCE // 4 else -rounding
+        return evaluation.objective > self.last_objective + slack
 
     def backtrack(self) -> None:
-        """Go back half of the last projected step."""
+        """Go back half of the last projected step; `work_array` must still hold the pressure before it."""
         self.halvings += 1
         self.tau /= 2
         self.G = 0.0
@@ -442,9 +481,13 @@ class ConstrainedCG:
 
     def pass_sums(self, kernel: Any, *arguments: Any) -> Array:
         """Run a kernel over all blocks and add up its sums, block after block."""
-        rows = self.preconditioner.rows
+        return self.pass_sums_and_maxima(kernel, *arguments)[0]
+
+    def pass_sums_and_maxima(self, kernel: Any, *arguments: Any) -> tuple[Array, Array]:
+        """Run a kernel over all blocks; return the sums of its columns over the blocks, and their maxima."""
+        rows = self.preconditioner.bin_rows
         in_bands(kernel, self.blocks, self.h.size, rows, *arguments, self.block_sums)
-        return np.asarray(self.block_sums.sum(axis=0))
+        return np.asarray(self.block_sums.sum(axis=0)), np.asarray(self.block_sums.max(axis=0))
 
 
 def subtract_step(start: int, stop: int, x: Array, t: Array, tau: Any) -> None:

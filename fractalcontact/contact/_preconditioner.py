@@ -1,4 +1,4 @@
-"""Preconditioners: nearly the pressure on a set of nodes that makes a given displacement there.
+"""Approximate inverse of the elastic operator on a set of nodes.
 
 The inverse of the half-space is |q|/2. On a set of nodes that is not the whole plane the exact inverse is
 
@@ -18,6 +18,7 @@ which costs a sixteenth of a transform.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -36,45 +37,58 @@ FADE = 0.04
 MARGIN = 8  # a free body has n/MARGIN more nodes for the extension beyond its edges
 
 
-class Preconditioner(Protocol):
-    """A preconditioner, with the arrays from which it reads the free set and the gap over the bins."""
+@dataclass(frozen=True)
+class FreeSet:
+    """The free set I_c on the plane of a preconditioner, and sums over its bins.
 
-    rows: int
-    columns: int
-    bins: tuple[int, int]
+    The solver owns it and writes it in the pass that selects the set (`_kernels.select_free_set`).
+    """
+
+    mask: Array  # of the plane: the free nodes
+    bin_sums: Array  # of the bins: the gap on the set, summed
+    bin_counts: Array  # of the bins: the number of free nodes
+
+    @classmethod
+    def empty(cls, plane: tuple[int, int], bin_shape: tuple[int, int], dtype: Any) -> FreeSet:
+        """Return a set without nodes."""
+        return cls(np.zeros(plane, np.bool_), np.zeros(bin_shape, dtype), np.zeros(bin_shape, dtype))
+
+
+class Preconditioner(Protocol):
+    """A preconditioner on a plane of `plane` nodes, in `bin_shape` bins of bin_rows x bin_columns nodes."""
+
     plane: tuple[int, int]
-    mask: Array
-    sums: Array
-    counts: Array
+    bin_rows: int
+    bin_columns: int
+    bin_shape: tuple[int, int]
     transforms: int
 
-    def apply(self, x: Array) -> tuple[Array, Array]:
-        """Return the pressure for the gap x on the set in `mask`, and what each bin adds to it on the set."""
+    def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
+        """Return the pressure for the gap x on a set, and what each bin adds to it on the set."""
         ...
 
-    def mean_displacement(self) -> float:
-        """Return the summed displacement under unit pressure on the set; infinite where it is not needed."""
+    def summed_displacement(self, free_set: FreeSet) -> float | None:
+        """Return the summed displacement under unit pressure on the set; None where it is not needed."""
         ...
 
 
 class ExtensionPreconditioner:
-    """Extension, |q|/2, and the transpose of the extension, on the plane of a body.
+    """Extension, |q|/2, and the transpose of the extension, on the plane of a body."""
 
-    `mask` is the free set, `sums` and `counts` are the gap and the number of free nodes over the bins: the
-    solver fills them in the pass that selects the free set.
-    """
-
-    def __init__(self, body: Body, dtype: Any, wavenumbers: WavenumberMultiplier | None = None) -> None:
-        self.rows, self.columns = (bin_edge(body, axis) for axis in (0, 1))
+    def __init__(self, body: Body, dtype: Any, multiplier: WavenumberMultiplier | None = None) -> None:
+        self.bin_rows, self.bin_columns = (bin_edge(body, axis) for axis in (0, 1))
         self.plane = body.shape
         if not body.periodic:
-            self.plane = (padded_plane(body.shape[0], self.rows), padded_plane(body.shape[1], self.columns))
-        self.bins = (-(-self.plane[0] // self.rows), -(-self.plane[1] // self.columns))
-        self.wavenumbers = wavenumbers or WavenumberMultiplier(self.plane, body.spacing)
-        edge = (self.rows * body.spacing[0], self.columns * body.spacing[1])
+            self.plane = (
+                padded_plane(body.shape[0], self.bin_rows),
+                padded_plane(body.shape[1], self.bin_columns),
+            )
+        self.bin_shape = (-(-self.plane[0] // self.bin_rows), -(-self.plane[1] // self.bin_columns))
+        self.multiplier = multiplier or WavenumberMultiplier(self.plane, body.spacing)
+        edge = (self.bin_rows * body.spacing[0], self.bin_columns * body.spacing[1])
         q = np.hypot(
-            fft.wavenumbers(self.bins[0], edge[0])[:, None],
-            fft.wavenumbers(self.bins[1], edge[1], real=True)[None, :],
+            fft.wavenumbers(self.bin_shape[0], edge[0])[:, None],
+            fft.wavenumbers(self.bin_shape[1], edge[1], real=True)[None, :],
         )
         self.kernel = np.exp(-DECAY * np.sqrt(edge[0] * edge[1]) * q).astype(dtype)
         q[0, 0] = np.inf
@@ -83,62 +97,66 @@ class ExtensionPreconditioner:
         extent = np.sqrt(self.plane[0] * body.spacing[0] * self.plane[1] * body.spacing[1])
         # that of a flat block under a rigid flat; a periodic body has no stiffness for its mean
         self.mean_stiffness = 1.0 / float(extent)
-        self.mask = np.zeros(self.plane, dtype=np.bool_)
-        self.sums, self.counts = (np.zeros(self.bins, dtype=dtype) for _ in range(2))
         self.dtype = dtype
         self.transforms = 0
 
-    def smoothed(self, bins: Array) -> Array:
+    def smooth(self, bins: Array) -> Array:
         """Apply the Poisson kernel G to the bins."""
         modes = fft.rfft2(bins)
         modes *= self.kernel
-        return fft.irfft2(modes, self.bins, overwrite=True)
+        return fft.irfft2(modes, self.bin_shape, overwrite=True)
 
-    def apply(self, x: Array) -> tuple[Array, Array]:
-        """Return the pressure for the gap x on the set, whose sums and counts over the bins are filled in.
+    def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
+        """Return the pressure for the gap x on a set, whose sums over the bins are those of x.
 
         Returns the plane (x is overwritten) and, over the bins, what is to be added to it on the set: the
         transpose of the extension.
         """
         self.transforms += 1
-        cells = self.dtype(self.rows * self.columns)
-        weight = 1 / (np.maximum(self.smoothed(self.counts), 0) + self.dtype(FADE) * cells)
-        extension = self.smoothed(self.sums)
+        bin_nodes = self.dtype(self.bin_rows * self.bin_columns)
+        weight = 1 / (np.maximum(self.smooth(free_set.bin_counts), 0) + self.dtype(FADE) * bin_nodes)
+        extension = self.smooth(free_set.bin_sums)
         extension *= weight
         size = self.plane[0] * self.plane[1]
-        grid = (self.rows, self.columns, self.mask)
-        in_bands(_kernels.fill_outside, self.bins[0], size, *grid, extension, x)
-        pressure = self.wavenumbers.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
-        in_bands(_kernels.sum_outside, self.bins[0], size, *grid, pressure, self.sums)
-        weight *= self.sums
-        return pressure, self.smoothed(weight)
+        grid = (self.bin_rows, self.bin_columns, free_set.mask)
+        in_bands(_kernels.fill_outside, self.bin_shape[0], size, *grid, extension, x)
+        pressure = self.multiplier.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
+        outside = extension  # the array is not needed any more
+        in_bands(_kernels.sum_outside, self.bin_shape[0], size, *grid, pressure, outside)
+        weight *= outside
+        return pressure, self.smooth(weight)
 
-    def mean_displacement(self) -> float:
-        """Return roughly the summed displacement under unit pressure on the set (periodic bodies)."""
+    def summed_displacement(self, free_set: FreeSet) -> float | None:
+        """Return roughly the summed displacement under unit pressure on the set; None for a free body.
+
+        The elastic operator of a free body has its mean displacement, and needs no correction for it.
+        """
         if self.compliance is None:
-            return float("inf")
-        modes = fft.rfft2(self.counts)
+            return None
+        counts = free_set.bin_counts
+        modes = fft.rfft2(counts)
         modes *= self.compliance
-        displacement = fft.irfft2(modes, self.bins, overwrite=True) / (self.rows * self.columns)
-        count = float(self.counts.sum())
+        displacement = fft.irfft2(modes, self.bin_shape, overwrite=True) / (self.bin_rows * self.bin_columns)
+        count = float(counts.sum())
         size = self.plane[0] * self.plane[1]
         own = self.self_compliance * count * (1.0 - count / size)
-        return float(np.sum(np.sum(self.counts * displacement, axis=1), dtype=np.float64)) + own
+        return float(np.sum(np.sum(counts * displacement, axis=1), dtype=np.float64)) + own
 
     def apply_to_all(self, gap: Array) -> Array:
         """Return the pressure for a gap on a body whose nodes are all free."""
         ny, nx = gap.shape
-        self.mask[:ny, :nx] = True
+        free_set = FreeSet.empty(self.plane, self.bin_shape, self.dtype)
+        free_set.mask[:ny, :nx] = True
         x = np.zeros(self.plane, dtype=self.dtype)
         x[:ny, :nx] = gap
-        padded = np.zeros((self.bins[0] * self.rows, self.bins[1] * self.columns), dtype=self.dtype)
-        shape = (self.bins[0], self.rows, self.bins[1], self.columns)
+        shape = (self.bin_shape[0], self.bin_rows, self.bin_shape[1], self.bin_columns)
+        padded = np.zeros((shape[0] * shape[1], shape[2] * shape[3]), dtype=self.dtype)
         padded[:ny, :nx] = gap
-        self.sums[...] = padded.reshape(shape).sum(axis=(1, 3))
+        free_set.bin_sums[...] = padded.reshape(shape).sum(axis=(1, 3))
         padded[:ny, :nx] = 1
-        self.counts[...] = padded.reshape(shape).sum(axis=(1, 3))
-        pressure, extra = self.apply(x)
-        per_node = np.repeat(np.repeat(extra, self.rows, axis=0), self.columns, axis=1)
+        free_set.bin_counts[...] = padded.reshape(shape).sum(axis=(1, 3))
+        pressure, extra = self.apply(x, free_set)
+        per_node = np.repeat(np.repeat(extra, self.bin_rows, axis=0), self.bin_columns, axis=1)
         return np.asarray(pressure[:ny, :nx] + per_node[:ny, :nx])
 
 
@@ -147,19 +165,17 @@ class NodePreconditioner:
 
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.pairs = PairSum(table, iy, ix)
-        self.rows, self.columns, self.bins = 1, iy.size, (1, 1)
         self.plane = (1, int(iy.size))
-        self.mask = np.zeros(self.plane, dtype=np.bool_)
-        self.sums, self.counts, self.no_bins = (np.zeros(self.bins) for _ in range(3))
+        self.bin_rows, self.bin_columns, self.bin_shape = 1, int(iy.size), (1, 1)
         self.transforms = 0
 
-    def apply(self, x: Array) -> tuple[Array, Array]:
-        """Return the pressure for the gap x on the set in `mask`; nothing is added over the bins."""
-        return self.pairs.sum_at(x, np.flatnonzero(self.mask)), self.no_bins
+    def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
+        """Return the pressure for the gap x on a set; nothing is added over the bins."""
+        return self.pairs.sum_at(x, np.flatnonzero(free_set.mask)), np.zeros(self.bin_shape)
 
-    def mean_displacement(self) -> float:
-        """Return infinity: the mean of a free body needs no correction."""
-        return float("inf")
+    def summed_displacement(self, free_set: FreeSet) -> float | None:  # noqa: ARG002
+        """Return None: the mean of a free body needs no correction."""
+        return None
 
 
 def stiffness_table(body: Body) -> Array:

@@ -6,7 +6,7 @@ import pytest
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.contact import _constrained_cg, _window_solver
-from fractalcontact.contact._preconditioner import ExtensionPreconditioner
+from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
 from fractalcontact.contact._scaled_problem import Body
 
 MODULUS = 1e9
@@ -26,17 +26,17 @@ def press(surface, **options):
 def preconditioned(body, free):
     """Matrix of the preconditioner on a set."""
     precondition = ExtensionPreconditioner(body, np.float64)
-    rows, columns = precondition.rows, precondition.columns
+    rows, columns = precondition.bin_rows, precondition.bin_columns
     nodes = np.argwhere(free)
     matrix = np.empty((len(nodes), len(nodes)))
     for k, (i, j) in enumerate(nodes):
-        precondition.mask[: free.shape[0], : free.shape[1]] = free
+        free_set = FreeSet.empty(precondition.plane, precondition.bin_shape, np.float64)
+        free_set.mask[: free.shape[0], : free.shape[1]] = free
         plane = np.zeros(precondition.plane)
         plane[i, j] = 1.0
-        precondition.sums[...], precondition.counts[...] = 0.0, 0.0
-        precondition.sums[i // rows, j // columns] = 1.0
-        np.add.at(precondition.counts, (nodes[:, 0] // rows, nodes[:, 1] // columns), 1.0)
-        plane, extra = precondition.apply(plane)
+        free_set.bin_sums[i // rows, j // columns] = 1.0
+        np.add.at(free_set.bin_counts, (nodes[:, 0] // rows, nodes[:, 1] // columns), 1.0)
+        plane, extra = precondition.apply(plane, free_set)
         full = plane[: free.shape[0], : free.shape[1]].copy()
         full += extra[np.arange(free.shape[0])[:, None] // rows, np.arange(free.shape[1])[None, :] // columns]
         matrix[:, k] = full[free]
@@ -140,8 +140,8 @@ def test_failing_preconditioner_is_dropped(monkeypatch, fault, boundary):
     sound = press(surface, **options)
     original, rng = ExtensionPreconditioner.apply, np.random.default_rng(0)
 
-    def faulty(self, x):
-        plane, extra = original(self, x)
+    def faulty(self, x, free_set):
+        plane, extra = original(self, x, free_set)
         return (-plane, -extra) if fault == "sign" else (rng.normal(size=plane.shape), extra)
 
     monkeypatch.setattr(_window_solver, "FEW_NODES", 0)
