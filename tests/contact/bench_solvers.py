@@ -15,10 +15,10 @@ pressure alone, in the same way for all:
     complementarity = sum of p (g - min g) / (sum of p * standard deviation of the heights),
 
 where g is the displacement under p less the heights. The time of a solver is that of its first tolerance with
-an error of at most `--target`; along a path the greatest error counts. Then all solvers run in turn,
-`--repeats` times, and the ratio to this solver is formed within each turn. The clock covers the solution: for
-the other solvers without their set-up (but ASPHER's nested mode sets up inside), for this solver all of
-`press`, labels included.
+an error of at most `--target`; along a path the greatest error counts. Then all solvers run one after the
+other, `--repeats` times, and the ratio to this solver is formed within each repeat. The clock covers the
+solution: for the other solvers without their set-up (but ASPHER's nested mode sets up inside), for this
+solver all of `press`, labels included.
 
 Each number of threads is a process of its own, bound to as many processors. Memory is the peak of a process
 that does nothing else, less what it had before. Transforms are pairs on the finest grid, where a solver
@@ -45,8 +45,8 @@ import numpy as np
 
 LOADS = (0.001, 0.01, 0.03)
 PATH = tuple(np.geomspace(0.0005, 0.05, 20).tolist())
-LADDER = tuple(digit * 10.0**-k for k in range(3, 10) for digit in (3, 1))  # ever tighter
-OURS = "fractalcontact"
+TOLERANCES = tuple(digit * 10.0**-k for k in range(3, 10) for digit in (3, 1))  # ever tighter
+THIS_SOLVER = "fractalcontact"
 # pressures and pairs of transforms (nan where the solver does not tell), step after step
 Answer = Iterator[tuple[np.ndarray, float]]
 
@@ -218,7 +218,7 @@ def contactmechanics(method: str) -> Callable[[Case, np.ndarray], Callable[[floa
 
 
 SOLVERS: dict[str, tuple[str, Callable[[Case, np.ndarray], Callable[[float], Answer]]]] = {
-    OURS: ("fractalcontact", fractalcontact),
+    THIS_SOLVER: ("fractalcontact", fractalcontact),
     "aspher precond": ("aspher", aspher("precond", "double")),
     "aspher nested": ("aspher", aspher("nested", "double")),
     "aspher nested float": ("aspher", aspher("nested", "float_then_double")),
@@ -268,19 +268,21 @@ def timed(
 
 
 def compare(case: Case, names: list[str], options: argparse.Namespace) -> list[dict[str, Any]]:
-    """Run all solvers on one case: down the ladder, then in turn at the tolerance that meets the target."""
+    """Run all solvers on one case: a sweep of tolerances, then repeats at the one that meets the target."""
     heights = case.heights
     judge, rows = Judge(case, heights), []
     solves = {name: SOLVERS[name][1](case, heights) for name in names}
     met: dict[str, float] = {}
     for name, solve in solves.items():
-        for tolerance in LADDER:
+        for tolerance in TOLERANCES:
             loosest = 3 * options.target if case.start == "path" else options.loosest  # a path draws no curve
             if tolerance > 1.01 * min(loosest, options.loosest):
                 continue
             seconds, pressures, pairs = timed(solve, tolerance, options)
             error = max(judge(pressure) for pressure in pressures)
-            rows.append(row(case, name, options.threads, "ladder", tolerance, error, seconds, pairs))
+            rows.append(
+                record(case, name, options.threads, "tolerance sweep", tolerance, error, seconds, pairs)
+            )
             if error <= options.target:
                 met.setdefault(name, tolerance)
             if error <= options.target * options.beyond or seconds > options.patience:
@@ -289,11 +291,11 @@ def compare(case: Case, names: list[str], options: argparse.Namespace) -> list[d
         for name, tolerance in met.items():
             seconds, pressures, pairs = timed(solves[name], tolerance, options)
             error = max(judge(pressure) for pressure in pressures)
-            rows.append(row(case, name, options.threads, "turn", tolerance, error, seconds, pairs))
+            rows.append(record(case, name, options.threads, "repeat", tolerance, error, seconds, pairs))
     return rows
 
 
-def row(
+def record(
     case: Case, name: str, threads: int, kind: str, tolerance: float, error: float, *cost: float
 ) -> dict[str, Any]:
     """One run as a line of the table."""
@@ -311,7 +313,7 @@ def worker(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dict[s
     return compare(case, names, options)
 
 
-def footprint(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dict[str, Any]]:
+def peak_memory(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dict[str, Any]]:
     """Peak memory of one solve beyond what was there before, in arrays of n x n doubles."""
     options, case, (name,) = arguments
     warm = Case(128, case.boundary, "cold", (0.01,), 0)
@@ -322,7 +324,7 @@ def footprint(arguments: tuple[argparse.Namespace, Case, list[str]]) -> list[dic
     for _ in SOLVERS[name][1](case, heights)(1e-6):
         pass
     arrays = (max(status("VmHWM"), 0) - before) / heights.nbytes
-    return [row(case, name, options.threads, "memory", 1e-6, np.nan, np.nan, np.nan) | {"arrays": arrays}]
+    return [record(case, name, options.threads, "memory", 1e-6, np.nan, np.nan, np.nan) | {"arrays": arrays}]
 
 
 def status(field: str) -> int:
@@ -358,35 +360,35 @@ def cases(options: argparse.Namespace) -> Iterator[Case]:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """Medians over turns and seeds, and the ratios to this solver within each turn."""
+    """Medians over repeats and seeds, and the ratios to this solver within each repeat."""
     lines = [
         f"{'threads n boundary start load':36} {'solver':22} {'seconds':>9} {'pairs a step':>12} "
-        f"{'error':>8} {'ours/theirs':>11} {'arrays':>6}"
+        f"{'error':>8} {'this/other':>11} {'arrays':>6}"
     ]
     groups: dict[tuple[Any, ...], dict[str, list[dict[str, Any]]]] = {}
-    for one in rows:
-        load = one["loads"] if one["start"] == "cold" else "path"
-        key = (one["threads"], one["n"], one["boundary"], one["start"], load)
-        if one["kind"] == "turn":
-            groups.setdefault(key, {}).setdefault(one["solver"], []).append(one)
+    for row in rows:
+        load = row["loads"] if row["start"] == "cold" else "path"
+        key = (row["threads"], row["n"], row["boundary"], row["start"], load)
+        if row["kind"] == "repeat":
+            groups.setdefault(key, {}).setdefault(row["solver"], []).append(row)
     memory = {
-        (one["n"], one["boundary"], one["solver"]): one["arrays"] for one in rows if one["kind"] == "memory"
+        (row["n"], row["boundary"], row["solver"]): row["arrays"] for row in rows if row["kind"] == "memory"
     }
     for key, solvers in groups.items():
         for name, runs in solvers.items():
             ratios = [
-                ours["seconds"] / theirs["seconds"]
-                for ours, theirs in zip(solvers.get(OURS, []), runs, strict=False)
-                if ours["seed"] == theirs["seed"]
+                this["seconds"] / other["seconds"]
+                for this, other in zip(solvers.get(THIS_SOLVER, []), runs, strict=False)
+                if this["seed"] == other["seed"]
             ]
-            middle = {
+            median = {
                 item: statistics.median(run[item] for run in runs) for item in ("seconds", "pairs", "error")
             }
-            held, ratio = memory.get((key[1], key[2], name), np.nan), statistics.median(ratios or [np.nan])
+            arrays, ratio = memory.get((key[1], key[2], name), np.nan), statistics.median(ratios or [np.nan])
             lines.append(
-                f"{' '.join(map(str, key)):36} {name:22} {middle['seconds']:9.3f} "
-                f"{middle['pairs'] / runs[0]['steps']:12.1f} {middle['error']:8.1e} "
-                f"{ratio:11.3f} {held:6.1f}"
+                f"{' '.join(map(str, key)):36} {name:22} {median['seconds']:9.3f} "
+                f"{median['pairs'] / runs[0]['steps']:12.1f} {median['error']:8.1e} "
+                f"{ratio:11.3f} {arrays:6.1f}"
             )
     return "\n".join([*lines, *totals(groups), *growth(rows)])
 
@@ -397,29 +399,31 @@ def totals(groups: dict[tuple[Any, ...], dict[str, list[dict[str, Any]]]]) -> It
     for (threads, n, boundary, start, load), solvers in groups.items():
         if start == "cold":
             for name, runs in solvers.items():
-                middle = statistics.median(run["seconds"] for run in runs)
-                sums.setdefault((threads, n, boundary), {}).setdefault(name, {})[load] = middle
+                median = statistics.median(run["seconds"] for run in runs)
+                sums.setdefault((threads, n, boundary), {}).setdefault(name, {})[load] = median
     for key, solvers in sums.items():
-        ours = solvers.get(OURS, {})
+        this_solver = solvers.get(THIS_SOLVER, {})
         for package in ("aspher", "tamaas", "contactmechanics"):
-            whole = {
-                k: v for k, v in solvers.items() if k.startswith(package) and ours and v.keys() == ours.keys()
+            complete = {
+                k: v
+                for k, v in solvers.items()
+                if k.startswith(package) and this_solver and v.keys() == this_solver.keys()
             }
-            if whole:
-                best = min(whole, key=lambda name: sum(whole[name].values()))
-                ratio = sum(ours.values()) / sum(whole[best].values())
-                yield f"threads {key[0]} n {key[1]} {key[2]}: all loads, ours / {best} = {ratio:.3f}"
+            if complete:
+                best = min(complete, key=lambda name: sum(complete[name].values()))
+                ratio = sum(this_solver.values()) / sum(complete[best].values())
+                yield f"threads {key[0]} n {key[1]} {key[2]}: all loads, this solver / {best} = {ratio:.3f}"
 
 
 def growth(rows: list[dict[str, Any]]) -> Iterator[str]:
     """Exponent with which the pairs of transforms grow with n, least squares over the sizes."""
-    for name in dict.fromkeys(one["solver"] for one in rows):
+    for name in dict.fromkeys(row["solver"] for row in rows):
         for boundary in ("periodic", "free"):
             runs = [
-                (one["n"], one["pairs"], one["loads"])
-                for one in rows
-                if (one["kind"], one["start"], one["solver"], one["boundary"])
-                == ("turn", "cold", name, boundary)
+                (row["n"], row["pairs"], row["loads"])
+                for row in rows
+                if (row["kind"], row["start"], row["solver"], row["boundary"])
+                == ("repeat", "cold", name, boundary)
             ]
             if len({n for n, _, _ in runs}) > 1 and all(np.isfinite(pairs) for _, pairs, _ in runs):
                 for load in dict.fromkeys(load for _, _, load in runs):
@@ -435,42 +439,50 @@ def draw(rows: list[dict[str, Any]], target: float, path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    threads = min(one["threads"] for one in rows)
-    kept = [one for one in rows if one["threads"] == threads and one["kind"] != "memory"]
-    subjects = list(dict.fromkeys((one["boundary"], one["start"]) for one in kept))
+    threads = min(row["threads"] for row in rows)
+    kept = [row for row in rows if row["threads"] == threads and row["kind"] != "memory"]
+    subjects = list(dict.fromkeys((row["boundary"], row["start"]) for row in kept))
     figure, axes = plt.subplots(len(subjects), 3, figsize=(15, 4.2 * len(subjects)), squeeze=False)
     for line, (boundary, start) in zip(axes, subjects, strict=True):
-        here = [one for one in kept if (one["boundary"], one["start"]) == (boundary, start)]
-        loads = sorted({one["loads"] for one in here}, key=lambda text: float(text.split()[0]))
+        here = [row for row in kept if (row["boundary"], row["start"]) == (boundary, start)]
+        loads = sorted({row["loads"] for row in here}, key=lambda text: float(text.split()[0]))
         load = loads[len(loads) // 2]
-        here = [one for one in here if one["loads"] == load]
-        n = max(one["n"] for one in here)
+        here = [row for row in here if row["loads"] == load]
+        n = max(row["n"] for row in here)
         for colour, name in enumerate(SOLVERS):
-            runs = [one for one in here if one["solver"] == name]
-            look = {"color": f"C{colour}", "label": name, "marker": "o", "ms": 4, "lw": 1 + (name == OURS)}
+            runs = [row for row in here if row["solver"] == name]
+            look = {
+                "color": f"C{colour}",
+                "label": name,
+                "marker": "o",
+                "ms": 4,
+                "lw": 1 + (name == THIS_SOLVER),
+            }
             curve = sorted(
-                (one["tolerance"], one["error"], one["seconds"])
-                for one in runs
-                if one["n"] == n and one["kind"] == "ladder" and one["seed"] == min(o["seed"] for o in runs)
+                (row["tolerance"], row["error"], row["seconds"])
+                for row in runs
+                if row["n"] == n
+                and row["kind"] == "tolerance sweep"
+                and row["seed"] == min(o["seed"] for o in runs)
             )
             if curve:
                 line[0].loglog([e for _, e, _ in curve], [s for _, _, s in curve], **look)
             for place, item in ((line[1], "seconds"), (line[2], "pairs")):
-                turns = [one for one in runs if one["kind"] == "turn" and np.isfinite(one[item])]
-                sizes = sorted({one["n"] for one in turns})
-                middle = [
-                    statistics.median(t[item] / t["steps"] for t in turns if t["n"] == m) for m in sizes
+                repeats = [row for row in runs if row["kind"] == "repeat" and np.isfinite(row[item])]
+                sizes = sorted({row["n"] for row in repeats})
+                median = [
+                    statistics.median(t[item] / t["steps"] for t in repeats if t["n"] == m) for m in sizes
                 ]
                 if sizes:
-                    place.loglog(sizes, middle, **look)
+                    place.loglog(sizes, median, **look)
         line[0].axvline(target, color="0.7", lw=1)
         line[0].invert_xaxis()
-        told = f"{boundary}, {start}" + (f", p = {load} E*" if start == "cold" else ", 20 steps")
-        line[0].set(xlabel="complementarity / std of heights", ylabel="seconds", title=f"{told}, n = {n}")
+        label = f"{boundary}, {start}" + (f", p = {load} E*" if start == "cold" else ", 20 steps")
+        line[0].set(xlabel="complementarity / std of heights", ylabel="seconds", title=f"{label}, n = {n}")
         line[1].set(xlabel="n", ylabel="seconds a step", title=f"to {target:g}")
         line[2].set(xlabel="n", ylabel="pairs of transforms a step", title=f"to {target:g}")
         for place in line[1:]:
-            place.set_xticks(sizes := sorted({one["n"] for one in here}), [str(m) for m in sizes])
+            place.set_xticks(sizes := sorted({row["n"] for row in here}), [str(m) for m in sizes])
             place.minorticks_off()
     figure.suptitle(f"{threads} thread{'s' if threads > 1 else ''}")
     figure.tight_layout(rect=(0, 0.3 / figure.get_figheight(), 1, 1))
@@ -481,7 +493,7 @@ def draw(rows: list[dict[str, Any]], target: float, path: Path) -> None:
 def write(rows: list[dict[str, Any]], path: Path) -> None:
     """Write every run as a line of a CSV file."""
     with path.open("w", newline="") as file:
-        names = list(dict.fromkeys(name for one in rows for name in one))
+        names = list(dict.fromkeys(name for row in rows for name in row))
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(rows)
@@ -489,7 +501,7 @@ def write(rows: list[dict[str, Any]], path: Path) -> None:
 
 def parsed(arguments: list[str] | None) -> argparse.Namespace:
     """Read the command line."""
-    numbers = {"type": lambda text: tuple(int(one) for one in text.split(","))}
+    numbers = {"type": lambda text: tuple(int(number) for number in text.split(","))}
     words = {"type": lambda text: tuple(text.split(","))}
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--sizes", default=(256, 512), **numbers)
@@ -501,9 +513,9 @@ def parsed(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--without", default=(), **words, help="solvers or packages left out")
     parser.add_argument("--path-up-to", type=int, default=512, help="largest n for paths")
     parser.add_argument("--target", type=float, default=1e-6, help="complementarity to reach")
-    parser.add_argument("--loosest", type=float, default=1e-3, help="tolerance where the ladders begin")
-    parser.add_argument("--beyond", type=float, default=0.1, help="share of the target where a ladder ends")
-    parser.add_argument("--patience", type=float, default=60.0, help="seconds after which a ladder ends")
+    parser.add_argument("--loosest", type=float, default=1e-3, help="tolerance where the sweeps begin")
+    parser.add_argument("--beyond", type=float, default=0.1, help="share of the target where a sweep ends")
+    parser.add_argument("--patience", type=float, default=60.0, help="seconds after which a sweep ends")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clock", choices=("wall", "processor"), default="wall", help="processor: if busy")
     parser.add_argument("--out", type=Path, default=Path("bench-solvers"))
@@ -522,15 +534,15 @@ def main(arguments: list[str] | None = None) -> None:
         for case in cases(options):
             rows += apart(worker, alone, case, names)
             write(rows, options.out / "solvers.csv")  # a long run may be stopped
-            told = f"{case.boundary} {case.start} {case.loads[0]:g} .. {case.loads[-1]:g}, seed {case.seed}"
-            print(f"done: {threads} threads, n {case.n} {told}", file=sys.stderr, flush=True)
+            label = f"{case.boundary} {case.start} {case.loads[0]:g} .. {case.loads[-1]:g}, seed {case.seed}"
+            print(f"done: {threads} threads, n {case.n} {label}", file=sys.stderr, flush=True)
     if "memory" in options.only:
         alone = argparse.Namespace(**(vars(options) | {"threads": min(options.threads)}))
         for n in options.sizes:
             for boundary in options.boundaries:
                 case = Case(n, boundary, "cold", (0.01,), options.seeds[0])
                 for name in names:
-                    rows += apart(footprint, alone, case, [name])
+                    rows += apart(peak_memory, alone, case, [name])
     write(rows, options.out / "solvers.csv")
     draw(rows, options.target, options.out / "solvers.png")
     text = table(rows)

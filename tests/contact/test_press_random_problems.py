@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_cases import displacement_under, draw, judge
+from contact.cases import displacement_under, draw, judge
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
