@@ -44,7 +44,7 @@ def project_onto_capped_simplex(q: Array, force: float, p_max: float) -> Array:
 
 
 def uniform_on_lowest(level: Array, force: float, p_max: float) -> Array:
-    """Return an even pressure of the given force on the nodes of lowest `level`, a tenth more than needed."""
+    """Return an even pressure of this force on the nodes of lowest level u + h, a tenth more than needed."""
     count = min(level.size, max(1, int(np.ceil(1.1 * force / p_max))))
     pressure = np.zeros(level.shape)
     pressure.ravel()[np.argpartition(level.ravel(), count - 1)[:count]] = force / count
