@@ -28,7 +28,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.provenance import PAPER, stamp
+from fractalcontact.base.provenance import NO_REFERENCES, stamp
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems, did_you_mean
 
@@ -53,7 +53,7 @@ class PublicFunction(Protocol[P, R_co]):
 def public_result(
     *,
     title: str,
-    references: str = PAPER,
+    references: str = NO_REFERENCES,
     achieved_error: str | None = None,
     check: Callable[..., None] | None = None,
     error: type[InvalidInput] = InvalidInput,
@@ -65,7 +65,7 @@ def public_result(
     title : str
         Title of the result, in a few words.
     references : str
-        The source of the method.
+        The sources of the method; the function may replace them where they depend on its arguments.
     achieved_error : str, optional
         The error in words, for a result without a number for it.
     check : callable, optional

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid
+from fractalcontact.base.provenance import PAPER, joined_references
 from fractalcontact.base.validation import Problems, float_array, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._scaled_problem import length_unit, make_units, scaled_body
@@ -20,6 +21,16 @@ INFLUENCES = ("disc", "square", "spectral")
 METHODS = ("fast", "elimination")
 CONTROL_UNITS = {"closure": "m", "normal_force": "N", "nominal_pressure": "Pa"}
 CONTROLS = tuple(CONTROL_UNITS)
+SOLVER_SOURCES = {
+    "fast": "Polonsky and Keer, Wear 231:206 (1999); Bugnicourt et al., Tribol. Lett. 66:29 (2018)",
+    "elimination": PAPER,
+}
+INFLUENCE_SOURCES = {
+    "disc": PAPER,
+    "square": "Love, Phil. Trans. R. Soc. A 228:377 (1929)",
+    "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
+}
+YASTREBOV = "Yastrebov, Anciaux and Molinari, Tribol. Int. 114:161 (2017) (perimeter correction)"
 SMALLEST_RADIUS = 1e-9  # of the spacing: a smaller plate is a point force, which has no stiffness
 # largest force, closure or hardness over its scale (its inverse is the smallest): products of three such
 # numbers must stay below 1e308
@@ -88,6 +99,12 @@ class ContactOptions:
     def keywords(self) -> dict[str, Any]:
         """Return the options as keyword arguments of `press`."""
         return asdict(self)
+
+    def references(self, grid: Grid) -> str:
+        """Return the sources of the methods used on this grid."""
+        return joined_references(
+            SOLVER_SOURCES[self.method], INFLUENCE_SOURCES[self.influence_on(grid)], YASTREBOV
+        )
 
     def is_periodic(self, grid: Grid) -> bool:
         """Return whether the bodies on this grid are periodic."""

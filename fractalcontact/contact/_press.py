@@ -181,6 +181,7 @@ def press(
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     result.attrs = {
+        "references": options.references(grid),
         "boundary": "periodic" if path.body.periodic else "free",
         "influence": path.body.influence,
         "achieved_residual": float(np.fmax.reduce(result["residual"].values)),

@@ -10,6 +10,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
 
@@ -29,8 +30,7 @@ def _check(problems: Problems, *, surface: Any, vertical_scale: Any) -> None:
 
 @public_result(
     title="Cube counts of a surface",
-    references="Borri-Brunetto, Carpinteri and Chiaia, Contact, closure and friction behaviour of rough "
-    "crack concrete surfaces, FRAMCOS-3 (1998); Clarke, Computers and Geosciences 12 (1986) 713-722",
+    references=METHODS["cube_counts"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )

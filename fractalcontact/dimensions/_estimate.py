@@ -13,6 +13,7 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.provenance import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions import (
@@ -74,8 +75,6 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, noise
 
 @public_result(
     title="Hurst exponent and fractal dimension of a surface",
-    references="Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63; Sykulski, "
-    "Olhede, Guillaumin, Lilly and Early, The debiased Whittle likelihood, Biometrika 106 (2019) 251-266",
     check=_check,
 )
 def estimate(
@@ -165,8 +164,10 @@ def _dataset(
     data["topothesy"] = stacked([record.topothesy(spacing) for record in estimates])
     data["run_time"] = stacked(times)
     coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=data))
+    used = [METHODS[DEFAULT if name == "default" else name].references for name in names]
+    references = joined_references(*used)
     coords |= {"method": np.array(names, dtype=str), "increment_lag": spacing}
-    return xr.Dataset(data, coords=coords, attrs={"default_method": DEFAULT})
+    return xr.Dataset(data, coords=coords, attrs={"default_method": DEFAULT, "references": references})
 
 
 def _with_reasons(result: xr.Dataset, names: Sequence[str], estimates: Sequence[Estimate]) -> xr.Dataset:

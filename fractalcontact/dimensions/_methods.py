@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fractalcontact.base.provenance import PAPER
+
 DEFAULT = "likelihood"
+_INCREMENTS = (
+    "Chan and Wood, Annals of Statistics 28 (2000) 343-376; Zhu and Stein, Journal of Agricultural, "
+    "Biological and Environmental Statistics 7 (2002) 24-44"
+)
+_CLARKE = "Clarke, Computers and Geosciences 12 (1986) 713-722"
 
 
 @dataclass(frozen=True)
 class Method:
-    """Description of a method in one line, whether it accepts gaps, and its smallest number of points."""
+    """Description of a method in one line, sources, whether it accepts gaps, smallest number of points."""
 
     description: str
+    references: str
     gaps: bool = True
     smallest: int = 4
 
@@ -19,43 +27,56 @@ class Method:
 METHODS = {
     "likelihood": Method(
         "the default: maximum likelihood; exact fractional Brownian surfaces (free), power-law spectra with "
-        "cut-offs (periodic); 95 % interval"
+        "cut-offs (periodic); 95 % interval",
+        "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63; Sykulski, Olhede, "
+        "Guillaumin, Lilly and Early, The debiased Whittle likelihood, Biometrika 106 (2019) 251-266",
     ),
     "increments": Method(
         "closed form in one pass, first or second differences over 1, 2 and 4 spacings; fractional Brownian "
-        "surfaces; 95 % interval"
+        "surfaces; 95 % interval",
+        _INCREMENTS,
     ),
     "spectrum": Method(
         "slope of the radially averaged power spectral density; periodic surfaces, too low on rough free "
         "ones; no interval",
+        "Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
         gaps=False,
     ),
     "variogram": Method(
-        "slope of the mean square increment; fractional Brownian surfaces of H below 0.6; no interval"
+        "slope of the mean square increment; fractional Brownian surfaces of H below 0.6; no interval",
+        "Matheron, Economic Geology 58 (1963) 1246-1266; Marcotte, Computers and Geosciences 22 "
+        "(1996) 1175-1186",
     ),
     "madogram": Method(
-        "slope of the mean absolute increment; as the variogram, less sensitive to outliers; no interval"
+        "slope of the mean absolute increment; as the variogram, less sensitive to outliers; no interval",
+        "Gneiting, Sevcikova and Percival, Statistical Science 27 (2012) 247-277",
     ),
     "second_variogram": Method(
         "slope of the mean square second difference; fractional Brownian surfaces of any H, tilted or not; "
-        "no interval"
+        "no interval",
+        _INCREMENTS,
     ),
     "roughness_length": Method(
         "growth of the rms height in windows about their planes, corrected for small windows; fractional "
         "Brownian surfaces; no interval",
+        "Malinverno, Geophysical Research Letters 17 (1990) 1953-1956",
         smallest=5,
     ),
     "variation": Method(
         "growth of the range of heights over segments of rows and columns; H too high by 0.05 to 0.25 where "
-        "it is below 0.8; no interval"
+        "it is below 0.8; no interval",
+        "Dubuc, Quiniou, Roques-Carmes, Tricot and Zucker, Physical Review A 39 (1989) 1500-1512; Hall and "
+        "Wood, Biometrika 80 (1993) 246-252",
     ),
     "cube_counts": Method(
         "slope of the number of cubes that meet the surface, heights scaled to the extent; H too high by "
-        "0.05 to 0.4; no interval"
+        "0.05 to 0.4; no interval",
+        f"{PAPER}; {_CLARKE}",
     ),
     "covering": Method(
         "slope of the triangulated area in natural scale; 2 for flat surfaces, the dimension only where "
-        "slopes are far above 1; no interval"
+        "slopes are far above 1; no interval",
+        _CLARKE,
     ),
 }
 

@@ -10,6 +10,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 from fractalcontact.dimensions._windows import edge_lengths, window_edges
 
@@ -23,7 +24,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
 
 @public_result(
     title="Roughness inside windows of a surface",
-    references="Malinverno, Geophysical Research Letters 17 (1990) 1953-1956",
+    references=METHODS["roughness_length"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )

@@ -13,6 +13,7 @@ from fractalcontact.base.power_law import logarithm
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset
+from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -31,7 +32,7 @@ def _check(problems: Problems, *, surface: Any, window: Any, tile: Any) -> None:
 
 @public_result(
     title="Power spectral density of a surface",
-    references="Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
+    references=METHODS["spectrum"].references,
     achieved_error="relative standard error of each value sqrt(2 / mode_count), where no window mixes the "
     "modes",
     check=_check,

@@ -10,6 +10,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
 
@@ -24,8 +25,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
 
 @public_result(
     title="Range of heights over segments of a surface",
-    references="Dubuc, Quiniou, Roques-Carmes, Tricot and Zucker, Physical Review A 39 (1989) 1500-1512; "
-    "Hall and Wood, Biometrika 80 (1993) 246-252",
+    references=METHODS["variation"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )

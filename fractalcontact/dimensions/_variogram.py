@@ -14,6 +14,7 @@ from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
+from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -35,8 +36,7 @@ def _check(problems: Problems, *, surface: Any, max_lag: Any) -> None:
 
 @public_result(
     title="Variogram of a surface",
-    references="Matheron, Economic Geology 58 (1963) 1246-1266; Marcotte, Computers and Geosciences 22 "
-    "(1996) 1175-1186",
+    references=METHODS["variogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )
@@ -87,7 +87,7 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
 
 @public_result(
     title="Madogram of a surface",
-    references="Gneiting, Sevcikova and Percival, Statistical Science 27 (2012) 247-277",
+    references=METHODS["madogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )
@@ -128,8 +128,7 @@ def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Datas
 
 @public_result(
     title="Mean square second differences of a surface",
-    references="Chan and Wood, Annals of Statistics 28 (2000) 343-376; Zhu and Stein, Journal of "
-    "Agricultural, Biological and Environmental Statistics 7 (2002) 24-44",
+    references=METHODS["second_variogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
 )

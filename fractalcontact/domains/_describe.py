@@ -9,12 +9,19 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
+from fractalcontact.base.provenance import joined_references
 from fractalcontact.base.results import public_result
-from fractalcontact.domains import _boundary, _box_counting, _correlation, _lacunarity, _minkowski
+from fractalcontact.domains import (
+    _boundary,
+    _box_counting,
+    _correlation,
+    _islands,
+    _lacunarity,
+    _minkowski,
+    _percolation,
+)
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._islands import island_scalars
 from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
-from fractalcontact.domains._percolation import AXES, crossings, percolation_name
 
 ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
     "box_dimension": _box_counting.analyse,
@@ -27,10 +34,25 @@ MEASURES = ("islands", "percolation", *ANALYSES)
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time")
 LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 
+_SOURCES = {
+    "islands": _islands.SOURCE,
+    "percolation": _percolation.SOURCE,
+    "box_dimension": _box_counting.SOURCE,
+    "minkowski_dimension": _minkowski.SOURCE,
+    "correlation_dimension": _correlation.SOURCE,
+    "boundary_dimension": _boundary.SOURCE,
+    "lacunarity": _lacunarity.SOURCE,
+}
+
 Variable = tuple[tuple[str, ...], Array]
 
 
-@public_result(title="Description of a set", check=check_connected)
+def sources(measures: Sequence[str]) -> str:
+    """Return the sources of several measures."""
+    return joined_references(*(_SOURCES[name] for name in measures if name in _SOURCES))
+
+
+@public_result(title="Description of a set", references=sources(MEASURES), check=check_connected)
 def describe(
     mask: xr.DataArray,
     *,
@@ -115,14 +137,14 @@ def measure_planes(
     if "islands" in wanted:
         spacing = planes.grid.spacing if planes.grid.has_coordinates else (np.nan, np.nan)
         perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
-        values = {"total_perimeter": perimeter, **island_scalars(components, planes, connectivity)}
+        values = {"total_perimeter": perimeter, **_islands.island_scalars(components, planes, connectivity)}
         result.variables.update({name: planes.variable(array) for name, array in values.items()})
     if "percolation" in wanted:
-        values = crossings(components, planes)
+        values = _percolation.crossings(components, planes)
         result.variables["largest_share"] = planes.variable(values["largest_share"])
         result.variables["percolates"] = planes.variable(values["percolates"], "axis")
-        result.coords["axis"] = ("axis", np.array(AXES))
-        result.notes["percolates"] = {"long_name": percolation_name(connectivity)}
+        result.coords["axis"] = ("axis", np.array(_percolation.AXES))
+        result.notes["percolates"] = {"long_name": _percolation.percolation_name(connectivity)}
     datasets = {name: analyse(planes) for name, analyse in ANALYSES.items() if name in wanted}
     box_sizes = [dataset["box_size"].values for dataset in datasets.values() if "box_size" in dataset.coords]
     all_sizes = np.unique(np.concatenate([np.empty(0, np.int64), *box_sizes]))

@@ -10,15 +10,16 @@ import xarray as xr
 from scipy.spatial import cKDTree
 
 from fractalcontact.base.grid import Grid
+from fractalcontact.base.provenance import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains._connected_components import Components, label_planes
-from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes
+from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes, sources
 from fractalcontact.domains._lineage import check_path, island_overlaps
 from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
 
-SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998); Hausdorff, Mengenlehre (1927)"
+SOURCE = "Hausdorff, Mengenlehre (1927)"  # of the changes
 CHANGES = "changes"
 WORDS = (CHANGES, *MEASURES)
 NEED_ISLANDS = (CHANGES, "islands", "percolation")
@@ -34,7 +35,7 @@ def _check(problems: Problems, *, mask: Any, want: Any, connectivity: Any, perio
     check_path(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
 
 
-@public_result(title="Evolution of a set", references=SOURCE, check=_check)
+@public_result(title="Evolution of a set", check=_check)
 def evolution(
     mask: xr.DataArray,
     *,
@@ -97,7 +98,9 @@ def evolution(
     if CHANGES in wanted:
         _add_changes(measurements, components)
         _add_returns(measurements)
-    return build_dataset(planes, measurements.variables, measurements.coords, notes=measurements.notes)
+    result = build_dataset(planes, measurements.variables, measurements.coords, notes=measurements.notes)
+    references = joined_references(*([SOURCE] if CHANGES in wanted else []), sources(wanted))
+    return result.assign_attrs(references=references)
 
 
 def _add_changes(measurements: Measurements, components: Sequence[Components]) -> None:

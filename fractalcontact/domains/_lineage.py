@@ -13,7 +13,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._mask_input import Array, build_dataset, plane_shape, read_planes
 
-SOURCE = "Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998)"
+SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components)"
 CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flags of `event` in the schema
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 
@@ -87,7 +88,8 @@ def read_mask(
     cells = (grey <= threshold if dark else grey > threshold)[::-1]
     step = np.broadcast_to(float_array(spacing), 2).tolist()
     coords = plane_coords(cells.shape, step, (False, False))
-    facts = {"threshold": float(threshold), "grey_values": int(levels.size)}
+    facts: dict[str, Any] = {"threshold": float(threshold), "grey_values": int(levels.size)}
+    facts |= {"file_sha256": file_checksum(Path(path)), "parameters": {"path": Path(path).name}}
     return xr.DataArray(np.ascontiguousarray(cells), coords, ("y", "x"), name="mask", attrs=facts)
 
 

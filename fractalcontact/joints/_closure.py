@@ -14,6 +14,7 @@ import fractalcontact as fc  # loads `contact` on first use: a study of rigid fa
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import PAPER, joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
@@ -161,7 +162,7 @@ def closure(
     result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
     _explain_undetermined(result)
     residual = float(np.max([columns["residual"].max() for columns in pressed]))
-    return result.assign_attrs(achieved_residual=residual)
+    return result.assign_attrs(achieved_residual=residual, references=pressing_references(crack, options))
 
 
 def _dataset(
@@ -256,6 +257,13 @@ def check_pressing(
     )
     if load is not None:
         options.check_load(load, crack.nominal_area, problems)
+
+
+def pressing_references(crack: Crack, options: fc.contact.ContactOptions) -> str:
+    """Return the sources of the closure of a delta-surface and of the solver that presses it."""
+    layout = crack.layout
+    used = replace(options, boundary=_boundary(crack))
+    return joined_references(PAPER, used.references(Grid(layout.cells, layout.spacing, layout.periodic)))
 
 
 def _boundary(crack: Crack) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.provenance import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import (
@@ -52,7 +53,11 @@ def _check(problems: Problems, *, crack: Any, direction: Any, shear: Any) -> Non
         problems.require(slides, "crack", expected, crack.layout.cells)
 
 
-@public_result(title="correlation of the faces of a sheared crack", check=_check)
+@public_result(
+    title="correlation of the faces of a sheared crack",
+    references=f"{PAPER}; Künsch, Ann. Stat. 17:1217 (1989) (jackknife)",
+    check=_check,
+)
 def decorrelation_length(
     crack: Crack,
     *,

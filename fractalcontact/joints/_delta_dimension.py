@@ -12,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.provenance import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import check_direction, read_direction
@@ -46,6 +47,7 @@ def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, window
 
 @public_result(
     title="dimension of the delta-surface",
+    references=PAPER,
     achieved_error="not given: an interval of such a slope would have no stated coverage",
     check=_check,
 )

@@ -16,6 +16,7 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.provenance import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
@@ -34,7 +35,7 @@ def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any) -> Non
     check_sliding(problems, crack, shear, direction)
 
 
-@public_result(title="delta-surface of a sheared crack", check=_check)
+@public_result(title="delta-surface of a sheared crack", references=PAPER, check=_check)
 def delta_surface(
     crack: Crack,
     shear: float | Sequence[float] | Array,

@@ -12,6 +12,7 @@ import xarray as xr
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._closure import (
@@ -19,6 +20,7 @@ from fractalcontact.joints._closure import (
     ShearedContact,
     check_pressing,
     press_sheared,
+    pressing_references,
     warn_steep,
     warn_unconverged,
 )
@@ -69,7 +71,7 @@ def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
         problems.require(unused, name, "nothing without normal_force", value)
 
 
-@public_result(title="dilatancy of a crack", check=_check)
+@public_result(title="dilatancy of a crack", references=PAPER, check=_check)
 def dilatancy(
     crack: Crack,
     *,
@@ -164,7 +166,7 @@ def dilatancy(
         result["initial_force"] = "step", float_array(pressing.load.values)
     result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
     residual = float(np.max([columns["residual"].max() for columns in pressed]))
-    return result.assign_attrs(achieved_residual=residual)
+    return result.assign_attrs(achieved_residual=residual, references=pressing_references(crack, options))
 
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:

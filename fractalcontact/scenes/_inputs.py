@@ -11,6 +11,7 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.provenance import joined_references
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._stages import STAGES, public_function
 
@@ -32,13 +33,16 @@ def read_surface(table: SurfaceTable, folder: Path) -> xr.DataArray:
         surface = surfaces.sample(table.sample)
     else:
         surface = surfaces.read(locate(str(table.read), folder), **table.options)
+    source = surface.attrs["references"]
     if table.despike:
         surface = surfaces.despike(surface)
+        source = joined_references(source, surface.attrs["references"])
     if table.fill:
         surface = surfaces.fill(surface)
+        source = joined_references(source, surface.attrs["references"])
     if table.level is not None:
         surface = surfaces.level(surface, table.level)
-    return surface
+    return surface.assign_attrs(references=source)
 
 
 def generator_options(table: SurfaceTable) -> dict[str, Any]:
