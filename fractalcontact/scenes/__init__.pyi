@@ -3,6 +3,7 @@ from ._paper import paper_criteria as paper_criteria
 from ._paper import paper_table as paper_table
 from ._plan import plan as plan
 from ._report import summary as summary
+from ._reproduce import reproduce as reproduce
 from ._run import run as run
 from ._scene import Scene as Scene
 from ._scene_file import load as load
@@ -15,6 +16,7 @@ __all__ = [
     "paper_criteria",
     "paper_table",
     "plan",
+    "reproduce",
     "run",
     "summary",
     "validate",

@@ -6,6 +6,7 @@ may run anywhere and in any order; the joined result is the same.
 
 from __future__ import annotations
 
+import json
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,8 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import provenance
 from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
+from fractalcontact.base.provenance import with_provenance
+from fractalcontact.base.results import provenance_of
 from fractalcontact.scenes._inputs import contact_options, crack_options, joint_options, read_surface
 from fractalcontact.scenes._plan import Stage
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
@@ -63,7 +67,7 @@ class MapReader:
 
     def __call__(self, source: xr.Dataset) -> xr.Dataset:
         """Return the result of the function for the map."""
-        return call(self.function, source[self.variable], **self.options)
+        return call(self.function, with_provenance(source, self.variable), **self.options)
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,13 +104,20 @@ class Precomputed:
 
 def without(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
     """Return a result without some of its maps, and without x and y if nothing else has them."""
-    rest = result.drop_vars(list(names), errors="ignore")
+    dropped = [name for name in names if name in result]
+    if not dropped:
+        return result
+    rest = result.drop_vars(dropped)
+    entry = provenance_of(rest)
+    if "keep" in entry.get("parameters", {}):  # the call that gives what is left
+        entry["parameters"]["keep"] = [name for name in entry["parameters"]["keep"] if name not in dropped]
+        rest = rest.assign_attrs(provenance=json.dumps(entry))
     used = {dim for variable in rest.data_vars.values() for dim in variable.dims}
     return rest.drop_vars([dim for dim in ("y", "x") if dim in rest.coords and dim not in used])
 
 
 def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
-    """Join results along a dim; their run times are added."""
+    """Join results along a dim; their run times are added, and their provenance is that of the whole."""
     if len(results) == 1:
         return results[0]
     joined = xr.concat(
@@ -124,6 +135,9 @@ def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
     if dim == "step":
         attributes = dict(joined["step"].attrs)
         joined = joined.assign_coords(step=("step", np.arange(joined.sizes["step"]), attributes))
+    entries = [provenance_of(result) for result in results]
+    if all(entries):
+        joined.attrs["provenance"] = json.dumps(provenance.joined(entries, dim))
     for name, variable in joined.variables.items():
         variable.encoding = dict(results[0].variables[name].encoding)
     return joined
@@ -139,7 +153,7 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
     if stage.name == "surfaces":
         return StageWork((partial(_read_height, scene.surface, scene.folder),))
     if subpackage == "surfaces":
-        return StageWork((partial(call, stage.row.function, results["surfaces"]["height"]),))
+        return StageWork((partial(call, stage.row.function, _heights(results, "surfaces")),))
     if subpackage == "dimensions":
         return _dimension_work(stage, scene, results)
     if subpackage == "contact":
@@ -160,7 +174,7 @@ def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
 
 
 def _dimension_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
-    surface = results["surfaces"]["height"]
+    surface = _heights(results, "surfaces")
     if scene.surface.despike:
         # spikes are removed for the contact alone: the roughness is that of the surface as it was scanned
         surface = read_surface(replace(scene.surface, despike=False), scene.folder)
@@ -171,7 +185,7 @@ def _dimension_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
 
 
 def _contact_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
-    options, height = contact_options(scene), results["surfaces"]["height"]
+    options, height = contact_options(scene), _heights(results, "surfaces")
     load = next(key for key in LOADS if key in options)
     paths = _sections(options.pop(load), height.size, has_hardness="hardness" in options)
     press = partial(call, stage.row.function, height, keep=stage.keep, **options)
@@ -188,7 +202,7 @@ def _sections(path: Any, nodes: int, *, has_hardness: bool) -> list[Any]:
 
 def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> StageWork:
     if name == "faces":
-        return StageWork((partial(_upper_face, scene, results["surfaces"]),))
+        return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
     options = joint_options(scene, name)
     if name == "friction":
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
@@ -225,18 +239,22 @@ def _as_list(value: Any) -> Sequence[Any]:
     return value if isinstance(value, (list, tuple)) else [value]
 
 
-def _upper_face(scene: Scene, lower: xr.Dataset) -> xr.Dataset:
+def _heights(results: Results, stage: str) -> xr.DataArray:
+    return with_provenance(results[stage], "height")
+
+
+def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
     upper = read_surface(scene.upper or scene.surface, scene.folder)
     if scene.joint.register:
-        return call("joints.register", lower["height"], upper)
+        return call("joints.register", lower, upper)
     return as_dataset(upper.rename("height"))
 
 
 def _crack(scene: Scene, results: Results) -> Crack:
     from fractalcontact import joints
 
-    upper = results["joints/faces"]["height"] if "joints/faces" in results else None
-    return joints.Crack(results["surfaces"]["height"], upper, **crack_options(scene))
+    upper = _heights(results, "joints/faces") if "joints/faces" in results else None
+    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene))
 
 
 def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:

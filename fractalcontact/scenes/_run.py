@@ -78,14 +78,15 @@ def run(
     >>> print((last.sel(direction=["E", "W"]) * 1e3).round(2).values)  # mm at 10 mm of shear
     [1.15 0.5 ]
     """
+    start = time.perf_counter()
     _check_workers(workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
-        return _run(scene, out, progress, workers_of(processes if client is None else client))
+        return _run(scene, out, progress, workers_of(processes if client is None else client), start)
 
 
 def _run(
-    scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None
+    scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None, start: float
 ) -> xr.DataTree:
     folder = None if out is None else output_folder(out)
     scene, choices = choose(scene)
@@ -101,6 +102,7 @@ def _run(
             if name in groups:
                 warn(implausible_result(name, groups[name]))
         tree = _assemble(scene, groups, study.seconds, choices, missing)
+        _note_run_time(tree, start)
         if folder is None:
             return tree
         if missing:
@@ -110,6 +112,7 @@ def _run(
             )
         if scene.want.figures:
             _draw(tree, folder, progress, paper=scene.paper)
+            _note_run_time(tree, start)
         netcdf.save(tree, folder / RESULT)
         (folder / PARTIAL_RESULT).unlink(missing_ok=True)
         store.clear()
@@ -135,8 +138,7 @@ def _assemble(
     description = groups.pop("/surfaces/description", None)
     if description is not None:
         heights = groups.get("/surfaces", xr.Dataset())
-        attributes = heights.attrs or description.attrs
-        groups["/surfaces"] = heights.assign(description.data_vars).assign_attrs(attributes)
+        groups["/surfaces"] = _merged(heights, description) if heights else description
     tree = xr.DataTree.from_dict(
         {path: schema.encoded(dataset) for path, dataset in groups.items()}, name=scene.name
     )
@@ -162,6 +164,23 @@ def _assemble(
     if missing:
         tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
     return tree
+
+
+def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:
+    """Return the heights of a surface with its description; the provenance states both calls."""
+    merged = heights.assign(description.data_vars)
+    entry = json.loads(heights.attrs["provenance"]) | {
+        "merged": [json.loads(description.attrs["provenance"])]
+    }
+    sources = (dataset.attrs["references"] for dataset in (heights, description))
+    references = provenance.joined_references(*sources)
+    return merged.assign_attrs(provenance=json.dumps(entry), references=references)
+
+
+def _note_run_time(tree: xr.DataTree, start: float) -> None:
+    """Note the time since the call of `run`: stages, validation, starting of workers, waiting."""
+    entry = json.loads(tree.attrs["provenance"])
+    tree.attrs["provenance"] = json.dumps(entry | {"run_time": time.perf_counter() - start})
 
 
 def _achieved(result: xr.Dataset) -> dict[str, Any]:

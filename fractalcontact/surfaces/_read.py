@@ -16,6 +16,7 @@ import xarray as xr
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
+from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import NONE, Problems
@@ -95,7 +96,7 @@ def read(
     -------
     DataArray
         `height` with dims (y, x) in metres, y ascending, heights up, NaN where missing. The provenance has
-        the name of the file, its unit and size as stated, and the library that read it.
+        name and checksum of the file, its unit and size as stated, and the library that read it.
 
     Raises
     ------
@@ -136,6 +137,7 @@ def read(
     surface.attrs = {
         "title": f"Surface read from {source.name}",
         "parameters": {"path": source.name},
+        "file_sha256": file_checksum(source),
         **content.entries,
     }
     return surface

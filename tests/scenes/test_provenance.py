@@ -1,0 +1,270 @@
+"""Every stored group is made again from its own provenance, bit for bit but for the run times."""
+
+import json
+import signal
+
+import numpy as np
+import pytest
+from study import watch_calls
+
+import fractalcontact as fc
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput
+from fractalcontact.base.results import provenance_of
+from fractalcontact.base.signals import Stopped
+
+STUDY = """
+[surface]
+generate = "fbm"
+shape = [32, 32]
+spacing = 1e-4
+hurst = 0.8
+rms_increment = 4e-6
+rng = 5
+level = 1
+[material]
+young = 30e9
+poisson = 0.2
+[contact]
+normal_force = [1.0, 2.0, 4.0, 3.0]
+[joint]
+block = 2.0e-3
+shear = [0.0, 1e-4, 3e-4]
+normal_force = [1.0, 10.0]
+[joint.elastic_dilatancy]
+direction = ["E", "W"]
+[want]
+surfaces = ["height", "describe"]
+dimensions = ["likelihood", "variogram"]
+contact = ["press"]
+joints = [
+    "delta_surface", "closure", "rigid_dilatancy", "elastic_dilatancy", "friction", "decorrelation_length",
+    "transmissivity",
+]
+domains = [
+    "box_dimension", "box_counts", "boundary_dimension", "lacunarity", "islands", "percolation", "evolution",
+]
+"""
+DOMAINS_OF_A_JOINT = STUDY.replace('contact = ["press"]', 'keep = ["state"]')
+ENSEMBLE = DOMAINS_OF_A_JOINT.replace("rng = 5", "rng = 5\nmembers = 3").replace(
+    '"box_counts", "boundary_dimension", "lacunarity", ', ""
+)
+
+
+def write(folder, text):
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def stored_groups(tree):
+    return [node for node in tree.subtree if node.data_vars]
+
+
+def check_equal(stored, made):
+    """Check all stored variables and coordinates for equal dims, types and bytes."""
+    stored = stored.to_dataset() if hasattr(stored, "to_dataset") else stored
+    assert set(stored.variables) == set(made.variables)
+    for name, variable in stored.variables.items():
+        if name != "run_time":
+            again = made[name]
+            assert variable.dims == again.dims, name
+            assert (
+                np.asarray(variable.values).tobytes()
+                == np.asarray(again.values.astype(variable.dtype)).tobytes()
+            ), name
+
+
+@pytest.fixture(scope="module", params=["one part each", "sections of a path", "domains of a joint"])
+def study(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "sections of a path":
+            patch.setattr("fractalcontact.scenes._parts.PART_SIZE", 32 * 32)
+        text = DOMAINS_OF_A_JOINT if request.param == "domains of a joint" else STUDY
+        fc.scenes.run(write(folder, text), out=folder, progress=False)
+    return fc.open(folder / "result.nc")
+
+
+def test_every_group_is_made_again(study):
+    groups = stored_groups(study)
+    assert len(groups) > 14
+    for group in groups:
+        check_equal(group, fc.scenes.reproduce(group))
+
+
+def test_joined_group_states_the_whole_call_and_the_worst_residual(study):
+    closure, dilatancy = study["joints/closure"], study["joints/elastic_dilatancy"]
+    entry = provenance_of(closure)
+    assert entry["call"] == "fractalcontact.joints.closure"
+    assert entry["parameters"]["shear"] == [0.0, 1e-4, 3e-4]
+    assert entry["parameters"]["normal_force"] == [1.0, 10.0]
+    assert entry["achieved_residual"] == float(closure["residual"].max())
+    assert entry["run_time"] >= float(closure["run_time"].sum())
+    entry = provenance_of(dilatancy)
+    assert entry["parameters"]["direction"] == ["E", "W"]
+    assert entry["parameters"]["shear"] == [0.0, 1e-4, 3e-4]
+    assert entry["achieved_residual"] == float(dilatancy["residual"].max())
+    gap = provenance_of(study["joints/transmissivity"])["parameters"]["gap"]
+    assert gap["dims"] == {"shear": 3, "step": 2, "y": 20, "x": 20}
+    assert gap["provenance"]["parameters"]["shear"] == [0.0, 1e-4, 3e-4]
+    assert "gap" in gap["provenance"]["parameters"]["keep"]
+    assert "gap" not in provenance_of(closure)["parameters"]["keep"]
+
+
+def test_ensemble_member_is_made_again(tmp_path):
+    tree = fc.scenes.run(write(tmp_path, ENSEMBLE), progress=False)
+    groups = stored_groups(tree)
+    assert len(groups) > 8
+    for group in groups:
+        assert "random" in group.attrs["provenance"]
+        made = fc.scenes.reproduce(group, member=2)
+        stored = group.to_dataset()
+        rows = {dim: stored[f"{dim}_member"] == 2 for dim in ("island", "link") if dim in stored.dims}
+        stored = stored.isel(member=2).drop_vars([name for name in stored.variables if "member" in name])
+        check_equal(stored.isel({dim: np.flatnonzero(row) for dim, row in rows.items()}), made)
+    with pytest.raises(InvalidInput, match="<= 2, got 3"):
+        fc.scenes.reproduce(groups[0], member=3)
+    with pytest.raises(InvalidInput, match="member"):
+        fc.scenes.reproduce(groups[0])
+
+
+def test_resumed_study_states_the_whole_call(tmp_path, monkeypatch):
+    def stop_at_second_shear(name):
+        if name == "closure":
+            calls.append(name)
+            if len(calls) == 2:
+                signal.raise_signal(signal.SIGTERM)
+
+    calls = []
+    scene = write(tmp_path, DOMAINS_OF_A_JOINT)
+    with monkeypatch.context() as patch:
+        watch_calls(patch, stop_at_second_shear)
+        with pytest.raises(Stopped):
+            fc.scenes.run(scene, out=tmp_path, progress=False)
+    partial = fc.open(tmp_path / "partial.nc")
+    assert partial["joints/closure"].sizes["shear"] == 2
+    tree = fc.scenes.run(scene, out=tmp_path, progress=False)
+    for group in (partial["joints/closure"], *stored_groups(tree)):
+        check_equal(group, fc.scenes.reproduce(group))
+    kept_and_new = provenance_of(tree["joints/closure"])["run_time"]
+    assert kept_and_new > json.loads(tree.attrs["provenance"])["stages"]["joints/closure"]["run_time"]
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A study of two faces in files, prepared and registered, and its folder."""
+    folder = tmp_path_factory.mktemp("private")
+    heights = fc.surfaces.fbm((72, 72), 1e-4, hurst=0.8, rms_increment=4e-6, rng=3).values
+    face, upper = heights[4:68, 4:68].copy(), heights[4:68, 3:67] + 1e-6
+    face[9, 9] = np.nan
+    np.save(folder / "lower.npy", face)
+    np.save(folder / "upper.npy", upper)
+    text = """
+        [surface]
+        read = "lower.npy"
+        spacing = 1e-4
+        fill = true
+        despike = true
+        level = 1
+        [upper]
+        read = "upper.npy"
+        spacing = 1e-4
+        [material]
+        young = 30e9
+        poisson = 0.2
+        [joint]
+        block = 1.2e-3
+        shear = [0.0, 2e-4]
+        normal_force = 1.0
+        register = true
+        [want]
+        surfaces = ["height"]
+        dimensions = ["variogram"]
+        joints = ["closure", "rigid_dilatancy"]
+    """
+    return fc.scenes.run(write(folder, text), progress=False), folder
+
+
+def test_study_of_files_is_made_again_from_the_same_files_only(measured, tmp_path):
+    tree, folder = measured
+    for group in stored_groups(tree):
+        check_equal(group, fc.scenes.reproduce(group, folder=folder))
+    for node in tree.subtree:
+        assert "private" not in str(node.attrs)
+        assert str(folder.parent) not in str(node.attrs)
+    with pytest.raises(InvalidInput, match="'lower.npy' that was read, got no such file"):
+        fc.scenes.reproduce(tree["surfaces"], folder=tmp_path)
+    np.save(tmp_path / "lower.npy", np.zeros((64, 64)))
+    with pytest.raises(InvalidInput, match="SHA-256"):
+        fc.scenes.reproduce(tree["surfaces"], folder=tmp_path)
+
+
+def test_references_name_the_methods_and_no_paper_of_1998_for_heights(measured, study):
+    for tree in (measured[0], study):
+        for group in stored_groups(tree):
+            assert group.attrs["references"], group.path
+    heights = measured[0]["surfaces"].attrs["references"]
+    assert "FRAMCOS" not in heights
+    assert "Rousseeuw" in heights
+    assert "Briggs" in heights
+    assert "FRAMCOS" in study["joints/closure"].attrs["references"]
+    for name in ("joints/closure", "joints/elastic_dilatancy"):
+        assert "Polonsky" in study[name].attrs["references"]
+    assert "Polonsky" not in study["joints/rigid_dilatancy"].attrs["references"]
+
+
+@pytest.mark.parametrize(
+    ("options", "named", "others"),
+    [
+        ({}, ["FRAMCOS", "Polonsky", "Yastrebov"], ["Love", "Stanley"]),
+        ({"influence": "square"}, ["Love", "Polonsky"], ["FRAMCOS", "Stanley"]),
+        ({"influence": "square", "method": "elimination"}, ["FRAMCOS", "Love"], ["Polonsky", "Stanley"]),
+    ],
+)
+def test_references_of_a_contact_are_those_of_its_solver(options, named, others):
+    surface = fc.surfaces.from_array(np.random.default_rng(1).normal(size=(8, 8)), 1.0)
+    references = fc.contact.press(surface, contact_modulus=1.0, closure=0.5, **options).attrs["references"]
+    assert all(name in references for name in named)
+    assert not any(name in references for name in others)
+
+
+def test_periodic_contact_names_no_paper_of_plates():
+    surface = fc.surfaces.spectral((8, 8), 1.0, hurst=0.8, rms_height=1.0, rng=1)
+    references = fc.contact.press(surface, contact_modulus=1.0, closure=0.5).attrs["references"]
+    assert "Stanley" in references
+    assert "FRAMCOS" not in references
+
+
+def test_input_without_provenance_is_named():
+    surface = fc.surfaces.from_array(np.eye(8), 1.0)
+    with pytest.raises(InvalidInput, match="heights: expected an input .* got an array of shape"):
+        fc.scenes.reproduce(fc.surfaces.describe(surface))
+    with pytest.raises(InvalidInput, match="surface: expected an input with the provenance"):
+        fc.scenes.reproduce(fc.surfaces.describe(surface.drop_attrs()))
+    with pytest.raises(InvalidInput, match="result: expected a result with the attribute `provenance`"):
+        fc.scenes.reproduce(surface.drop_attrs())
+
+
+@pytest.mark.parametrize(
+    "call", ["os.system", "fractalcontact.save", "fractalcontact.contact.ContactOptions"]
+)
+def test_text_of_a_file_calls_only_functions_of_results(call):
+    entry = {"call": call, "parameters": {}}
+    surface = fc.surfaces.from_array(np.eye(8), 1.0).assign_attrs(provenance=json.dumps(entry))
+    with pytest.raises(InvalidInput, match="call: expected a public function"):
+        fc.scenes.reproduce(surface)
+
+
+def test_input_that_comes_out_otherwise_is_told():
+    surface = fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1)
+    described = fc.surfaces.describe(surface + 1.0)
+    entry = provenance_of(fc.surfaces.describe(surface))
+    entry["parameters"]["surface"]["sha256"] = "0" * 64
+    with pytest.warns(FractalContactWarning, match="surface differs"):
+        fc.scenes.reproduce(described.assign_attrs(provenance=json.dumps(entry)))
+
+
+def test_total_of_the_summary_is_the_time_of_the_whole_run(study):
+    lines = {line.split("  ")[0]: line.split()[-1] for line in fc.scenes.summary(study).splitlines() if line}
+    assert float(lines["total"]) >= float(lines["all stages"]) > 0
+    assert float(lines["total"]) == pytest.approx(provenance_of(study)["run_time"], abs=0.006)
