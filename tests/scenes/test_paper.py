@@ -8,6 +8,7 @@ import os
 import re
 from functools import cache
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -102,9 +103,10 @@ def measured_faces():
     return {face: np.where(np.isnan(side), np.nanmean(side), side) for face, side in sides.items()}
 
 
-def rows(text):
-    """Return the rows of a table of the paper as tuples of its columns."""
-    lines = text.splitlines()
+def rows(table, *arguments):
+    """Return the rows of a table of the paper, on a screen that is wide enough, as tuples of its columns."""
+    with mock.patch.dict(os.environ, COLUMNS="1000"):
+        lines = table(*arguments).splitlines()
     starts = [match.start() for match in re.finditer("-+", lines[1])]
     ends = [*starts[1:], None]
     body = [line for line in lines[2:] if not line.startswith(" ")]
@@ -113,10 +115,10 @@ def rows(text):
 
 def findings(tree):
     """Return result and verdict of every claim."""
-    return {claim: (result, verdict) for _, claim, result, verdict in rows(paper_table(tree))}
+    return {claim: (result, verdict) for _, claim, result, verdict in rows(paper_table, tree)}
 
 
-CRITERIA = {claim: criterion for _, claim, criterion in rows(paper_criteria())}
+CRITERIA = {claim: criterion for _, claim, criterion in rows(paper_criteria)}
 CLAIMS = [claim for claim, criterion in CRITERIA.items() if not criterion.startswith(FINAL)]
 
 
