@@ -24,6 +24,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,8 @@ from fractalcontact.contact._scaled_problem import sum_by_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-METHODS = ("superposition",)
+METHODS = ("superposition", "full")
+BELOW_SLIDING = 1e-6  # relative distance from sliding, where the full displacement grows without bound
 GREATEST_FRICTION = 1e3
 FORCE_ROUNDING = 1e-12  # of the normal force: forces that differ by less share one solution
 STIFFNESS_TOLERANCE = (
@@ -91,23 +93,26 @@ def _check(
         return
     grid = read_grid(surface)
     options.check_grid(grid, problems)
+    if method == "full":
+        expected = "'superposition' for free bodies: 'full' is for periodic ones"
+        problems.require(options.is_periodic(grid), "method", expected, method)
     if load is None or problems.messages:
         return
     height_range = float(surface.values.max()) - float(surface.values.min())
     check_scale(problems, grid, height_range, float(contact_modulus), None, load)
     if load.control != "closure":
         normal = float(load.solver_values(grid.nominal_area)[1][0])
-        check_sliding(problems, float_array(tangential_force), float(friction_coefficient), normal)
+        check_sliding(problems, float_array(tangential_force), float(friction_coefficient), normal, method)
 
 
-def check_sliding(problems: Problems, path: Array, friction: float, normal_force: float) -> bool:
+def check_sliding(problems: Problems, path: Array, friction: float, normal_force: float, method: str) -> bool:
     """Check that no tangential force is beyond that at which the whole contact slides."""
     limit = friction * normal_force
     greatest = float(path[np.argmax(np.abs(path))])
     expected = f"at most friction_coefficient times normal force, {limit:.8g} N, where sliding begins"
-    return problems.require(
-        abs(greatest) <= limit * (1 + FORCE_ROUNDING), "tangential_force", expected, greatest
-    )
+    limit *= 1 - BELOW_SLIDING if method == "full" else 1 + FORCE_ROUNDING
+    expected += ", and less by 1e-6 with method='full'" if method == "full" else ""
+    return problems.require(abs(greatest) <= limit, "tangential_force", expected, greatest)
 
 
 @public_result(
@@ -155,8 +160,9 @@ def partial_slip(
         Exactly one of them, as for `press`: the normal load, under which the force stays constant.
     azimuth : float
         Direction of the tangential force in degrees, anticlockwise from +x.
-    method : {"superposition"}
-        Ciavarella and Jaeger: one normal solution for each new tangential force.
+    method : {"superposition", "full"}
+        Ciavarella and Jaeger: one normal solution for each new tangential force. Or, for periodic bodies,
+        Coulomb's law at every node with x and y coupled; a step takes the transforms of some ten normal ones.
     boundary, influence, disc_radius, tolerance
         As for `press`.
     keep : sequence out of "slip_state", "traction_x", "traction_y", "slip_x", "slip_y"
@@ -181,15 +187,15 @@ def partial_slip(
     Warns
     -----
     ConvergenceWarning
-        A normal solution stopped before its tolerance was met.
+        A solution stopped before its tolerance was met.
 
     Notes
     -----
-    A node sticks if it has not slipped since the last reversal of the force. Exact for poisson = 0 and for
-    plane problems; otherwise within a few per cent, because slip across the force and the change of the
-    normal pressure between dissimilar bodies are neglected. A change of the force below `tolerance` times
-    the normal force is not resolved. The stiffness is that of a further step in the same direction, zero
-    where the whole contact slides. Displacements of periodic bodies are without those of the bulk.
+    A node sticks if it has not slipped since the last reversal of the force ("full": in the step). The
+    superposition is exact for poisson = 0, otherwise within a few per cent: slip across the force is
+    neglected. So is, always, the change of the pressure between dissimilar bodies. A change of the force
+    below `tolerance` times the normal force is not resolved. The stiffness is that of a further step in the
+    same direction, zero where all slides. Displacements of periodic bodies are without those of the bulk.
 
     Examples
     --------
@@ -199,14 +205,8 @@ def partial_slip(
     >>> import fractalcontact as fc
     >>> x = 1e-4 * np.arange(-20, 21)
     >>> ball = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2, 1e-4)
-    >>> slipping = fc.contact.partial_slip(
-    ...     ball,
-    ...     contact_modulus=1e9,
-    ...     poisson=0.2,
-    ...     friction_coefficient=0.4,
-    ...     normal_force=3.0,
-    ...     tangential_force=[0.6, -0.6],
-    ... )
+    >>> bodies = {"contact_modulus": 1e9, "poisson": 0.2, "friction_coefficient": 0.4}
+    >>> slipping = fc.contact.partial_slip(ball, normal_force=3.0, tangential_force=[0.6, -0.6], **bodies)
     >>> round(float(slipping["stick_area"][0] / slipping["contact_area"]), 2), round(0.5 ** (2 / 3), 2)
     (0.63, 0.63)
     """
@@ -225,7 +225,7 @@ def partial_slip(
     if control == "closure":
         pressed = next(solve_path(scaled_path(heights, grid, modulus, options, load)))
         normal = pressed.force
-        _check_closure(load, forces, friction, normal)
+        _check_closure(load, forces, friction, normal, method)
     states = shear_states(forces)
     reduced, numbers = reduced_forces(states, normal, friction)
     steps: Iterator[Step] = iter(() if pressed is None else (pressed,))
@@ -236,10 +236,15 @@ def partial_slip(
 
     ratio = (2 - float(poisson)) / (2 - 2 * float(poisson))  # lambda: tangential over normal compliance
     unit = unit_vector(float(azimuth))
-    superposition = Superposition(states, numbers, friction, ratio, unit, grid.cell_area, names)
+    wanted = (*names, "traction_x") if method == "full" else names  # where the full method starts from
+    superposition = Superposition(states, numbers, friction, ratio, unit, grid.cell_area, wanted)
     for step in track(steps, progress, "partial_slip", total=len(reduced)):
         superposition.add(step)
-    result = _dataset(surface, grid, superposition)
+    columns = superposition.columns()
+    maps = {name: superposition.map(name) for name in names}
+    if method == "full":
+        columns, maps = coulomb_path(superposition, forces, float(poisson), tolerance, columns, names)
+    result = _dataset(surface, grid, superposition.normal, columns, maps)
     result = result.assign(
         contact_modulus=modulus, poisson=float(poisson), friction_coefficient=friction
     ).assign_coords(tangential_force=("step", forces), azimuth=float(azimuth))
@@ -253,32 +258,32 @@ def partial_slip(
     return result
 
 
-def _check_closure(load: LoadPath, forces: Array, friction: float, normal: float) -> None:
+def _check_closure(load: LoadPath, forces: Array, friction: float, normal: float, method: str) -> None:
     """Check what is known only when the force under an imposed closure is."""
     with Problems("fractalcontact.contact.partial_slip") as problems:
         expected = "a closure whose force is determined: above the mean plane of a periodic body"
         if problems.require(math.isfinite(normal), "closure", expected, load.values[0]):
-            check_sliding(problems, forces, friction, normal)
+            check_sliding(problems, forces, friction, normal, method)
 
 
-def _dataset(surface: xr.DataArray, grid: Grid, superposition: Superposition) -> xr.Dataset:
+def _dataset(
+    surface: xr.DataArray, grid: Grid, normal: Step, columns: dict[str, Array], maps: dict[str, Array]
+) -> xr.Dataset:
     """Return the Dataset over all steps."""
-    normal = superposition.normal
-    columns = superposition.columns().items()
-    variables: dict[str, Any] = {name: ("step", column) for name, column in columns}
+    variables: dict[str, Any] = {name: ("step", column) for name, column in columns.items()}
     variables["contact_area"] = np.count_nonzero(normal.contact) * grid.cell_area
     variables["nominal_area"] = grid.nominal_area
     if normal.path.body.influence == "disc":
         variables["disc_radius"] = normal.path.body.radius * normal.path.units.length
     coords: dict[str, Any] = {
-        "step": np.arange(len(superposition.states)),
+        "step": np.arange(columns["residual"].size),
         "closure": normal.closure,
         "normal_force": normal.force,
         "nominal_pressure": normal.force / grid.nominal_area,
     }
-    if superposition.names:
+    if maps:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
-        variables |= {name: (("step", "y", "x"), superposition.map(name)) for name in superposition.names}
+        variables |= {name: (("step", "y", "x"), planes) for name, planes in maps.items()}
     return xr.Dataset(variables, coords)
 
 
@@ -288,8 +293,8 @@ def _warn(result: xr.Dataset) -> None:
     if failed.size:
         worst = float(np.fmax.reduce(result["residual"].values))
         message = (
-            f"fractalcontact.contact.partial_slip: normal solutions of {failed.size} steps, the first of"
-            f" them step {failed[0]}, not converged (residual {worst:.2g})"
+            f"fractalcontact.contact.partial_slip: {failed.size} steps not converged, the first of them"
+            f" step {failed[0]} (residual up to {worst:.2g})"
         )
         warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
@@ -412,6 +417,59 @@ class Superposition:
             return np.stack([self.state_maps[number] for number in self.latest])
         factor = self.friction * (1.0 if name.startswith("traction") else self.ratio)  # (1), (3)
         return np.asarray(self.fields[name[:-2]] * factor * self.unit[name.endswith("y")])
+
+
+def coulomb_path(
+    superposition: Superposition,
+    forces: Array,
+    poisson: float,
+    tolerance: float,
+    columns: dict[str, Array],
+    names: Sequence[str],
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return columns and maps of the full method, each step from the superposition and the slip before it."""
+    from fractalcontact.contact import _coulomb
+
+    normal, contact, units = superposition.normal, superposition.contact, superposition.normal.path.units
+    mu, unit = superposition.friction, np.array(superposition.unit)
+    columns = {name: column.copy() for name, column in columns.items()}
+    maps = {name: np.zeros((forces.size, *contact.shape)) for name in names if name != "slip_state"}
+    state_maps = np.zeros((forces.size, *contact.shape), dtype=np.int8)
+    if not contact.any():
+        return columns, maps | {name: state_maps for name in names if name == "slip_state"}
+    bound = mu * normal.solution.pressure[contact]
+    force = normal.solution.force
+    mean_displacement = max(normal.solution.work / force, force * normal.problem.local_compliance)
+    scale = mu * mu * superposition.ratio * force * mean_displacement
+    operator = _coulomb.TangentialOperator(contact, normal.path.body.spacing, poisson)
+    slip, dissipated = np.zeros((2, bound.size)), 0.0
+    for row, tangential in enumerate(forces.tolist()):
+        start, transforms = perf_counter(), operator.transforms
+        guess = superposition.fields["traction"][row][contact] * (mu / units.pressure)
+        goal = unit * (tangential / units.force)
+        step = _coulomb.coulomb_step(operator, bound, slip, goal, unit[:, None] * guess, scale, tolerance)
+        dissipated += float(np.sum(step.q * (step.slip - slip)))
+        slip = step.slip
+        slips = np.hypot(*step.q) >= bound * (1 - _coulomb.AT_BOUND)
+        state_maps[row][contact] = np.where(slips, np.int8(SLIP), np.int8(STICK))
+        for name, planes in maps.items():
+            values = step.q * units.pressure if name.startswith("traction") else slip * units.height
+            planes[row][contact] = values[int(name.endswith("y"))]
+        stiffness = math.inf
+        if not contact.all() or slips.any():
+            stiffness = _coulomb.stiffness(operator, step, bound, unit) * units.force / units.height
+        cell = superposition.cell_area
+        columns["tangential_displacement"][row] = float(step.displacement @ unit) * units.height
+        columns["tangential_stiffness"][row] = stiffness
+        columns["slip_area"][row] = np.count_nonzero(slips) * cell
+        columns["stick_area"][row] = np.count_nonzero(~slips) * cell
+        columns["dissipated_energy"][row] = dissipated * units.energy
+        columns["residual"][row] = max(columns["residual"][row], step.residual)
+        columns["converged"][row] &= step.converged
+        columns["iterations"][row] += step.iterations
+        columns["transforms"][row] += operator.transforms - transforms
+        columns["run_time"][row] += perf_counter() - start
+    return columns, maps | {name: state_maps for name in names if name == "slip_state"}
 
 
 def press_sticking_punch(step: Step) -> Step | None:

@@ -342,7 +342,7 @@ def test_one_node_in_contact():
         ({"friction_coefficient": np.nan}, "friction_coefficient"),
         ({"poisson": 0.6}, "poisson"),
         ({"azimuth": np.nan}, "azimuth"),
-        ({"method": "full"}, "method"),
+        ({"method": "fast"}, "method"),
         ({"keep": ("state",)}, "keep"),
         ({"normal_force": [1.0, 2.0]}, "the normal load is constant"),
         ({"normal_force": 1.0, "closure": 1e-6}, "exactly one"),
@@ -370,3 +370,118 @@ def test_bad_input_with_imposed_closure():
 def test_surface_with_gaps_is_refused():
     with pytest.raises(InvalidInput, match="surface"):
         sheared(rough(12).where(rough(12).x > 2e-5), 0.1)
+
+
+def test_full_is_the_superposition_without_poisson_effect():
+    forces = [0.1, 0.3, -0.1, 0.2]
+    simple, full = (
+        sheared(rough(), forces, poisson=0.0, method=method, azimuth=25.0, tolerance=1e-10)
+        for method in ("superposition", "full")
+    )
+    for name in (*ALL, "tangential_displacement", "dissipated_energy", "stick_area", "slip_area"):
+        scale = float(abs(simple[name]).max())
+        np.testing.assert_allclose(full[name], simple[name], atol=1e-6 * scale)
+    np.testing.assert_allclose(full["tangential_stiffness"], simple["tangential_stiffness"], rtol=1e-3)
+    assert full["converged"].all()
+
+
+def periodic_operator(n, spacing, contact, poisson):
+    """Return the dense K (2 m, 2 m) of two like periodic bodies on the nodes in contact, from its modes."""
+    k = 2 * np.pi * np.fft.fftfreq(n, spacing)
+    ky, kx = np.meshgrid(k, k, indexing="ij")
+    size = np.hypot(kx, ky)
+    size[0, 0] = np.inf
+    size[0, 0], angle = 1.0, np.arctan2(ky, kx)
+    along, across = 2 / (MODULUS * size), 2 / (MODULUS * size * (1 - poisson))
+    along[0, 0] = across[0, 0] = 0.0
+    coupling = (along - across) * np.sin(angle) * np.cos(angle)
+    coupling[n // 2, :] = coupling[:, n // 2] = 0.0
+    c2, s2 = np.cos(angle) ** 2, np.sin(angle) ** 2
+    kernels = [np.fft.ifft2(m).real for m in (along * c2 + across * s2, along * s2 + across * c2, coupling)]
+    iy, ix = np.nonzero(contact)
+    xx, yy, xy = (m[(iy[:, None] - iy) % n, (ix[:, None] - ix) % n] for m in kernels)
+    return np.block([[xx, xy], [xy, yy]])
+
+
+def test_dense_operator_is_that_of_a_point_force():
+    """u_x is larger along the force than across it, by 2 nu/(2 pi G r) for two bodies (Cerruti)."""
+    contact = np.zeros((256, 256), dtype=bool)
+    contact[[0, 0, 8], [0, 8, 0]] = True  # the force, a node along it, a node across it
+    operator = periodic_operator(256, 1.0, contact, 0.3)
+    shear_modulus = MODULUS * (1 - 0.3)  # 1/E* = (1 - nu)/G for two like bodies
+    assert operator[1, 0] - operator[2, 0] == pytest.approx(0.3 / (np.pi * shear_modulus * 8), rel=0.02)
+
+
+def test_full_stiffness_of_stuck_circle():
+    """k_t/k_n = 2 (1 - nu)/(2 - nu), as in the superposition, for one round contact far from its images."""
+    x = np.arange(-32, 32)
+    cap = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2e3, 1.0, periodic=True)
+    given = {"poisson": 0.4, "normal_force": 8e8, "keep": ()}
+    simple, full = (sheared(cap, 0.0, method=method, **given) for method in ("superposition", "full"))
+    assert 100 < float(full["contact_area"]) < 400
+    ratio = float(full["tangential_stiffness"][0] / simple["tangential_stiffness"][0])
+    assert ratio == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("poisson", [0.2, 0.5])
+def test_full_against_dense_operator(poisson):
+    """Coulomb's law at every node, with the displacement of a dense operator; its solution is unique."""
+    surface, forces = rough(32), [0.15, 0.32, -0.1]
+    result = sheared(surface, forces, poisson=poisson, method="full", tolerance=1e-10)
+    pressed = fc.contact.press(
+        surface, contact_modulus=MODULUS, normal_force=1.0, keep=("pressure",), tolerance=1e-12
+    )
+    pressure = pressed["pressure"][0].values
+    contact = pressure > 0
+    assert 40 < contact.sum() < 500
+    bound = FRICTION * pressure[contact]
+    operator = periodic_operator(32, 1e-5, contact, poisson)
+    np.testing.assert_allclose(operator, operator.T, atol=1e-12 * operator.max())  # reciprocity
+    before = np.zeros((2, bound.size))
+    for step, force in enumerate(forces):
+        q = np.stack([result[f"traction_{axis}"][step].values[contact] for axis in "xy"])
+        slip = np.stack([result[f"slip_{axis}"][step].values[contact] for axis in "xy"])
+        np.testing.assert_allclose(q.sum(1) * 1e-10, [force, 0], atol=1e-10)
+        assert (np.hypot(*q) <= bound + 1e-8 * bound.max()).all()
+        moved = (operator @ q.ravel()).reshape(2, -1) + slip  # displacement and slip: that of the upper body
+        scale = float(result["tangential_displacement"][1])
+        np.testing.assert_allclose(
+            moved, moved.mean(1, keepdims=True) * np.ones_like(moved), atol=1e-6 * scale
+        )
+        assert moved[0].mean() == pytest.approx(float(result["tangential_displacement"][step]), rel=1e-5)
+        increment, before = slip - before, slip
+        slips = result["slip_state"][step].values[contact] == 2
+        assert abs(increment[:, ~slips]).max() < 1e-6 * scale
+        work = (increment * q).sum(0)
+        np.testing.assert_allclose(work[slips], (np.hypot(*increment) * bound)[slips], atol=1e-5 * work.max())
+        assert abs(q[1]).max() > 1e-3 * bound.max()  # the directions are coupled
+
+
+def test_full_rotates_with_the_surface():
+    surface = rough(32)
+    turned = fc.surfaces.from_array(np.rot90(surface.values, -1), 1e-5, periodic=True)
+    one = sheared(surface, [0.2, -0.1], azimuth=30.0, method="full", tolerance=1e-10)
+    other = sheared(turned, [0.2, -0.1], azimuth=120.0, method="full", tolerance=1e-10)
+    for name in ("tangential_displacement", "dissipated_energy"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-5)
+    x, y = (np.rot90(one[name].values, -1, axes=(1, 2)) for name in ("traction_x", "traction_y"))
+    np.testing.assert_allclose(other["traction_x"], -y, atol=1e-4 * abs(x).max())
+    np.testing.assert_allclose(other["traction_y"], x, atol=1e-4 * abs(x).max())
+
+
+def test_full_stiffness_is_slope_of_the_path():
+    result = sheared(rough(), [0.2, 0.20002], method="full", keep=(), tolerance=1e-12)
+    slope = 2e-5 / float(np.diff(result["tangential_displacement"].values)[0])
+    assert float(result["tangential_stiffness"][0]) == pytest.approx(slope, rel=5e-3)
+
+
+def test_full_extremes():
+    flat = fc.surfaces.from_array(np.zeros((12, 12)), 1e-5, periodic=True)
+    result = sheared(flat, [0.0, 0.3], method="full")
+    np.testing.assert_allclose(result["traction_x"][1], 0.3 / 144e-10)
+    assert not result["slip_area"].any()
+    assert not sheared(rough(), 0.0, normal_force=0.0, method="full")["slip_state"].any()
+    with pytest.raises(InvalidInput, match="less by 1e-6"):
+        sheared(rough(), 0.4, method="full")
+    with pytest.raises(InvalidInput, match="free bodies"):
+        sheared(rough(periodic=False), 0.1, method="full")
