@@ -3,10 +3,13 @@
 import doctest
 import importlib
 import re
+import textwrap
 from pathlib import Path
 
 import matplotlib as mpl
 import pytest
+
+import fractalcontact as fc
 
 SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints", "accuracy", "scenes", "plotting")
 ROOT = Path(__file__).resolve().parent.parent
@@ -63,3 +66,14 @@ def test_readme_example_runs():
     for block in blocks:
         exec(compile(block, "README.md", "exec"), {})
     assert list(Path().glob("*.nc"))
+
+
+def test_loop_over_members_of_the_data_model_runs():
+    text = (ROOT / "gallery" / "data_model.rst").read_text(encoding="utf-8")
+    (block,) = re.findall(r"code-block:: python\n\n(.*?)(?=\n\S)", text, flags=re.DOTALL)
+    names = {}
+    exec(compile(textwrap.dedent(block), "data_model.rst", "exec"), names)
+    for number, face in enumerate(names["faces"]):
+        alone = fc.contact.press(face, contact_modulus=1e9, nominal_pressure=1e5)
+        assert names["pressed"].contact_fraction[number].item() == alone.contact_fraction.item()
+    assert {names[name].sizes["member"] for name in ("pressed", "roughness", "closed")} == {3}

@@ -17,6 +17,13 @@ from fractalcontact.plotting._contact_maps import contact_domains
 from fractalcontact.plotting._decorrelation import correlation
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directions import evenly_sampled_reach
+from fractalcontact.plotting._ensemble import (
+    BAND,
+    MEDIAN,
+    draw_with_band,
+    member_count,
+    quantile_over_members,
+)
 from fractalcontact.plotting._friction import friction
 from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import islands
@@ -46,7 +53,8 @@ def draw(
     Parameters
     ----------
     tree : DataTree
-        From `fractalcontact.scenes.run` or `fractalcontact.open`.
+        From `fractalcontact.scenes.run` or `fractalcontact.open`. Of an ensemble the curves are the median
+        over the members with the band of their central 68 %; the maps are those of member 0, and say so.
     folder : path-like
         Created if it does not exist. An existing figure of the same name is replaced once the new one is
         complete.
@@ -74,11 +82,23 @@ def draw(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, drawing in track(list(_drawings(tree, paper)), progress, "figures", unit="figure"):
+    for name, drawing in track(_all_drawings(tree, paper), progress, "figures", unit="figure"):
         figure = drawing()
         written.append(_write(figure, folder / f"{name}.png"))
         figure.clear()
     return written
+
+
+def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Callable[[], Figure]]]:
+    """Return file name and drawing function of every figure; of an ensemble with a band of the members."""
+    members = member_count(tree)
+    if not members:
+        return list(_drawings(tree, paper))
+    trees = [quantile_over_members(tree, share) for share in (MEDIAN, *BAND)]
+    figures = zip(*(_drawings(reduced, paper) for reduced in trees), strict=True)
+    return [
+        (each[0][0], _later(draw_with_band, [drawing for _, drawing in each], members)) for each in figures
+    ]
 
 
 def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[], Figure]]]:

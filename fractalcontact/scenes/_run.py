@@ -20,7 +20,6 @@ from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
-from fractalcontact.scenes._report import first_member
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
@@ -206,7 +205,7 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> No
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    plotting.draw(first_member(tree), folder, progress=progress, paper=paper)
+    plotting.draw(tree, folder, progress=progress, paper=paper)
     entry = json.loads(tree.attrs["provenance"])
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)

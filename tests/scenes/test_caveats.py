@@ -1,12 +1,15 @@
 """Caveats below the summary: each appears where it holds, and only there."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
 import xarray as xr
+from study import SOUND
 
 import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput, SmallStrainWarning
 
 PERIODIC = fc.surfaces.spectral(
     (128, 128), 1e-5, hurst=0.8, rolloff=3e-4, short_cutoff=1e-4, rms_slope=0.05, rng=1
@@ -73,3 +76,27 @@ def test_no_yield_without_a_stated_material_or_below_it(rough):
 def test_no_caveat_of_yield_where_a_hardness_is_given():
     hard = fc.contact.press(GRID_NOISE, contact_modulus=1e9, nominal_pressure=1e6, hardness=5e7)
     assert "yields" not in text(study(hard, yield_pressure=[1e6, 2e7]))
+
+
+@pytest.mark.parametrize(("slope", "is_told"), [(0.2, False), (0.5, True)])
+def test_steep_slopes_are_told_without_figures(slope, is_told):
+    surface = fc.surfaces.spectral((64, 64), 1e-5, hurst=0.8, rms_slope=slope, rng=1)
+    pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=1e5, keep=())
+    assert ("contact: the surface has an rms slope of up to" in text(study(pressed))) == is_told
+    assert ("strains are not small" in text(study(pressed))) == is_told
+
+
+def test_study_tells_steep_slopes_once_and_does_not_warn(tmp_path):
+    steep = SOUND.replace("rms_increment = 4e-6", "rms_increment = 1e-4")
+    (tmp_path / "study.toml").write_text(steep, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SmallStrainWarning)
+        tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    assert text(tree).count("the delta-surface has an rms slope of up to") == 1
+
+
+def test_yield_pressure_of_a_scene_is_checked(tmp_path):
+    wrong = SOUND.replace("poisson = 0.2", "poisson = 0.2\nyield_pressure = [-1.0, 1e9]")
+    (tmp_path / "study.toml").write_text(wrong, encoding="utf-8")
+    with pytest.raises(InvalidInput, match=r"material\.yield_pressure"):
+        fc.scenes.load(tmp_path / "study.toml")

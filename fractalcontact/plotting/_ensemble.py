@@ -1,0 +1,111 @@
+"""Figures of an ensemble: curves of the median over the members, with a band of their spread."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.units import recorded_scales, replayed_scales
+from fractalcontact.plotting import _style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MEMBER = "member"
+MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
+
+
+def member_count(tree: xr.DataTree) -> int:
+    """Return the number of members of an ensemble; 0 for a single study."""
+    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
+
+
+def quantile_over_members(tree: xr.DataTree, share: float) -> xr.DataTree:
+    """Return a quantile of every curve over the members; maps and flags are those of member 0."""
+    return tree.map_over_datasets(lambda dataset: _quantile(dataset, share))
+
+
+def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
+    for dim in ("island", "link"):  # rows of all members, one after the other
+        if f"{dim}_{MEMBER}" in dataset.coords:
+            dataset = dataset.isel({dim: np.flatnonzero(dataset[f"{dim}_{MEMBER}"].values == 0)})
+    if MEMBER not in dataset.dims:
+        return dataset
+    loads = [name for name, coord in dataset.coords.items() if MEMBER in coord.dims and name != MEMBER]
+    flat = dataset.reset_coords(loads)
+    reduced = {}
+    for name, variable in flat.data_vars.items():
+        is_map = {"y", "x"} <= set(variable.dims) or variable.dtype.kind not in "fiu"
+        if MEMBER not in variable.dims:
+            reduced[name] = variable
+        elif is_map or variable.dtype == np.int8:
+            reduced[name] = variable.isel({MEMBER: 0}, drop=True)
+        else:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
+                values = np.nanquantile(variable.values.astype(float), share, variable.dims.index(MEMBER))
+            kept = variable.isel({MEMBER: 0}, drop=True)
+            reduced[name] = kept.copy(data=values)
+    rest = flat.drop_dims(MEMBER)
+    return rest.assign(reduced).set_coords(loads)
+
+
+def draw_with_band(drawings: Sequence[Callable[[], Figure]], members: int) -> Figure:
+    """Draw the median, and for every curve the band between the same curves of the two other drawings."""
+    middle, *ends = drawings
+    with recorded_scales() as record:
+        figure = middle()
+    bounds = []
+    for drawing in ends:
+        with replayed_scales(record):
+            bounds.append(drawing())
+    bands = sum(
+        _add_bands(ax, low, high)
+        for ax, low, high in zip(figure.axes, *(bound.axes for bound in bounds), strict=False)
+    )
+    for bound in bounds:
+        bound.clear()
+    has_map = any(ax.images or ax.name == "3d" for ax in figure.axes)
+    words = [f"curves: median, band: central 68 % of {members} members"] if bands else []
+    if has_map:
+        words.append(f"maps: member 0 of {members}" if bands else f"member 0 of {members}")
+    if not words:
+        words = [f"median of {members} members"]
+    figure.supxlabel("; ".join(words), x=0.99, ha="right", fontsize=7.5, color=_style.GREY)
+    return figure
+
+
+def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
+    """Fill between the curves of two axes, in the colour of the same curve; return how many were filled."""
+    count, limits = 0, (ax.get_xlim(), ax.get_ylim())
+    lines = [list(axes.get_lines()) for axes in (ax, low, high)]
+    if len({len(found) for found in lines}) > 1:
+        return 0
+    for line, *bounds in zip(*lines, strict=True):
+        (x_low, y_low), (x_high, y_high) = (
+            np.broadcast_arrays(*(np.asarray(values, dtype=float) for values in bound.get_data()))
+            for bound in bounds
+        )
+        same = x_low.size == x_high.size and bool(np.all((x_low == x_high) & (y_low == y_high)))
+        if x_low.size < 2 or x_low.size != x_high.size or same:
+            continue
+        known = np.isfinite(x_low + y_low + x_high + y_high)
+        x = np.concatenate([x_low[known], x_high[known][::-1]])
+        y = np.concatenate([y_low[known], y_high[known][::-1]])
+        ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5)
+        limits = tuple(
+            (min(end[0], float(values.min(initial=end[0]))), max(end[1], float(values.max(initial=end[1]))))
+            if end[0] <= end[1]
+            else end
+            for end, values in zip(limits, (x, y), strict=True)
+        )
+        count += 1
+    if count:
+        ax.set_xlim(limits[0])
+        ax.set_ylim(limits[1])
+    return count

@@ -1,0 +1,91 @@
+"""Figures of an ensemble: median and quantiles of the members, and words that say so."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import fractalcontact as fc
+
+FORCES = np.array([1.0, 2.0, 4.0])
+FACTORS = np.array([0.01, 0.02, 0.03, 0.05, 0.09])
+
+
+@pytest.fixture
+def drawn(monkeypatch, tmp_path):
+    """Draw a tree and return what its figures show: curves, corners of bands, and all words."""
+
+    def draw(tree):
+        shown = {}
+        print_png = FigureCanvasAgg.print_png
+
+        def record(canvas, target, *arguments, **options):
+            figure, name = canvas.figure, str(target)
+            curves = [line.get_xydata() for ax in figure.axes for line in ax.get_lines()]
+            bands = [patch.get_xy() for ax in figure.axes for patch in ax.patches if hasattr(patch, "get_xy")]
+            words = figure._supxlabel.get_text() if figure._supxlabel else ""
+            shown[name] = curves, [np.asarray(band) for band in bands if np.ndim(band) == 2], words
+            return print_png(canvas, target, *arguments, **options)
+
+        monkeypatch.setattr(FigureCanvasAgg, "print_png", record)
+        fc.plotting.draw(tree, tmp_path)
+        return {key: value for name, value in shown.items() for key in NAMES if key in name}
+
+    return draw
+
+
+NAMES = ("contact_area", "contact_domains", "closure_law")
+
+
+def study(factors):
+    """Return the tree of an ensemble whose contact areas are known multiples of the force."""
+    area = FORCES * factors[:, None] / 10
+    state = np.zeros((factors.size, 3, 8, 8), np.int8)
+    state[:, :, :2, :2] = 1
+    pressed = xr.Dataset(
+        {
+            "contact_fraction": (("member", "step"), area),
+            "corrected_contact_fraction": (("member", "step"), 0.5 * area),
+            "state": (("member", "step", "y", "x"), state),
+        },
+        {
+            "member": np.arange(factors.size),
+            "step": np.arange(3),
+            "normal_force": ("step", FORCES, {"units": "N"}),
+            "closure": (("member", "step"), 1e-6 * area / FORCES, {"units": "m"}),
+            "y": ("y", np.arange(8.0), {"units": "m"}),
+            "x": ("x", np.arange(8.0), {"units": "m"}),
+        },
+    )
+    return xr.DataTree.from_dict({"contact": pressed})
+
+
+def test_curves_are_the_median_and_bands_the_quantiles(drawn):
+    curves, bands, words = drawn(study(FACTORS))["contact_area"]
+    assert words == "curves: median, band: central 68 % of 5 members"
+    cells = next(curve for curve in curves if curve[-1, 1] == pytest.approx(100 * 0.03 * 0.4))
+    np.testing.assert_allclose(cells[:, 1], 100 * 0.03 * FORCES / 10)
+    low, high = np.quantile(FACTORS, [0.16, 0.84]) * 100 / 10
+    corners = max(bands, key=lambda band: band[:, 1].max())
+    np.testing.assert_allclose(corners[:3], np.column_stack([FORCES, low * FORCES]))
+    np.testing.assert_allclose(corners[3:6], np.column_stack([FORCES, high * FORCES])[::-1])
+
+
+def test_band_has_the_unit_of_the_axis(drawn):
+    # closures from nanometres to hundreds of micrometres: each alone would have another prefix
+    curves, bands, _ = drawn(study(np.array([1e-4, 1.0, 1e3])))["closure_law"]
+    low, middle, high = np.quantile([1e-4, 1.0, 1e3], [0.16, 0.5, 0.84])
+    shown = next(curve for curve in curves if len(curve) == 3)[0, 0]
+    assert bands[0][0, 0] / shown == pytest.approx(low / middle)
+    assert bands[0][-2, 0] / shown == pytest.approx(high / middle)
+
+
+def test_maps_name_their_member(drawn):
+    assert drawn(study(FACTORS))["contact_domains"][2] == "member 0 of 5"
+
+
+def test_single_study_has_neither_bands_nor_words(drawn):
+    single = study(FACTORS).map_over_datasets(lambda dataset: dataset.isel(member=0, missing_dims="ignore"))
+    for curves, bands, words in drawn(single).values():
+        assert not bands or not curves
+        assert words == ""
