@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -98,14 +98,17 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         x = np.concatenate([x_low[known], x_high[known][::-1]])
         y = np.concatenate([y_low[known], y_high[known][::-1]])
         ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5)
-        limits = tuple(
-            (min(end[0], float(values.min(initial=end[0]))), max(end[1], float(values.max(initial=end[1]))))
-            if end[0] <= end[1]
-            else end
-            for end, values in zip(limits, (x, y), strict=True)
-        )
+        limits = _widened(limits[0], x), _widened(limits[1], y)
         count += 1
     if count:
         ax.set_xlim(limits[0])
         ax.set_ylim(limits[1])
     return count
+
+
+def _widened(limits: tuple[float, float], values: np.ndarray[Any, Any]) -> tuple[float, float]:
+    """Return the limits of an axis with all values inside; those of an inverted axis stay."""
+    low, high = limits
+    if low > high:
+        return limits
+    return min(low, float(values.min(initial=low))), max(high, float(values.max(initial=high)))
