@@ -76,7 +76,7 @@ def _check(
     problems.number("friction_coefficient", friction_coefficient, above=0, at_most=GREATEST_FRICTION)
     problems.numbers("tangential_force", tangential_force)
     problems.number("azimuth", azimuth)
-    problems.choice("method", method, METHODS)
+    method_is_valid = problems.choice("method", method, METHODS)
     problems.choices("keep", keep, SLIP_MAPS)
     problems.boolean("progress", progress)
     options = problems.construct(ContactOptions, **keywords)
@@ -93,7 +93,7 @@ def _check(
         return
     grid = read_grid(surface)
     options.check_grid(grid, problems)
-    if method == "full":
+    if method_is_valid and method == "full":
         expected = "'superposition' for free bodies: 'full' is for periodic ones"
         problems.require(options.is_periodic(grid), "method", expected, method)
     if load is None or problems.messages:
