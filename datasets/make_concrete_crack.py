@@ -1,10 +1,10 @@
-"""Make `concrete_crack.nc`: a synthetic face that behaves like the scanned one of the paper.
+"""Make `concrete_crack.nc`: a synthetic face with the statistics of the scanned one of the paper.
 
 A self-affine face of fractal dimension 2.22 (Hurst exponent 0.78) up to a roll-off at 12 mm, beyond which the
-heights forget each other; a mean plane that falls towards W and N, so that sliding E and S climbs it; and a
-few pores in the cement paste, which both faces carry and which decide how far the block must rise before it
-slides freely. It is drawn on a grid four times finer than the one that is kept, because points scanned 80 um
-apart say nothing of the shorter waves they skip. Heights are rounded to 2 um, the precision of the scanner.
+heights are no longer correlated; a mean plane that falls towards W and N, so that sliding E and S climbs it;
+and a few pores in the cement paste, which both faces carry and which decide how far the block must rise
+before it slides freely. It is drawn on a grid four times finer than the one that is kept, because points
+scanned 80 um apart do not resolve shorter waves. Heights are rounded to 2 um, the precision of the scanner.
 
     python datasets/make_concrete_crack.py            writes the file beside this script
 """

@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         default=0,
         metavar="N",
-        help="share members, shears and directions between N processes (0: none)",
+        help="share members, shears and directions between N processes (default 0: this process)",
     )
     run.set_defaults(action=_run)
 
@@ -85,22 +85,22 @@ def _parser() -> argparse.ArgumentParser:
         help="folder for the results (NetCDF) and figures; after a stop of `estimators` the same command "
         "continues",
     )
-    accuracy.add_argument("--budget", type=float, default=60.0, help="seconds for the whole (60)")
+    accuracy.add_argument("--budget", type=float, default=60.0, help="time budget in seconds (default 60)")
     accuracy.add_argument(
         "--extreme",
         action="store_true",
         help="run the catalogue of extreme cases instead, or the cases named",
     )
     accuracy.add_argument(
-        "--large", action="store_true", help="with --extreme: also the cases of minutes and gigabytes"
+        "--large", action="store_true", help="with --extreme: also cases that take minutes and gigabytes"
     )
     bench = accuracy.add_argument_group("estimators")
-    bench.add_argument("--hurst", type=float, nargs="+", help="exponents (.1 .3 .5 .7 .9)")
-    bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (64 256 1024)")
+    bench.add_argument("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
+    bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
     bench.add_argument("--families", nargs="+", help="fbm, spectral (default: both)")
     bench.add_argument("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
-    bench.add_argument("--members", type=int, nargs="+", help="surfaces for each case (25600 over the size)")
-    bench.add_argument("--seed", type=int, help="of the random stream")
+    bench.add_argument("--members", type=int, nargs="+", help="surfaces for each case (default 25600 / size)")
+    bench.add_argument("--seed", type=int, help="seed of the random stream")
     accuracy.set_defaults(action=_accuracy)
 
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")

@@ -56,8 +56,8 @@ slopes = fc.plotting.local_slopes(dimensions[0.8])
 def coarsen(surface, factor):
     """Return a surface with the waves that a grid coarser by a factor can represent."""
     modes = np.fft.fft2(surface.values)
-    kept = np.fft.fftfreq(N // factor, 1 / (N // factor)).astype(int)
-    heights = np.fft.ifft2(modes[np.ix_(kept, kept)]).real / factor**2
+    wavenumbers = np.fft.fftfreq(N // factor, 1 / (N // factor)).astype(int)
+    heights = np.fft.ifft2(modes[np.ix_(wavenumbers, wavenumbers)]).real / factor**2
     return fc.surfaces.from_array(heights, 1e-5 * factor, periodic=True)
 
 

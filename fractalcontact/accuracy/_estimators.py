@@ -255,7 +255,7 @@ def _empty_table(
 
 
 def _with_reasons(table: xr.Dataset) -> xr.Dataset:
-    """Say for every variable why values are missing."""
+    """State for every variable why values are missing."""
     stopped = bool(table["least_error"].isnull().any())
     for name in (*MEASURED, "least_error"):
         reasons = ["the run was stopped before this case"] if stopped else []

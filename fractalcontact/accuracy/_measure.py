@@ -32,7 +32,7 @@ EQUAL_ERRORS = 1.01  # ratio of two errors that is no difference
 LEAST_SCATTER = 0.1  # of the logarithm of a run time, also where the two timings agree
 
 MEASURED = ("error", "run_time", "first_run_time", "memory")
-ALONE, OPTIMAL, DOMINATED, UNDECIDED = "alone", "Pareto optimal", "dominated", "undecided"
+ONLY, OPTIMAL, DOMINATED, UNDECIDED = "only method", "Pareto optimal", "dominated", "undecided"
 
 
 @dataclass
@@ -113,8 +113,8 @@ def measure(
     the second follows when all methods were measured, and takes up to a quarter of the budget. A method is
     "dominated" if it was measured at all its settings, and at each another method is clearly better in both
     error and time. It is "Pareto optimal" if at one setting all others are clearly worse in one of the two,
-    and none has a setting left that could be better. Otherwise the verdict is "undecided": a larger budget
-    or an idle machine can decide it.
+    and none has a setting left that could be better. The "only method" of a benchmark is compared with none.
+    Otherwise the verdict is "undecided": a larger budget or an idle machine can decide it.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def measure(
     >>> flow = [b for b in fc.accuracy.benchmarks("joints") if b.name == "checkerboard"]
     >>> measured = fc.accuracy.measure({"flow": flow}, budget=0.05)["flow"]
     >>> print(str(measured["verdict"].values[0]), bool(measured["error"][0, 0] < 0.1))
-    alone True
+    only method True
     """
     with Problems(WHERE) as problems:
         _check_parts(problems, parts)
@@ -352,7 +352,7 @@ class Comparison:
 
     def _verdict(self, number: int, curve: Curve) -> str:
         if len(self.benchmark.methods) == 1:
-            return ALONE
+            return ONLY
         mine = np.flatnonzero(self.owner == number).tolist()
         if any(self.unbeaten[place] and self._is_final(place) for place in mine):
             return OPTIMAL

@@ -1,7 +1,7 @@
 """Decorators that compile loops with Numba; no other module calls `numba.njit`.
 
 Kernels are plain loops over arrays, compiled at the first call and cached on disk. They follow IEEE rules
-(no fast-math unless the decorator says so; a division by zero gives infinity or NaN). A sum that must not
+(no fast-math unless the decorator sets it; a division by zero gives infinity or NaN). A sum that must not
 depend on the number of threads is done by rows in the kernel, then serially over the rows.
 """
 

@@ -12,7 +12,7 @@ The function returns plain variables and coordinates with names of `base.schema`
 `reason` and `long_name` of a data variable are kept; the attributes of the Dataset or DataArray itself become
 entries of its provenance, except `title` and `references`, which replace those of the decorator,
 `parameters`, a dict that replaces recorded arguments (a default that depends on others, a path to
-shorten), and `completeness`, which stays an attribute: it says what a stopped run left out.
+shorten), and `completeness`, which stays an attribute: it lists what a stopped run left out.
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ QUANTITIES: dict[str, Quantity] = {
     "profile_slope": Quantity("1", "root mean square slope Z2 of the profile at a lag"),
     "smoothing": Quantity("m", "length of shear over which the slope of the dilatancy was taken"),
     "stiffness": Quantity("Pa m-1", "normal stiffness per nominal area"),
-    "interpolation_error": Quantity("m", "root mean square error of the heights between whole cells"),
+    "interpolation_error": Quantity("m", "rms interpolation error for shifts of a fraction of a cell"),
     "aperture": Quantity("m", "mechanical aperture"),
     "correlation": Quantity("1", "correlation of the facing heights"),
     "structure_function": Quantity("m2", "mean square difference of the facing heights"),
@@ -506,7 +506,7 @@ def _follows_dim(name: str, dims: tuple[Hashable, ...]) -> bool:
 
 
 def _label_own(name: str, variable: xr.Variable) -> None:
-    """Label the coordinate of a dim that the table does not know."""
+    """Label the coordinate of a dim that is not in the table."""
     attributes = {"long_name": str(variable.attrs.get("long_name", name))}
     if variable.dtype.kind in "biuf":
         attributes["units"] = str(variable.attrs.get("units", "1"))

@@ -128,14 +128,14 @@ def radial_average(
     )
     ring, weight = ring[inside], weights.ravel()[inside]
     counts = np.bincount(ring, weight, minlength=edges.size - 1)
-    kept = counts > 0
-    q = np.bincount(ring, weight * radius.ravel()[inside], minlength=counts.size)[kept] / counts[kept]
+    filled = counts > 0
+    q = np.bincount(ring, weight * radius.ravel()[inside], minlength=counts.size)[filled] / counts[filled]
     planes = psd.reshape(-1, radius.size)[:, inside]
     mean: Array = np.stack(
-        [np.bincount(ring, weight * plane, minlength=counts.size)[kept] for plane in planes]
+        [np.bincount(ring, weight * plane, minlength=counts.size)[filled] for plane in planes]
     )
-    mean = mean / counts[kept]
-    return q, mean.reshape(*psd.shape[: -len(shape)], q.size), counts[kept].astype(np.int64)
+    mean = mean / counts[filled]
+    return q, mean.reshape(*psd.shape[: -len(shape)], q.size), counts[filled].astype(np.int64)
 
 
 @dataclass(frozen=True)

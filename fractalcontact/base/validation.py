@@ -214,8 +214,8 @@ class Problems:
 
     def exactly_one(self, **options: object) -> bool:
         """Check that one of the options is given and the others are None; `given_option` returns it."""
-        given = [name for name, value in options.items() if value is not None]
-        return self.require(len(given) == 1, " / ".join(options), "exactly one of them", given or NONE)
+        names = [name for name, value in options.items() if value is not None]
+        return self.require(len(names) == 1, " / ".join(options), "exactly one of them", names or NONE)
 
     def finite(self, argument: str, array: xr.DataArray | np.ndarray, *, remedy: str = "") -> bool:
         """Check that all values are finite; otherwise report how many are not."""

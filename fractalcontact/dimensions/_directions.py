@@ -107,7 +107,7 @@ def directions(
         that an isotropic surface differs as much between directions); `anisotropy_ratio` of the
         correlation lengths along and across `anisotropy_azimuth`, with its 95 % interval
         (`anisotropy_ratio_low`, `anisotropy_ratio_high`); `anisotropy_p_value` (the same probability for a
-        surface of that ratio). The attribute `reason` says why a value is NaN.
+        surface of that ratio). The attribute `reason` states why a value is NaN.
 
     Raises
     ------

@@ -37,8 +37,8 @@ METHODS = {
         _INCREMENTS,
     ),
     "spectrum": Method(
-        "slope of the radially averaged power spectral density; periodic surfaces, too low on rough free "
-        "ones; no interval",
+        "slope of the radially averaged power spectral density; periodic surfaces; "
+        "underestimates H of free surfaces where it is below 0.6; no interval",
         "Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
         gaps=False,
     ),
@@ -63,19 +63,19 @@ METHODS = {
         smallest=5,
     ),
     "variation": Method(
-        "growth of the range of heights over segments of rows and columns; H too high by 0.05 to 0.25 where "
-        "it is below 0.8; no interval",
+        "growth of the range of heights over segments of rows and columns; overestimates H by 0.05 "
+        "to 0.25 where it is below 0.8; no interval",
         "Dubuc, Quiniou, Roques-Carmes, Tricot and Zucker, Physical Review A 39 (1989) 1500-1512; Hall and "
         "Wood, Biometrika 80 (1993) 246-252",
     ),
     "cube_counts": Method(
-        "slope of the number of cubes that meet the surface, heights scaled to the extent; H too high by "
-        "0.05 to 0.4; no interval",
+        "slope of the number of cubes that meet the surface, heights scaled to the extent; "
+        "overestimates H by 0.05 to 0.4; no interval",
         f"{PAPER}; {_CLARKE}",
     ),
     "covering": Method(
-        "slope of the triangulated area in natural scale; 2 for flat surfaces, the dimension only where "
-        "slopes are far above 1; no interval",
+        "slope of the triangulated area in natural scale; gives a dimension of 2 for flat surfaces, and that "
+        "of the surface only where slopes are far above 1; no interval",
         _CLARKE,
     ),
 }

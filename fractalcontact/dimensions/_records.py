@@ -21,7 +21,7 @@ class Estimate:
     hurst : float
         As fitted; `limited` brings it into 0 ... 1.
     standard_error, ci_low, ci_high : float
-        NaN where no validated interval exists; `reason` then says why.
+        NaN where no validated interval exists; `reason` then states why.
     scale_min, scale_max : float
         Window of the fit, m.
     rms_increment : float

@@ -87,9 +87,9 @@ def box_dimension(
     mask : DataArray, dims (..., y, x)
         Boolean, or integer flags where contact means value > 0.
     scales : sequence of int, optional
-        Edges of the boxes in cells, for a least-squares slope of ln N over ln s. By default the products
-        of 2 and 3 from 1 to the geometric mean of the cell and the extent (at least to 9), and the mean
-        local slope over the ratio, 2 or 3, at which it varies least.
+        Edges of the boxes in cells, for a least-squares slope of ln N over ln s. By default the sizes are
+        the products of 2 and 3 from 1 to the geometric mean of the cell and the extent (at least to 9). The
+        dimension is then the mean local slope over the ratio of sizes, 2 or 3, at which it varies least.
     cover : {"minimum", "mean", "aligned"}
         The fewest boxes over all offsets of the grid, their mean over all offsets, or the boxes of the one
         grid that starts at the first cell. The default fit combines the first two.

@@ -227,8 +227,8 @@ def build_dataset(
 def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
     """Return where along every leading dim the plane of each row of a table lies.
 
-    The coordinates are named after the row and the dim, as in `island_step`. A dim that the schema does not
-    know gives its index.
+    The coordinates are named after the row and the dim, as in `island_step`. A dim that is not in the
+    schema gives its index.
     """
     coords: dict[str, Any] = {}
     places = np.unravel_index(plane, planes.shape) if planes.dims else ()

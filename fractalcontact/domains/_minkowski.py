@@ -177,7 +177,7 @@ def null_area(cells: float, observed: float, grid: Grid, radii: Array) -> Array:
 def rows_to_set(cells: Array, reach: int, wrap: bool, above: Array, below: Array) -> None:
     """Find the rows to the nearest cell of the set in each column, up and down; reach + 1 beyond the reach.
 
-    `cells` is uint8 (0 or 1), shape (ny, nx); `wrap` says that y is periodic.
+    `cells` is uint8 (0 or 1), shape (ny, nx); `wrap` marks a periodic y.
     """
     ny, nx = cells.shape
     far = reach + 1

@@ -26,7 +26,7 @@ def percolation(
     """Whether an island of the set crosses the plane along x, and along y.
 
     It crosses along a free axis if it touches both ends, and along a periodic one if it closes on itself
-    around the period, while it may also move along the other axis.
+    around the period. It may close after periods of the other axis too: a diagonal band crosses along both.
 
     Parameters
     ----------

@@ -232,6 +232,6 @@ def _local_slope(x: Array, w: Array, exponent: float, place: int) -> tuple[float
 
 def branches(pressure: Array) -> list[Array]:
     """Return the steps of each rise and fall of the force, with the turning points at both ends."""
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(pressure)))) + 1
-    ends = [0, *turns.tolist(), pressure.size - 1]
+    reversals = np.flatnonzero(np.diff(np.sign(np.diff(pressure)))) + 1
+    ends = [0, *reversals.tolist(), pressure.size - 1]
     return [np.arange(first, last + 1) for first, last in itertools.pairwise(ends)]

@@ -99,7 +99,7 @@ class Crack:
     poisson : float
         Poisson's ratio of both bodies, above -1 and at most 0.5.
     block : float or pair (y, x), optional
-        Edge length of the sliding block, m, rounded to the nearest whole number of cells; its first cell is
+        Edge length of the sliding block, m, rounded to an integer number of cells; its first cell is
         (n - b)//2 of `lower`. None: the whole face.
     basic_friction_angle : float
         Friction angle of smooth faces of the material, degree.

@@ -47,27 +47,27 @@ def _check(
         direction is None or check_direction(problems, direction),
     ]
     if valid[1]:
-        turns = float_array(path)
-        moves = turns.size > 1 and bool((np.diff(turns) != 0).all())
+        turning_points = float_array(path)
+        moves = turning_points.size > 1 and bool((np.diff(turning_points) != 0).all())
         expected = "at least two positions, each different from the previous one"
         valid.append(problems.require(moves, "path", expected, path))
     if all(valid):
-        _check_reach(problems, dilatancy, direction, turns)
+        _check_reach(problems, dilatancy, direction, turning_points)
 
 
-def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turns: Array) -> None:
+def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turning_points: Array) -> None:
     """Check that the dilatancy covers the path, on both sides where it has negative positions."""
     if not problems.require("azimuth" in dilatancy.variables, "dilatancy", "an azimuth", NONE):
         return
     shears = read_dilatancy(dilatancy)[1]
-    for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items():
+    for sign, azimuth in _side_azimuths(dilatancy, direction, turning_points).items():
         places = _places(dilatancy, azimuth)
         expected = f"the azimuth {azimuth:g}"
         if problems.require(places.size == 1, "dilatancy", expected, _azimuths(dilatancy).tolist()):
-            reach = float((sign * turns).max())
+            reach = float((sign * turning_points).max())
             covered = reach <= shears[-1] * (1 + 1e-9) and (shears[0] == 0 or reach <= 0)
             problems.require(covered, "path", f"positions from 0 to {shears[-1]:g} m on both sides", reach)
-    lowest = float(turns.min())
+    lowest = float(turning_points.min())
     problems.require(lowest < 0 or lowest >= shears[0], "path", f"at least {shears[0]:g} m", lowest)
 
 
@@ -134,15 +134,15 @@ def cyclic_shear(
     [40.0, 40.0, 40.0, 20.0, 20.0, 20.0]
     """
     name, shears = read_dilatancy(dilatancy)
-    turns = float_array(path)
+    turning_points = float_array(path)
     dilatancy = dilatancy.assign({LIFT: (dilatancy[name].dims, lift_curve(dilatancy, form))})
     sides = {
         sign: dilatancy.isel(direction=int(_places(dilatancy, azimuth)[0]))
         if "direction" in dilatancy.dims
         else dilatancy
-        for sign, azimuth in _side_azimuths(dilatancy, direction, turns).items()
+        for sign, azimuth in _side_azimuths(dilatancy, direction, turning_points).items()
     }
-    shear, sense, side = _points_along(turns, shears)
+    shear, sense, side = _points_along(turning_points, shears)
 
     def along(tables: dict[int, Array]) -> Array:
         return _interpolated(np.abs(shear), side, shears, tables)
@@ -194,11 +194,11 @@ def _azimuths(dilatancy: xr.Dataset) -> Array:
     return np.atleast_1d(np.asarray(dilatancy["azimuth"].values, dtype=float))
 
 
-def _side_azimuths(dilatancy: xr.Dataset, direction: Any, turns: Array) -> dict[int, float]:
+def _side_azimuths(dilatancy: xr.Dataset, direction: Any, turning_points: Array) -> dict[int, float]:
     """Return the azimuth of positive positions under 1 and, if needed, of negative ones under -1."""
     azimuth = float(_azimuths(dilatancy)[0]) if direction is None else read_direction(direction).azimuth
     sides = {1: azimuth}
-    if float(turns.min()) < 0:
+    if float(turning_points.min()) < 0:
         sides[-1] = (azimuth + 180.0) % 360.0
     return sides
 
@@ -215,14 +215,14 @@ def _table(variable: xr.DataArray, size: int) -> Array:
     return np.asarray(variable.transpose("shear", ...).values, dtype=float).reshape(size, -1)
 
 
-def _points_along(turns: Array, shears: Array) -> tuple[Array, Array, Array]:
+def _points_along(turning_points: Array, shears: Array) -> tuple[Array, Array, Array]:
     """Return the positions along the path, those of the dilatancy included, the sense and the side.
 
     The side is 1 for positions towards the direction and -1 for those opposite; a leg that crosses 0 has
     this point on both.
     """
     legs, senses, sides = [], [], []
-    for first, last in itertools.pairwise(turns):
+    for first, last in itertools.pairwise(turning_points):
         sense = 1 if last > first else -1
         ends = (first, 0.0, last) if min(first, last) < 0 < max(first, last) else (first, last)
         for start, stop in itertools.pairwise(ends):

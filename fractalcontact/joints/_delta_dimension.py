@@ -62,7 +62,7 @@ def delta_dimension(
 
     The three methods disagree. By the area of the triangulated surface the dimension starts at exactly 2 for
     mated faces, grows while the heights grow, and levels. By variogram and spectrum it starts near 3 or
-    above and falls to the dimension of the face. Only the first says that shearing roughens a joint.
+    above and falls to the dimension of the face. Only the first indicates that shearing roughens a joint.
 
     Parameters
     ----------

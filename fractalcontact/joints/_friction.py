@@ -110,7 +110,7 @@ def friction(
     -----
     The kinematic form is that of the paper. It neglects the elastic energy U stored in the faces while they
     slide: T = N d delta/dv + dU/dv. Mated fractal faces have no peak of their own: it grows as the distance
-    gets shorter, and `comment` of the peak says by how much.
+    gets shorter, and `comment` of the peak states by how much.
 
     References
     ----------
@@ -313,7 +313,7 @@ def _dependence(secants: xr.DataArray) -> str:
 
 
 def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
-    """Say how the peaks depend on the distance, and why values are missing."""
+    """State how the peaks depend on the distance, and why values are missing."""
     mark_locked(result, ("shear_strength",))
     locked = bool((secants >= LOCKED_ANGLE).any())
     unresolved = bool(np.isnan(secants.sel(distance=float(result["peak_distance"])).values).all())

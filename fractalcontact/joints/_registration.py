@@ -77,7 +77,7 @@ def register(
     Parameters
     ----------
     lower, upper : DataArray, shape (y, x)
-        Heights (m) of two facing faces, both up positive and seen from above: a scan of the upper body from
+        Heights (m) of two facing faces, positive upwards and seen from above: a scan of the upper body from
         below must be mirrored and turned over first. Equal spacing; the extents may differ. Missing heights
         (NaN) are allowed.
     rotation, tilt : bool

@@ -79,7 +79,7 @@ def transmissivity(
     viscosity : float, optional
         Dynamic viscosity, Pa s; adds `flow_conductance`.
     periodic : bool, optional
-        None: as the axes of `gap` say. False: both axes are free.
+        None: along the periodic axes of `gap`. False: both axes are free.
 
     Returns
     -------

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PANELS = 6
 SHOWN_SHEAR = 1 / 50  # of the block edge: 0.4 mm of 2 cm, the shear of the maps in the paper
 
-# groups of each figure; `has_figure` says which of them are required
+# groups of each figure; `has_figure` lists which of them are required
 GROUPS: dict[int, tuple[str, ...]] = {
     1: ("surfaces",),
     2: ("surfaces", "joints/delta_surface"),

@@ -1,7 +1,7 @@
 """Selection of methods and tolerances for an error or a run time, from measured curves.
 
 ``error = 1e-3`` in a scene bounds the relative error of pressures, and the error of exponents and dimensions;
-``budget = 30`` asks for the smallest such error within so many seconds. Values set explicitly are never
+``budget = 30`` gives the smallest such error within so many seconds. Values set explicitly are never
 changed. The errors are those measured on the surfaces and sets of `fractalcontact.accuracy`, the seconds are
 those of the machine that measured the curves (`autotune_curves.json`, made by the benchmarks).
 """
@@ -193,7 +193,7 @@ def _open_keys(scene: Scene) -> Iterator[tuple[str, list[Option]]]:
 
 @dataclass(frozen=True)
 class _Solver:
-    """The solutions that a scene asks of a contact solver: table, benchmark, cold solves, nodes of each."""
+    """Solutions of a contact solver that a scene requires: table, benchmark, cold solves, nodes of each."""
 
     table: str
     benchmark: str
@@ -233,8 +233,8 @@ def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[_Solver]:
 
 def _joint_solves(scene: Scene, name: str) -> float:
     """Return the number of cold solves of a stage of the joint."""
-    given = scene.stage_options(STAGES[f"joints/{name}"], ("shear", "direction", *LOADS))
-    counts = {key: len(value) if isinstance(value, list) else 1 for key, value in given.items()}
+    options = scene.stage_options(STAGES[f"joints/{name}"], ("shear", "direction", *LOADS))
+    counts = {key: len(value) if isinstance(value, list) else 1 for key, value in options.items()}
     directions = counts.get("direction", 4) if name == "elastic_dilatancy" else 1
     steps = max([counts[key] for key in LOADS if key in counts] or [1])
     return counts.get("shear", 1) * directions * (1.0 + WARM_START * (steps - 1))

@@ -73,7 +73,7 @@ class PartStore:
 
 
 class MemoryStore(PartStore):
-    """The store of a worker that does not see the folder: kept parts are sent to it, new ones return."""
+    """The store of a worker without access to the folder: kept parts are sent to it, new ones return."""
 
     def __init__(self, kept: Mapping[str, xr.Dataset]) -> None:
         super().__init__(None)

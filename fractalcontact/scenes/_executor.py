@@ -1,8 +1,8 @@
 """Independent tasks, in this process or on the workers of a `concurrent.futures.Executor`.
 
 Local processes, threads and a dask.distributed cluster (`client.get_executor()`) are used alike. A task keeps
-its own finished parts: a worker that sees the folder of the run writes them there; from any other they return
-with the result of the task and are written here.
+its own finished parts: a worker that has access to the folder of the run writes them there; from any other
+they return with the result of the task and are written here.
 """
 
 from __future__ import annotations
@@ -179,13 +179,13 @@ class _WorkerTask:
         self.kept = {} if local else store.kept(getattr(task, "digests", ()))
 
     def __call__(self) -> tuple[Any, Mapping[str, Any]]:
-        """Return the result, and the new parts where the worker does not see the folder of the run.
+        """Return the result, and the new parts where the worker has no access to the folder of the run.
 
-        The worker may run as many tasks as it has threads: each uses one, unless the environment says
-        otherwise (`FRACTALCONTACT_THREADS`).
+        The worker may run as many tasks as it has threads: each uses one, unless the environment
+        variable `FRACTALCONTACT_THREADS` sets more.
         """
-        sees_folder = self.mark is None or self.mark.is_file()
-        store = self.store if sees_folder else MemoryStore(self.kept)
+        has_access = self.mark is None or self.mark.is_file()
+        store = self.store if has_access else MemoryStore(self.kept)
         with threads.limit(threads.requested_count() or 1):
             result = self.task(store, _MarkedStop(self.mark))
         return result, store.added if isinstance(store, MemoryStore) else {}

@@ -209,12 +209,12 @@ def check_loads(scene: Scene, problems: Problems) -> None:
         name = stage.name.partition("/")[2]
         if not stage.name.startswith("joints/") or name == "faces":
             continue
-        given = scene.stage_options(stage.row, ("shear", "direction", *LOADS))
-        if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in given:
+        options = scene.stage_options(stage.row, ("shear", "direction", *LOADS))
+        if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in options:
             problems.add("joint.shear", f"a value for {name} ({stage.reason})", NONE)
-        if name == "elastic_dilatancy" and "normal_force" not in given:
+        if name == "elastic_dilatancy" and "normal_force" not in options:
             problems.add("joint.normal_force", f"a value for {name}", NONE)
-        direction = given.get("direction", "E")
+        direction = options.get("direction", "E")
         if name in ("closure", "delta_surface", "decorrelation_length") and isinstance(direction, list):
             problems.add("joint.direction", f"one direction for {name}", direction)
         if name == "closure" and len(loads := scene.joint.loads) != 1:

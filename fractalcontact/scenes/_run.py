@@ -52,7 +52,7 @@ def run(
         guard for it.
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
-        is set on the worker. Workers need not see `out`; a scene that reads files needs them there.
+        is set on the worker. Workers need no access to `out`; a scene that reads files needs them there.
 
     Returns
     -------

@@ -254,8 +254,8 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):
         expected = "a value, or young and poisson in [material]"
-        given = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
-        problems.require(given, "contact.contact_modulus", expected, NONE)
+        has_modulus = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
+        problems.require(has_modulus, "contact.contact_modulus", expected, NONE)
         expected = "exactly one of closure, normal_force, nominal_pressure"
         one_load = sum(key in contact for key in LOADS) == 1
         problems.require(one_load, "contact", expected, sorted(contact) or NONE)

@@ -129,15 +129,15 @@ def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
         for stage in stages_of(scene) if _is_valid(problems, "joint") else ():
             name = stage.name.partition("/")[2]
             if stage.name.startswith("joints/") and name in JOINT_STAGES:
-                given = scene.stage_options(stage.row, ("shear", "direction"))
-                if "shear" in given:
-                    _validate_travel(crack, given, stage, problems)
+                options = scene.stage_options(stage.row, ("shear", "direction"))
+                if "shear" in options:
+                    _validate_travel(crack, options, stage, problems)
 
 
-def _validate_travel(crack: Crack, given: dict[str, Any], stage: Stage, problems: Problems) -> None:
+def _validate_travel(crack: Crack, options: dict[str, Any], stage: Stage, problems: Problems) -> None:
     default = ("E", "N", "W", "S") if stage.name.endswith("dilatancy") else "E"
-    directions = given.get("direction", default)
-    longest = float(np.max(given["shear"]))
+    directions = options.get("direction", default)
+    longest = float(np.max(options["shear"]))
     for direction in directions if isinstance(directions, (list, tuple)) else [directions]:
         travel = crack.travel(direction)
         if longest > travel * (1.0 + 1e-6):

@@ -41,8 +41,8 @@ def _check(problems: Problems, *, surface: Any, threshold: Any, window: Any) -> 
 def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -> xr.DataArray:
     """Remove isolated outliers from a scan.
 
-    Dust, glitter and undercut edges leave single wrong heights in optical scans. The highest points hold two
-    faces apart, so a handful of outliers decides closure and friction. A spike becomes a missing height
+    Dust, reflections and undercut edges leave single wrong heights in optical scans. Closure and friction
+    depend on the highest points, so a few outliers change them. A spike becomes a missing height
     (NaN), to be filled (`fill`) or left out.
 
     Parameters

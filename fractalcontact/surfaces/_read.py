@@ -130,7 +130,7 @@ def read(
     content = file_content(source, channel=channel, units=units, spacing=spacing, first_row=first_row)
     stated = content.entries["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
-        message = f"{source.name}: the file states {stated!r} and is read in {units!r}, as `units` says"
+        message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
         warnings.warn(message, ScaleWarning, stacklevel=3)
     _warn_of_scale(content, source.name)
     surface = content.surface

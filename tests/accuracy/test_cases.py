@@ -19,7 +19,7 @@ def failed(case):
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_case_gives_what_is_expected(name):
+def test_case_gives_the_expected_values(name):
     wrong = failed(CASES[name])
     assert not wrong, "\n".join(map(str, wrong))
 
@@ -40,12 +40,12 @@ def test_wrong_expectations_fail():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, case in fc.accuracy.cases.items() if case.large])
-def test_large_case_gives_what_is_expected(name):
+def test_large_case_gives_the_expected_values(name):
     wrong = failed(fc.accuracy.cases[name])
     assert not wrong, "\n".join(map(str, wrong))
 
 
-def test_error_is_the_distance_from_what_is_expected():
+def test_error_is_the_distance_from_the_expected_value():
     def make():
         return xr.Dataset({"area": 3.0, "wide": 5.0, "gone": np.nan}, attrs={"reason": "given"})
 

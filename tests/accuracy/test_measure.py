@@ -46,7 +46,7 @@ def test_each_part_is_measured_within_its_budget(part, measured):
     assert (data["memory"].values[finite] > 0).all()
     assert (data["first_run_time"].values[finite] >= data["run_time"].values[finite]).all()
     assert all(data[key].values.all() for key in ("truth", "error_meaning", "parameter_name", "benchmark"))
-    assert set(data["verdict"].values) <= {"alone", "Pareto optimal", "dominated", "undecided"}
+    assert set(data["verdict"].values) <= {"only method", "Pareto optimal", "dominated", "undecided"}
     assert part in fc.accuracy.summary(tree)
 
 
@@ -80,7 +80,7 @@ MEASURES = {
 UNMEASURED = {"box_counts", "describe", "evolution", "lineage", "read_mask"}  # of domains
 
 
-def test_every_measure_of_a_domain_and_every_flow_has_a_method():
+def test_every_public_analysis_of_domains_and_joints_is_measured():
     assert set(MEASURES["domains"]) | UNMEASURED == set(fc.domains.__all__)
     for part, names in MEASURES.items():
         for name in names.values():
@@ -146,7 +146,7 @@ def test_front_verdicts_and_memory_of_known_methods():
         "quick": "Pareto optimal",
         "slow": "dominated",
         "fine": "Pareto optimal",
-        "other": "alone",
+        "other": "only method",
     }
     np.testing.assert_allclose(data["memory"].sel({"method": "quick"}), [8000, 16000], rtol=0.2)
     np.testing.assert_allclose(data["run_time"].sel({"method": "slow"}), [0.03, 0.08], rtol=0.3)
@@ -199,16 +199,16 @@ def test_inputs_given_are_compared_at_equal_size_only():
     assert at_equal_size["on_pareto_front"].values.tolist() == [[True] * 3, [True, False, False]]
 
 
-def test_stopped_measurement_keeps_what_it_has_and_names_what_is_missing():
+def test_stopped_measurement_keeps_its_results_and_names_the_missing_methods():
     stop = Stop()
 
     def errors_and_stop(_, parameter):
         stop.number = signal.SIGINT
         return 0.1 / (parameter + 1)
 
-    one = stub("one", [0.01], [0.1])
-    two = dataclasses.replace(stub("two", [0.01, 0.01], [0.1, 0.1]), errors=errors_and_stop)
-    part = Benchmark("a", "", "known", (one, two)), Benchmark("b", "", "known", (stub("c", [0], [1]),))
+    first = stub("one", [0.01], [0.1])
+    second = dataclasses.replace(stub("two", [0.01, 0.01], [0.1, 0.1]), errors=errors_and_stop)
+    part = Benchmark("a", "", "known", (first, second)), Benchmark("b", "", "known", (stub("c", [0], [1]),))
     tree = fc.accuracy.measure({"contact": part, "joints": part}, budget=20, stop=stop)
     assert tree.attrs["completeness"] == "partial: the run was stopped; missing: c; one; two; c"
     assert list(tree.children) == ["contact"]
@@ -217,7 +217,7 @@ def test_stopped_measurement_keeps_what_it_has_and_names_what_is_missing():
     assert "two" in fc.accuracy.summary(tree)
 
 
-def test_file_is_clean_and_round_trips(tmp_path, compliance, measured):
+def test_file_is_cf_compliant_and_round_trips(tmp_path, compliance, measured):
     tree = measured("joints")
     tree["joints"].to_dataset().to_netcdf(tmp_path / "joints.nc")
     assert compliance(tmp_path / "joints.nc") == []

@@ -42,7 +42,7 @@ def test_a_window_keeps_the_level_of_white_noise():
         spectra.periodogram(heights, (1.0, 1.0), "triangle")
 
 
-def test_one_wave_stands_in_one_mode():
+def test_one_wave_has_one_mode():
     n, step, amplitude = 16, 0.5, 3.0
     x = np.arange(n) * step
     heights = np.tile(amplitude * np.cos(2 * np.pi * 3 * x / (n * step)), (n, 1))
@@ -78,7 +78,7 @@ def test_default_rings_end_at_the_nyquist_wavenumber():
     np.testing.assert_allclose(q[1:-1] / q[1:-1][0] * 2, np.arange(2, q.size), rtol=0.1)
 
 
-def test_radial_average_sees_no_difference_in_a_mirror():
+def test_radial_average_is_invariant_under_mirrors():
     heights = plane((16, 16))
     averages = [
         spectra.radial_average(spectra.periodogram(face, (1.0, 1.0))[0], (16, 16), (1.0, 1.0))[1]

@@ -189,9 +189,9 @@ def judge(case, result):
     control = next(
         name for name in ("closure", "normal_force", "nominal_pressure") if case.options.get(name) is not None
     )
-    asked = np.atleast_1d(case.options[control])
+    imposed = np.atleast_1d(case.options[control])
     plastic, noise = np.zeros_like(top), 0.0
-    for step, value in enumerate(asked):
+    for step, value in enumerate(imposed):
         here = result.isel(step=step)
 
         def blame(what, here=here, step=step):

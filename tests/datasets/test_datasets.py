@@ -1,4 +1,4 @@
-"""The shipped surfaces are what their scripts make, and what they are said to be."""
+"""The shipped surfaces are what their scripts make, and have the published properties."""
 
 import importlib.util
 
@@ -21,17 +21,17 @@ def shipped_crack(name):
 
 
 @pytest.mark.parametrize("name", ["concrete_crack", "concrete_crack_1998"])
-def test_the_crack_is_what_its_script_makes(name):
+def test_crack_equals_the_output_of_its_script(name):
     module = script(name)
-    shipped, made = shipped_crack(name), module.crack()
-    steps = np.abs(np.rint(shipped.values / module.PRECISION) - np.rint(made.values / module.PRECISION))
+    shipped, remade = shipped_crack(name), module.crack()
+    steps = np.abs(np.rint(shipped.values / module.PRECISION) - np.rint(remade.values / module.PRECISION))
     # another transform library may round a height that lies halfway the other way
     assert steps.max() <= 1
     assert (steps > 0).mean() < 1e-3
-    np.testing.assert_allclose(shipped.x, made.x, rtol=1e-12)
+    np.testing.assert_allclose(shipped.x, remade.x, rtol=1e-12)
 
 
-def test_the_crack_is_as_the_paper_tells():
+def test_crack_has_the_published_dimension_and_dilatancy():
     face = fc.surfaces.sample("concrete_crack")
     assert face.shape == (512, 512)
     np.testing.assert_allclose(np.diff(face.x), 80e-6)
@@ -53,7 +53,7 @@ def test_the_crack_is_as_the_paper_tells():
     ).all()
 
 
-def test_the_crack_of_1998_has_the_dimension_and_dilatancy_of_the_paper():
+def test_crack_of_1998_has_the_dimension_and_dilatancy_of_the_paper():
     path = datasets_folder() / "concrete_crack_1998.nc"
     assert path.stat().st_size < 600_000
     face = shipped_crack("concrete_crack_1998")
@@ -71,7 +71,7 @@ def test_the_crack_of_1998_has_the_dimension_and_dilatancy_of_the_paper():
     assert (rising.isel(shear=-1) > 1.35 * rising.isel(shear=0)).all()
 
 
-def test_the_land_surface_lies_as_on_the_map():
+def test_land_surface_has_the_position_and_heights_of_the_map():
     land = fc.surfaces.sample("jacksboro_fault_dem")
     assert land.shape == (344, 403)
     # length of one degree at 36.6 N: 110.96 km of latitude, 89.5 km of longitude (tables of the ellipsoid)
@@ -85,6 +85,6 @@ def test_the_land_surface_lies_as_on_the_map():
     assert (land == land.round()).all()
 
 
-def test_an_unknown_sample_is_refused():
+def test_unknown_sample_is_refused():
     with pytest.raises(ValueError, match="concrete_crack"):
         fc.surfaces.sample("moon")

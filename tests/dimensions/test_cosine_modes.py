@@ -74,9 +74,9 @@ def test_filling_of_plane_and_transpose(holes):
 
 
 def test_filling_without_gaps_removes_plane():
-    whole = np.ones((5, 6), dtype=bool)
+    observed = np.ones((5, 6), dtype=bool)
     values = np.random.default_rng(7).standard_normal(30)
-    filled = _cosine_modes.Filling(whole, (1.0, 1.0))(values)
+    filled = _cosine_modes.Filling(observed, (1.0, 1.0))(values)
     columns = np.stack([np.ones(30), *(p.ravel() for p in np.indices((5, 6)))], axis=1)
     rest = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
     np.testing.assert_allclose(filled.ravel(), rest, atol=1e-13)

@@ -69,8 +69,8 @@ def covered(low, high, hurst):
 
 
 def test_bound_equals_published_values():
-    known = {0.1: 0.512, 0.3: 0.856, 0.5: 1.029, 0.7: 1.130, 0.9: 1.194}
-    for hurst, value in known.items():
+    published = {0.1: 0.512, 0.3: 0.856, 0.5: 1.029, 0.7: 1.130, 0.9: 1.194}
+    for hurst, value in published.items():
         assert bound(hurst) == pytest.approx(value, rel=0.01)
 
 

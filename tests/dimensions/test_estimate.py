@@ -63,8 +63,8 @@ def test_every_method(rough, tmp_path):
     np.testing.assert_allclose(result.fractal_dimension, 3.0 - result.hurst, rtol=1e-15)
     near = result.hurst.sel({"method": ["default", "increments", "second_variogram"]})
     np.testing.assert_allclose(near, 0.7, atol=0.05)
-    given = np.isfinite(result.ci_low)
-    assert list(result.method.values[given.values]) == ["default", *VALIDATED]
+    has_interval = np.isfinite(result.ci_low)
+    assert list(result.method.values[has_interval.values]) == ["default", *VALIDATED]
     reasons = json.loads(result.ci_low.attrs["reason"])
     assert set(reasons) == set(NAMES) - set(VALIDATED)
     assert all(reasons.values())

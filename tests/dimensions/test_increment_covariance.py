@@ -22,14 +22,14 @@ def dense_covariance(shape, steps, order, hurst, observed=None):
                 index.take(range(i * lag, shape[axis] - (order - i) * lag), axis).ravel()
                 for i in range(order + 1)
             ]
-            kept = np.ones(parts[0].size, dtype=bool)
+            complete = np.ones(parts[0].size, dtype=bool)
             if observed is not None:
                 for part in parts:
-                    kept &= observed.ravel()[part]
+                    complete &= observed.ravel()[part]
             operator = np.zeros((parts[0].size, index.size))
             for part, weight in zip(parts, STENCILS[order], strict=True):
                 operator[np.arange(part.size), part] = weight
-            rows.append(operator[kept])
+            rows.append(operator[complete])
     own = [np.mean(np.einsum("ij,jk,ik->i", a, generalised, a)) for a in rows]
     return np.array(
         [

@@ -84,9 +84,9 @@ def test_two_lags_cannot_show_noise(lags):
 def test_noise_z_is_standard_normal():
     surfaces = fc.surfaces.fbm((48, 48), 1.0, hurst=0.7, rms_increment=1.0, rng=8, members=300).values
     moments = (_increment_moments.increment_moments([(surface, 48)], (48, 48)) for surface in surfaces)
-    turns = [_increments.closed_form(one, (1.0, 1.0)).noise_z for one in moments]
-    assert abs(np.mean(turns)) < 0.25
-    assert np.std(turns) == pytest.approx(1.0, abs=0.13)
+    scores = [_increments.closed_form(moment, (1.0, 1.0)).noise_z for moment in moments]
+    assert abs(np.mean(scores)) < 0.25
+    assert np.std(scores) == pytest.approx(1.0, abs=0.13)
 
 
 @pytest.mark.parametrize("shape", [(40, 40), (400,)])

@@ -114,13 +114,13 @@ def test_lattice_sets_are_exact_on_their_grid(name):
     scales = [ratio**k for k in range(level + 1)]
     for cover in ("minimum", "aligned"):
         result = fc.domains.box_dimension(as_mask(lattice_set(name, level)), scales=scales, cover=cover)
-        kept = int(GENERATORS[name].sum())
-        assert np.array_equal(result.box_count, [kept ** (level - k) for k in range(level + 1)])
+        n_copies = int(GENERATORS[name].sum())
+        assert np.array_equal(result.box_count, [n_copies ** (level - k) for k in range(level + 1)])
         assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-13)
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_lattice_sets_are_exact_anywhere_at_their_own_scales(name):
+def test_lattice_sets_off_the_grid_are_exact_at_powers_of_their_ratio(name):
     level, ratio = SIDE[name], ratio_of(name)
     plane = placed(lattice_set(name, level), 1024, np.random.default_rng(5))
     result = fc.domains.box_dimension(as_mask(plane), scales=[ratio**k for k in range(level + 1)])

@@ -1,4 +1,7 @@
-"""Masks as input of all functions: accepted types, refused values, labels of the results, lean import."""
+"""Masks as input of all functions: accepted types, refused values, labels of the results.
+
+The import of the subpackage loads no heavy library.
+"""
 
 import json
 import subprocess
@@ -159,7 +162,7 @@ def test_leading_dims_with_names_of_results_are_refused():
         fc.domains.box_dimension(mask)
 
 
-def test_import_loads_nothing_heavy():
+def test_import_loads_no_heavy_library():
     code = (
         "import sys, fractalcontact.domains;"
         "heavy = {'numba', 'xarray', 'scipy', 'matplotlib', 'skimage', 'dask', 'netCDF4'};"

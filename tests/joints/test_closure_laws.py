@@ -131,7 +131,9 @@ def test_self_affine_faces_close_with_the_known_length(seed):
 
 
 def test_invalid_arguments_are_refused():
-    with pytest.raises(ValueError, match=r"Dataset of fractalcontact.joints.closure, got 'int'"):
+    with pytest.raises(
+        ValueError, match=r"Dataset of fractalcontact.joints.closure, got an object of type int"
+    ):
         fc.joints.closure_laws(3)
     with pytest.raises(ValueError, match="no interface_closure"):
         fc.joints.closure_laws(xr.Dataset())

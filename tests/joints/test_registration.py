@@ -265,8 +265,8 @@ def test_cliff_locks_the_gneiss_pair_towards_west(gneiss):
 @measured
 def test_study_of_the_gneiss_pair(gneiss):
     lower = fc.surfaces.fill(gneiss["side_a"])
-    found = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
-    crack = fc.joints.Crack(lower, found.height, young=60e9, poisson=0.2, block=0.045)
+    registered = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
+    crack = fc.joints.Crack(lower, registered.height, young=60e9, poisson=0.2, block=0.045)
     shear = [0.0, 3e-4, 1.5e-3]
     opening = fc.joints.dilatancy(crack, shear=shear, direction=("E", "W"), normal_force=[1e3, 1e4])
     closing = fc.joints.closure(crack, shear=shear, normal_force=[1e3, 1e4], keep=("gap",))

@@ -48,18 +48,18 @@ def test_slope_of_a_sawtooth(make_face, direction, share):
 )
 def test_regressions_at_their_own_intervals(make_face, regression, lag, expected):
     interval = lag or (0.508e-3 if regression == "tse_cruden" else 0.5e-3)
-    found = []
+    coefficients = []
     for slope in (0.1, 0.2, 0.3, 0.4):
         heights = slope * interval * (np.arange(50) % 2) * np.ones((4, 1))
         face = make_face(heights, interval)
         result = fc.joints.roughness_coefficient(face, direction="E", regression=regression, lag=lag)
         assert result.regression_interval.item() == pytest.approx(interval)
-        found.append(result.roughness_coefficient.item())
+        coefficients.append(result.roughness_coefficient.item())
     # the mean line of an even number of readings has a slope of 3 / (n^2 - 1) of the teeth
-    np.testing.assert_allclose(found, expected, atol=0.03)
+    np.testing.assert_allclose(coefficients, expected, atol=0.03)
 
 
-def test_default_lag_is_that_of_the_joint_not_of_its_enlarged_print():
+def test_default_lag_is_the_sampling_interval_of_the_joint():
     # on a self-affine surface Z2 ~ lag^(H - 1): 1.27 mm instead of 0.508 mm would lower JRC by
     # 32.47 (1 - H) log10 2.5 = 3.9
     surface = fc.surfaces.fbm((512, 512), 0.127e-3, hurst=0.7, rms_increment=0.04e-3, rng=3)

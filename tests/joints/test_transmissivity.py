@@ -153,12 +153,12 @@ def test_equals_a_dense_assembly(make_face, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_tiling_a_periodic_plane_changes_nothing(make_face, seed):
     gap = np.random.default_rng(seed).random((6, 8)) - 0.1
-    one = flow(make_face, gap, periodic=True)
+    single = flow(make_face, gap, periodic=True)
     many = flow(make_face, np.tile(gap, (3, 2)), periodic=True)
-    np.testing.assert_allclose(one.transmissivity, many.transmissivity, rtol=1e-9)
+    np.testing.assert_allclose(single.transmissivity, many.transmissivity, rtol=1e-9)
     # many periods between fixed pressures approach the periodic value
     between = flow(make_face, np.tile(gap, (1, 60)), periodic=(True, False), axis="x")
-    np.testing.assert_allclose(between.transmissivity, one.transmissivity.sel(axis=["x"]), rtol=0.02)
+    np.testing.assert_allclose(between.transmissivity, single.transmissivity.sel(axis=["x"]), rtol=0.02)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -254,20 +254,20 @@ def test_periodic_plane_can_be_declared_free(make_face):
 
 def test_units_change_only_exponents(make_face):
     gap = np.random.default_rng(0).random((12, 13)) - 0.1
-    one = flow(make_face, gap).transmissivity.values
+    metres = flow(make_face, gap).transmissivity.values
     two = flow(make_face, gap * 2.0**-40, 2.0**-20).transmissivity.values
-    np.testing.assert_array_equal(one * 2.0**-120, two)
+    np.testing.assert_array_equal(metres * 2.0**-120, two)
     large = flow(make_face, gap * 2.0**60).transmissivity.values
-    np.testing.assert_array_equal(one * 2.0**180, large)
+    np.testing.assert_array_equal(metres * 2.0**180, large)
 
 
 def test_leading_dims_and_labels(make_face):
     planes = np.random.default_rng(0).random((2, 3, 6, 5)) - 0.3
-    one = make_face(planes[0, 0], 2.0)
+    plane = make_face(planes[0, 0], 2.0)
     stack = xr.DataArray(
         planes,
         dims=("shear", "step", "y", "x"),
-        coords={"x": one.x, "y": one.y, "shear": [0.0, 1.0], "normal_force": ("step", [1.0, 2.0, 3.0])},
+        coords={"x": plane.x, "y": plane.y, "shear": [0.0, 1.0], "normal_force": ("step", [1.0, 2.0, 3.0])},
     )
     result = fc.joints.transmissivity(stack, axis=("y", "x"))
     assert result.transmissivity.dims == ("shear", "step", "axis")

@@ -99,8 +99,8 @@ def test_slope_of_each_curve(name, hurst):
 def test_intervals_of_the_dimension():
     estimates = synthetic.estimates()
     ax = plotting.dimensions(estimates, truth=2.22, band=(2.15, 2.29)).axes[0]
-    known = estimates.isel(method=slice(0, -1))
+    with_interval = estimates.isel(method=slice(0, -1))
     segments = np.array(ax.collections[0].get_segments())[:, :, 0]
-    assert segments[:, 0] == pytest.approx((3 - known.ci_high).values)
-    assert segments[:, 1] == pytest.approx((3 - known.ci_low).values)
+    assert segments[:, 0] == pytest.approx((3 - with_interval.ci_high).values)
+    assert segments[:, 1] == pytest.approx((3 - with_interval.ci_low).values)
     assert [t.get_text() for t in ax.get_yticklabels()] == ["default", "spectrum", "variogram", "cube counts"]

@@ -32,7 +32,7 @@ def copied(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_example(copied, name):
+def test_gallery_example_runs(copied, name):
     environment = os.environ | {"FRACTALCONTACT_GALLERY": str(copied / "study")}
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", NO_NETWORK, name],
@@ -42,7 +42,7 @@ def test_example(copied, name):
     assert "<xarray." in done.stdout
 
 
-def test_the_gallery_is_there():
+def test_gallery_has_examples():
     assert len(SCRIPTS) >= 10
     assert (GALLERY / "images" / "overview.png").stat().st_size < 300_000
 

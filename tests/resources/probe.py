@@ -24,7 +24,7 @@ SPLIT = ("scipy", "skimage", "matplotlib")  # libraries whose subpackages are li
 
 
 def main(folder):
-    """Load libraries or run a scene, as the task says; run it a second time to trace its arrays."""
+    """Load libraries or run a scene, as the task states; run it a second time to trace its arrays."""
     before = peak_memory()
     task = pickle.loads((folder / TASK).read_bytes())
     for name in task["libraries"]:

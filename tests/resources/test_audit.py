@@ -62,7 +62,7 @@ def scene(folder, text):
 
 
 @pytest.mark.parametrize("word", list(WORDS))
-def test_word_alone_plans_only_required_stages(tmp_path, word):
+def test_wanted_result_plans_only_the_required_stages(tmp_path, word):
     study = scene(tmp_path, WORDS[word])
     named = "dimensions" if word.startswith("dimensions/") else NAMED.get(word, word)
     expected = {"surfaces", named} | ALSO.get(word, set())
@@ -97,7 +97,7 @@ print(json.dumps(report))
 """
 
 
-def test_no_word_loads_or_compiles_more_than_required(tmp_path):
+def test_no_wanted_result_loads_or_compiles_more_than_required(tmp_path):
     studies = {word: scene(tmp_path, text) for word, text in WORDS.items()}
     required = {word: resources.requirements(study) for word, study in studies.items()}
     # from the word that requires least to the one that requires most: what is loaded stays loaded
@@ -123,7 +123,7 @@ def test_no_word_loads_or_compiles_more_than_required(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", list(WORDS))
-def test_word_in_its_own_process_takes_only_what_is_required(tmp_path, word):
+def test_wanted_result_uses_only_the_required_resources(tmp_path, word):
     study = scene(tmp_path, WORDS[word])
     measured = resources.audit(study)
     assert resources.surplus(measured) == []
@@ -156,7 +156,7 @@ def test_scene_that_fails_is_reported(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rigid_sliding", "pressed_surface", "jacksboro_fault", "concrete_crack"])
-def test_shipped_scene_takes_only_what_is_required(name):
+def test_shipped_scene_uses_only_the_required_resources(name):
     measured = resources.audit(name)
     assert resources.surplus(measured) == []
     assert measured["warm_kernel_count"] == 0

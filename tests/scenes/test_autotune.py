@@ -35,25 +35,25 @@ def pressed(folder, top, generator, amplitude, boundary):
     return fc.scenes.run(path, progress=False)
 
 
-FACES = {
+SURFACES = {
     "periodic": ("spectral", "rms_slope = 0.1\nshort_cutoff = 6e-5", ""),
     "free": ("fbm", "rms_increment = 1e-6", 'boundary = "free"'),
 }
 
 
-@pytest.mark.parametrize("kind", list(FACES))
+@pytest.mark.parametrize("kind", list(SURFACES))
 def test_error_is_met_and_a_looser_one_is_faster(tmp_path, kind):
-    exact = pressed(tmp_path, "", FACES[kind][0], FACES[kind][1], FACES[kind][2] + "\ntolerance = 1e-13")[
-        "contact"
-    ]
+    exact = pressed(
+        tmp_path, "", SURFACES[kind][0], SURFACES[kind][1], SURFACES[kind][2] + "\ntolerance = 1e-13"
+    )["contact"]
     transforms, errors = [], []
     for error in (1e-1, 1e-2, 1e-3, 1e-4):
-        found = pressed(tmp_path, f"error = {error}", *FACES[kind])
-        assert "contact.tolerance" in found.attrs["selected"]
-        difference = (found["contact/pressure"] - exact["pressure"]).values
+        tree = pressed(tmp_path, f"error = {error}", *SURFACES[kind])
+        assert "contact.tolerance" in tree.attrs["selected"]
+        difference = (tree["contact/pressure"] - exact["pressure"]).values
         errors.append(np.sqrt((difference**2).mean() / (exact["pressure"].values ** 2).mean()))
         assert errors[-1] <= error
-        transforms.append(int(found["contact/transforms"].sum()))
+        transforms.append(int(tree["contact/transforms"].sum()))
     assert transforms == sorted(transforms)
     assert transforms[0] < transforms[-1]
     assert transforms[-1] < int(exact["transforms"].sum())
@@ -61,7 +61,7 @@ def test_error_is_met_and_a_looser_one_is_faster(tmp_path, kind):
 
 @pytest.mark.parametrize(("load", "condition"), [("nominal_pressure", ""), ("closure", ", closure imposed")])
 def test_tolerance_follows_the_curve_of_the_load(tmp_path, load, condition):
-    text = PRESSED.format(top="error = 1e-4", generator=FACES["free"][0], amplitude=FACES["free"][1],
+    text = PRESSED.format(top="error = 1e-4", generator=SURFACES["free"][0], amplitude=SURFACES["free"][1],
                           boundary='boundary = "free"').replace("nominal_pressure", load)  # fmt: skip
     (tmp_path / "pressed.toml").write_text(text, encoding="utf-8")
     (choice,) = selected(fc.scenes.load(tmp_path / "pressed.toml"))
@@ -168,9 +168,9 @@ def test_selection_is_in_the_summary_and_in_the_file(tmp_path):
 
 
 def test_shipped_curves_cover_the_methods():
-    found = _autotune.measured_curves()
-    assert set(found["Hurst exponent"]) == set(fc.dimensions.methods())
-    for benchmark in found.values():
+    curves = _autotune.measured_curves()
+    assert set(curves["Hurst exponent"]) == set(fc.dimensions.methods())
+    for benchmark in curves.values():
         for curve in benchmark.values():
             assert len(curve.parameter) == len(curve.error) == len(curve.seconds) >= 1
     assert _autotune.CURVES_FILE.stat().st_size < 20_000

@@ -54,18 +54,18 @@ def test_resolved_spots_have_no_caveat(smooth):
     assert "not resolved" not in text(study(smooth))
 
 
-def test_resolution_is_told_without_the_maps(rough, smooth):
+def test_resolution_is_stated_without_the_maps(rough, smooth):
     assert "not resolved at every load" in text(study(rough.drop_vars("state")))
     assert "from their perimeter" in text(study(rough.drop_vars("state")))
     assert "not resolved" not in text(study(smooth.drop_vars("state")))
 
 
-def test_yield_is_that_of_the_stated_material(rough):
+def test_yield_pressure_of_the_stated_material_is_used(rough):
     true = rough.nominal_pressure / rough.contact_fraction / 1e9
-    found = text(study(rough, yield_pressure=[1e6, 2e7]))
-    assert f"true mean pressure is {float(true.min()):.2g} to {float(true.max()):.2g} GPa" in found
-    assert "yields at 0.001 to 0.02 GPa" in found
-    assert "concrete" not in found
+    caveats = text(study(rough, yield_pressure=[1e6, 2e7]))
+    assert f"true mean pressure is {float(true.min()):.2g} to {float(true.max()):.2g} GPa" in caveats
+    assert "yields at 0.001 to 0.02 GPa" in caveats
+    assert "concrete" not in caveats
 
 
 def test_no_yield_without_a_stated_material_or_below_it(rough):

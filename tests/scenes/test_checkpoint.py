@@ -27,32 +27,32 @@ STUDY = SOUND.replace(
 
 def variables(path):
     """Return the bytes of every variable of a file but the run times."""
-    found = {}
+    contents = {}
 
     def walk(group, place):
         for name, variable in group.variables.items():
             if not name.endswith("run_time"):
                 variable.set_auto_maskandscale(False)
-                found[f"{place}/{name}"] = (variable.dimensions, np.asarray(variable[...]).tobytes())
+                contents[f"{place}/{name}"] = (variable.dimensions, np.asarray(variable[...]).tobytes())
         for name, child in group.groups.items():
             walk(child, f"{place}/{name}")
 
     with netCDF4.Dataset(path) as file:
         walk(file, "")
-    return found
+    return contents
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("whole")
+def uninterrupted(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("uninterrupted")
     (folder / "study.toml").write_text(STUDY, encoding="utf-8")
     fc.scenes.run(folder / "study.toml", out=folder, progress=False)
     return folder / "study.toml", variables(folder / "result.nc")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_study_stopped_at_every_part_gives_the_same_bytes(whole, tmp_path, monkeypatch, number):
-    scene, expected = whole
+def test_study_stopped_at_every_part_gives_the_same_bytes(uninterrupted, tmp_path, monkeypatch, number):
+    scene, expected = uninterrupted
     asked, numbers, runs = [], [], 0
 
     def stop_in_first_part(name):
@@ -82,14 +82,14 @@ def test_study_stopped_at_every_part_gives_the_same_bytes(whole, tmp_path, monke
     assert variables(tmp_path / "result.nc") == expected
 
 
-def test_partial_file_has_the_finished_part_of_a_stage(whole, tmp_path, monkeypatch):
+def test_partial_file_has_the_finished_part_of_a_stage(uninterrupted, tmp_path, monkeypatch):
     def stop_in_closure(name):
         if name == "closure":
             signal.raise_signal(signal.SIGTERM)
 
     watch_calls(monkeypatch, stop_in_closure)
     with pytest.raises(Stopped, match="SIGTERM"):
-        fc.scenes.run(whole[0], out=tmp_path, progress=False)
+        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     partial = fc.open(tmp_path / "partial.nc")
     assert partial["joints/closure"].sizes["shear"] == 1
     assert "joints/closure (1 of 2 parts done)" in partial.attrs["completeness"]
@@ -120,8 +120,8 @@ def test_repeated_signal_within_half_a_second_counts_once(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_killed_study_leaves_no_incomplete_file(whole, tmp_path, number):
-    words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
+def test_killed_study_leaves_no_incomplete_file(uninterrupted, tmp_path, number):
+    words = [sys.executable, "-m", "fractalcontact", "run", uninterrupted[0], "-o", tmp_path, "--quiet"]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob(".stages/*.npz")) and time.monotonic() < deadline:
@@ -133,10 +133,10 @@ def test_killed_study_leaves_no_incomplete_file(whole, tmp_path, number):
         assert "resumes" in text
         assert fc.open(tmp_path / "partial.nc").attrs["completeness"].startswith("partial")
     assert not (tmp_path / "result.nc").exists()
-    tree = fc.scenes.run(whole[0], out=tmp_path, progress=False)
+    tree = fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     assert "completeness" not in tree.attrs
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
-    assert variables(tmp_path / "result.nc") == whole[1]
+    assert variables(tmp_path / "result.nc") == uninterrupted[1]
 
 
 def damaged(folder, how):
@@ -161,38 +161,38 @@ def damaged(folder, how):
             path.write_text("not an archive", encoding="utf-8")
 
 
-def test_surface_read_from_a_file_is_not_kept_again(whole, tmp_path, monkeypatch):
-    face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
-    fc.save(face, tmp_path / "face.nc")
+def test_surface_read_from_a_file_is_not_kept_again(uninterrupted, tmp_path, monkeypatch):
+    surface = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
+    fc.save(surface, tmp_path / "surface.nc")
     text = SOUND.partition("[material]")[2]
-    (tmp_path / "read.toml").write_text(f'[surface]\nread = "face.nc"\n[material]{text}', encoding="utf-8")
-    kept = []
+    (tmp_path / "read.toml").write_text(f'[surface]\nread = "surface.nc"\n[material]{text}', encoding="utf-8")
+    part_names = []
 
     def list_kept(name):
-        kept.extend(path.name for path in (tmp_path / "out" / ".stages").glob("*.npz"))
+        part_names.extend(path.name for path in (tmp_path / "out" / ".stages").glob("*.npz"))
 
     watch_calls(monkeypatch, list_kept)
     fc.scenes.run(tmp_path / "read.toml", out=tmp_path / "out", progress=False)
-    assert kept
-    assert not [name for name in kept if name.startswith("surfaces")]
+    assert part_names
+    assert not [name for name in part_names if name.startswith("surfaces")]
 
 
 @pytest.mark.parametrize("how", ["truncated", "foreign", "NetCDF", "changed", "text"])
-def test_damaged_part_is_reported_and_computed_again(whole, tmp_path, monkeypatch, how):
+def test_damaged_part_is_reported_and_computed_again(uninterrupted, tmp_path, monkeypatch, how):
     with monkeypatch.context() as patch:
         watch_calls(patch, lambda name: signal.raise_signal(signal.SIGINT))
         with pytest.raises(Stopped):
-            fc.scenes.run(whole[0], out=tmp_path, progress=False)
+            fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     damaged(tmp_path, how)
     with pytest.warns(FractalContactWarning, match="computed again"):
-        fc.scenes.run(whole[0], out=tmp_path, progress=False)
-    assert variables(tmp_path / "result.nc") == whole[1]
+        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+    assert variables(tmp_path / "result.nc") == uninterrupted[1]
 
 
 @pytest.mark.parametrize("cut", [0, 10, 1000, -1])
-def test_truncated_result_file_is_refused(whole, tmp_path, cut):
+def test_truncated_result_file_is_refused(uninterrupted, tmp_path, cut):
     path = tmp_path / "cut.nc"
-    path.write_bytes((whole[0].parent / "result.nc").read_bytes()[:cut])
+    path.write_bytes((uninterrupted[0].parent / "result.nc").read_bytes()[:cut])
     with pytest.raises(UnreadableFile, match=r"cut\.nc"):
         fc.open(path)
 
@@ -228,19 +228,19 @@ def limited(size):
     return limit
 
 
-def test_full_disk_is_a_clear_error_and_the_study_resumes(whole, tmp_path):
-    words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--quiet"]
+def test_full_disk_is_a_clear_error_and_the_study_resumes(uninterrupted, tmp_path):
+    words = [sys.executable, "-m", "fractalcontact", "run", uninterrupted[0], "-o", tmp_path, "--quiet"]
     done = subprocess.run(words, preexec_fn=limited(40_000), capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr
     assert "cannot be written here" in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.glob("*.nc"))
-    fc.scenes.run(whole[0], out=tmp_path, progress=False)
-    assert variables(tmp_path / "result.nc") == whole[1]
+    fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+    assert variables(tmp_path / "result.nc") == uninterrupted[1]
 
 
-def test_folder_without_write_access_is_refused_first(whole, tmp_path):
+def test_folder_without_write_access_is_refused_first(uninterrupted, tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     for out in (tmp_path / "file", tmp_path / "file" / "below", "/proc/nowhere"):
         with pytest.raises(InvalidInput, match="folder"):
-            fc.scenes.run(whole[0], out=out, progress=False)
+            fc.scenes.run(uninterrupted[0], out=out, progress=False)

@@ -33,9 +33,9 @@ def test_each_member_equals_a_study_of_its_surface(ensemble):
         closed = fc.joints.closure(
             crack, shear=[1e-4, 4e-4], direction="W", normal_force=[1.0, 10.0], keep=("state",)
         )
-        found = tree["joints/closure"].isel(member=number)
+        member = tree["joints/closure"].isel(member=number)
         for name in ("closure", "contact_fraction", "normal_force"):
-            np.testing.assert_array_equal(found[name], closed[name])
+            np.testing.assert_array_equal(member[name], closed[name])
         boxes = fc.domains.box_dimension(closed["state"])
         np.testing.assert_array_equal(
             tree["domains/box_dimension/box_dimension"][number], boxes["box_dimension"]
@@ -90,7 +90,7 @@ class Recorder(Executor):
 
 def test_long_path_is_solved_in_sections_and_keeps_no_map(tmp_path, monkeypatch):
     (tmp_path / "path.toml").write_text(PATH, encoding="utf-8")
-    whole = fc.scenes.run(tmp_path / "path.toml", progress=False)
+    undivided = fc.scenes.run(tmp_path / "path.toml", progress=False)
     monkeypatch.setattr("fractalcontact.scenes._parts.PART_SIZE", 8 * 32 * 32)
     recorder = Recorder()
     parts = fc.scenes.run(tmp_path / "path.toml", progress=False, client=recorder)
@@ -101,9 +101,9 @@ def test_long_path_is_solved_in_sections_and_keeps_no_map(tmp_path, monkeypatch)
     assert parts["contact"].sizes["step"] == 60
     np.testing.assert_array_equal(parts["contact/step"], np.arange(60))
     for name in ("closure", "contact_fraction"):
-        np.testing.assert_allclose(parts["contact"][name], whole["contact"][name], rtol=1e-3)
+        np.testing.assert_allclose(parts["contact"][name], undivided["contact"][name], rtol=1e-3)
     assert parts["domains/box_dimension/box_dimension"].dims == ("step",)
-    np.testing.assert_array_equal(parts["contact/nominal_pressure"], whole["contact/nominal_pressure"])
+    np.testing.assert_array_equal(parts["contact/nominal_pressure"], undivided["contact/nominal_pressure"])
 
 
 @pytest.mark.slow
@@ -124,5 +124,5 @@ def test_workers_of_dask_give_the_same_bytes(ensemble):
 def test_lineage_of_several_shears_is_joined(tmp_path):
     text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["lineage"]')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    found = fc.scenes.run(tmp_path / "study.toml", progress=False)["domains/lineage"]
-    np.testing.assert_array_equal(np.unique(found["link_shear"]), [1e-4, 4e-4])
+    lineage = fc.scenes.run(tmp_path / "study.toml", progress=False)["domains/lineage"]
+    np.testing.assert_array_equal(np.unique(lineage["link_shear"]), [1e-4, 4e-4])

@@ -57,49 +57,49 @@ def contents(path):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def uninterrupted(tmp_path_factory):
     folder = tmp_path_factory.mktemp("working")
     (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     fc.scenes.run(folder / "sweep.toml", out=folder, progress=False)
     return folder / "sweep.toml", contents(folder / "result.nc")
 
 
-def test_remote_workers_return_their_parts_and_a_stopped_ensemble_resumes(whole, tmp_path):
+def test_remote_workers_return_their_parts_and_a_stopped_ensemble_resumes(uninterrupted, tmp_path):
     with pytest.raises(Stopped):
-        fc.scenes.run(whole[0], out=tmp_path, progress=False, client=Remote(stop_at=1))
+        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=Remote(stop_at=1))
     partial = fc.open(tmp_path / "partial.nc")
     assert "3 of 5 members" in partial.attrs["completeness"]
     np.testing.assert_array_equal(partial["joints/closure"]["member"], [0, 1])
-    kept = {path.stem for path in (tmp_path / ".stages").glob("*.npz")}
-    assert len(kept) == 6  # two shears and a dilatancy of each of two members
+    part_names = {path.stem for path in (tmp_path / ".stages").glob("*.npz")}
+    assert len(part_names) == 6  # two shears and a dilatancy of each of two members
     again = Remote()
-    fc.scenes.run(whole[0], out=tmp_path, progress=False, client=again)
-    assert set().union(*again.kept) == kept
-    assert contents(tmp_path / "result.nc") == whole[1]
+    fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=again)
+    assert set().union(*again.kept) == part_names
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
 
 
-def test_lost_worker_is_reported_and_nothing_else_is_lost(whole, tmp_path):
+def test_lost_worker_is_reported_and_nothing_else_is_lost(uninterrupted, tmp_path):
     with pytest.raises(FractalContactError, match="workers died at it"):
-        fc.scenes.run(whole[0], out=tmp_path, progress=False, client=Remote(lost=3))
+        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=Remote(lost=3))
     assert list((tmp_path / ".stages").glob("joints.closure.*"))
-    fc.scenes.run(whole[0], out=tmp_path, progress=False)
-    assert contents(tmp_path / "result.nc") == whole[1]
+    fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
 
 
-def test_a_worker_uses_one_thread_unless_the_environment_sets_more(whole, monkeypatch):
+def test_a_worker_uses_one_thread_unless_the_environment_sets_more(uninterrupted, monkeypatch):
     counts = []
     watch_calls(monkeypatch, lambda name: counts.append(threads.thread_count()))
     monkeypatch.delenv("FRACTALCONTACT_THREADS", raising=False)
-    fc.scenes.run(whole[0], progress=False, client=Remote())
+    fc.scenes.run(uninterrupted[0], progress=False, client=Remote())
     assert set(counts) == {1}
     counts.clear()
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "3")
-    fc.scenes.run(whole[0], progress=False, client=Remote())
+    fc.scenes.run(uninterrupted[0], progress=False, client=Remote())
     assert set(counts) == {3}
 
 
-def test_ensemble_without_a_seed_records_one(whole, tmp_path):
+def test_ensemble_without_a_seed_records_one(uninterrupted, tmp_path):
     import json
 
     path = tmp_path / "open.toml"
@@ -111,38 +111,48 @@ def test_ensemble_without_a_seed_records_one(whole, tmp_path):
     np.testing.assert_array_equal(tree["joints/closure/closure"], again["joints/closure/closure"])
 
 
-def test_invalid_number_of_workers_is_refused(whole, tmp_path, capsys):
-    words = ["run", str(whole[0]), "-o", str(tmp_path / "out")]
+def test_invalid_number_of_workers_is_refused(uninterrupted, tmp_path, capsys):
+    words = ["run", str(uninterrupted[0]), "-o", str(tmp_path / "out")]
     assert cli.main([*words, "--workers", "-1"]) == 2
     assert "--workers: expected at least 0, got -1" in capsys.readouterr().err
     with pytest.raises(InvalidInput, match="workers"):
-        fc.scenes.run(whole[0], workers=1.5, progress=False)
+        fc.scenes.run(uninterrupted[0], workers=1.5, progress=False)
     with pytest.raises(InvalidInput, match="workers / client"):
-        fc.scenes.run(whole[0], workers=2, client=Remote(), progress=False)
+        fc.scenes.run(uninterrupted[0], workers=2, client=Remote(), progress=False)
     assert not (tmp_path / "out").exists()
 
 
-def test_command_with_worker_processes_writes_the_same_bytes(whole, tmp_path):
-    done = command("run", whole[0], "-o", tmp_path, "--workers", 2, "--quiet")
+def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_path):
+    done = command("run", uninterrupted[0], "-o", tmp_path, "--workers", 2, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
-    assert contents(tmp_path / "result.nc") == whole[1]
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_stopped_worker_processes_end_and_the_study_resumes(whole, tmp_path, number):
-    words = [sys.executable, "-m", "fractalcontact", "run", whole[0], "-o", tmp_path, "--workers", "2"]
+def test_stopped_worker_processes_end_and_the_study_resumes(uninterrupted, tmp_path, number):
+    words = [
+        sys.executable,
+        "-m",
+        "fractalcontact",
+        "run",
+        uninterrupted[0],
+        "-o",
+        tmp_path,
+        "--workers",
+        "2",
+    ]
     process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while not list(tmp_path.glob(".stages/*.npz")) and process.poll() is None:
         time.sleep(0.005)
     os.kill(process.pid, number)
     _, message = process.communicate(timeout=60)  # the pipe closes when the last worker has ended
     assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), message
-    fc.scenes.run(whole[0], out=tmp_path, progress=False)
-    assert contents(tmp_path / "result.nc") == whole[1]
+    fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
 
 
-def test_killed_worker_process_is_reported_and_the_study_resumes(whole, tmp_path):
+def test_killed_worker_process_is_reported_and_the_study_resumes(uninterrupted, tmp_path):
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("forkserver")) as executor:
         worker = executor.submit(os.getpid).result()
 
@@ -153,14 +163,14 @@ def test_killed_worker_process_is_reported_and_the_study_resumes(whole, tmp_path
 
         threading.Thread(target=kill_worker, daemon=True).start()
         with pytest.raises(FractalContactError, match="a worker process died"):
-            fc.scenes.run(whole[0], out=tmp_path, progress=False, client=executor)
-    fc.scenes.run(whole[0], out=tmp_path, progress=False)
-    assert contents(tmp_path / "result.nc") == whole[1]
+            fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=executor)
+    fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("once_there_is", ["*", "*.npz"])
-def test_killed_worker_of_dask_changes_no_byte(whole, tmp_path, once_there_is):
+def test_killed_worker_of_dask_changes_no_byte(uninterrupted, tmp_path, once_there_is):
     """Another worker takes its place and repeats what was not handed over."""
     distributed = pytest.importorskip("distributed")
     killed = []
@@ -177,8 +187,8 @@ def test_killed_worker_of_dask_changes_no_byte(whole, tmp_path, once_there_is):
     ):
         killer = threading.Thread(target=kill_one, args=(cluster,), daemon=True)
         killer.start()
-        fc.scenes.run(whole[0], out=tmp_path, progress=False, client=client)
+        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=client)
         killer.join(5)
     assert killed
-    assert contents(tmp_path / "result.nc") == whole[1]
+    assert contents(tmp_path / "result.nc") == uninterrupted[1]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]

@@ -59,6 +59,6 @@ def test_pair_is_brought_into_mated_position(gneiss):
 
 def test_hurst_exponent_is_the_published_one(gneiss):
     # of the face as scanned: without its spikes it is smoother
-    found = gneiss["dimensions"].to_dataset().sel({"method": "default"})
-    assert float(found["hurst"]) == pytest.approx(0.71, abs=0.03)
-    assert float(found["ci_low"]) < 0.71 < float(found["ci_high"])
+    estimate = gneiss["dimensions"].to_dataset().sel({"method": "default"})
+    assert float(estimate["hurst"]) == pytest.approx(0.71, abs=0.03)
+    assert float(estimate["ci_low"]) < 0.71 < float(estimate["ci_high"])

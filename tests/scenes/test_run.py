@@ -75,8 +75,8 @@ def test_provenance_has_run_time_and_error_of_every_stage(study):
 
 def test_map_read_only_by_other_stages_is_not_stored(tmp_path):
     text = SOUND.replace('["closure", "rigid_dilatancy"]', '["closure"]\ndomains = ["box_dimension"]')
-    (tmp_path / "lean.toml").write_text(text, encoding="utf-8")
-    tree = fc.scenes.run(tmp_path / "lean.toml", progress=False)
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
     assert "state" not in tree["joints/closure"]
     assert "box_dimension" in tree["domains/box_dimension"]
     assert "surfaces" not in tree.children
@@ -97,7 +97,7 @@ def test_rigid_sliding_imports_no_solver_and_no_compiler(tmp_path):
 def test_failed_run_resumes_from_kept_stages(tmp_path, monkeypatch):
     text = SOUND.replace('"rigid_dilatancy"]', '"friction"]\ndomains = ["lacunarity"]')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    whole = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    uninterrupted = fc.scenes.run(tmp_path / "study.toml", progress=False)
 
     def fail_in_friction(name):
         if name == "friction":
@@ -108,15 +108,15 @@ def test_failed_run_resumes_from_kept_stages(tmp_path, monkeypatch):
         with pytest.raises(RuntimeError):
             fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert not (tmp_path / "out" / "result.nc").exists()
-    kept = sorted(path.name for path in (tmp_path / "out" / ".stages").iterdir())
-    assert sum(name.startswith("joints.closure") for name in kept) == 2
+    part_names = sorted(path.name for path in (tmp_path / "out" / ".stages").iterdir())
+    assert sum(name.startswith("joints.closure") for name in part_names) == 2
 
     calls = []
     watch_calls(monkeypatch, calls.append)
     resumed = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert calls == ["friction"]
     for path in ("joints/closure", "domains/lacunarity"):
-        ours, theirs = resumed[path].to_dataset(), whole[path].to_dataset()
+        ours, theirs = resumed[path].to_dataset(), uninterrupted[path].to_dataset()
         xr.testing.assert_identical(
             ours.drop_vars("run_time", errors="ignore").drop_attrs(deep=False),
             theirs.drop_vars("run_time", errors="ignore").drop_attrs(deep=False),

@@ -22,10 +22,10 @@ def test_file_has_the_wanted_results_and_no_map(tmp_path):
 
 def test_island_map_is_stored_only_where_it_is_kept(tmp_path):
     text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', 'domains = ["islands"]')
-    plain, kept = (
+    plain, with_map = (
         fc.scenes.run(scene(tmp_path, text + more), progress=False)["domains/islands"].to_dataset()
         for more in ("", 'keep = ["label"]')
     )
     assert not {"label", "y", "x"} & set(plain.variables)
-    assert kept["label"].dims == ("shear", "step", "y", "x")
-    assert plain["area"].equals(kept["area"])
+    assert with_map["label"].dims == ("shear", "step", "y", "x")
+    assert plain["area"].equals(with_map["area"])

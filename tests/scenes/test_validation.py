@@ -21,7 +21,7 @@ def test_scene_with_other_line_ends_is_read(tmp_path, encoding, newline):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "meant"),
+    ("old", "new", "suggestion"),
     [
         ("rigid_dilatancy", "rigid_dilatency", "'rigid_dilatancy'"),
         ('"fbm"', '"fmb"', "'fbm'"),
@@ -29,18 +29,18 @@ def test_scene_with_other_line_ends_is_read(tmp_path, encoding, newline):
         ("[material]", "[materials]", "'material'"),
     ],
 )
-def test_misspelt_word_gets_a_suggestion(tmp_path, old, new, meant):
+def test_misspelt_word_gets_a_suggestion(tmp_path, old, new, suggestion):
     (tmp_path / "study.toml").write_text(SOUND.replace(old, new), encoding="utf-8")
-    with pytest.raises(InvalidInput) as told:
+    with pytest.raises(InvalidInput) as caught:
         fc.scenes.load(tmp_path / "study.toml")
-    assert f"did you mean {meant}?" in str(told.value)
+    assert f"did you mean {suggestion}?" in str(caught.value)
 
 
 def test_values_in_place_of_tables_are_listed_at_once(tmp_path):
     (tmp_path / "study.toml").write_text("surface = 3\njoint = [1]\nmaterial = 'x'\nwant = 4\n")
-    with pytest.raises(InvalidInput) as told:
+    with pytest.raises(InvalidInput) as caught:
         fc.scenes.load(tmp_path / "study.toml")
-    assert {line.partition(":")[0] for line in told.value.problems} >= {
+    assert {line.partition(":")[0] for line in caught.value.problems} >= {
         "surface",
         "joint",
         "material",
@@ -79,14 +79,14 @@ def test_command_reports_file_size_and_peak_memory(tmp_path):
     (tmp_path / "study.toml").write_text(SOUND.replace('"closure", ', ""), encoding="utf-8")
     last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-1]
     size = (tmp_path / "out" / "result.nc").stat().st_size
-    told = re.search(r"result\.nc \((\S+) MB\); peak memory (\d+) MB", last)
-    assert told, last
-    assert float(told[1]) == pytest.approx(size / 1e6, rel=0.1)
-    assert 50 < int(told[2]) < 1000
+    printed = re.search(r"result\.nc \((\S+) MB\); peak memory (\d+) MB", last)
+    assert printed, last
+    assert float(printed[1]) == pytest.approx(size / 1e6, rel=0.1)
+    assert 50 < int(printed[2]) < 1000
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "message"),
     [
         ("[joint.decorrelation_length]\nshear = [1e-4, 2e-4]", "joints/decorrelation_length: shear"),
         ("[joint.transmissivity]\naxis = 'z'", "joints/transmissivity: axis"),
@@ -101,8 +101,8 @@ def test_command_reports_file_size_and_peak_memory(tmp_path):
         ("[dimensions]\nmethods = ['spectrum']", "dimensions.methods"),
     ],
 )
-def test_values_refused_by_a_late_stage_are_reported_first(tmp_path, monkeypatch, table, told):
-    wanted = """[want]
+def test_values_refused_by_a_late_stage_are_reported_first(tmp_path, monkeypatch, table, message):
+    want_table = """[want]
 joints = ["closure", "elastic_dilatancy", "decorrelation_length", "transmissivity"]
 domains = ["lacunarity", "box_dimension", "evolution"]
 dimensions = ["default"]
@@ -111,8 +111,8 @@ dimensions = ["default"]
     scene = SOUND.partition("[want]")[0].replace("shear = [1e-4, 4e-4]", shears)
     computed = []
     watch_calls(monkeypatch, computed.append)
-    (tmp_path / "study.toml").write_text(f"{scene}\n{table}\n{wanted}", encoding="utf-8")
-    with pytest.raises(InvalidInput, match=told):
+    (tmp_path / "study.toml").write_text(f"{scene}\n{table}\n{want_table}", encoding="utf-8")
+    with pytest.raises(InvalidInput, match=message):
         fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
     assert not (tmp_path / "out").exists()
     assert computed == []

@@ -193,8 +193,8 @@ def test_members_profiles_and_labels():
     stack = fc.surfaces.fbm((8, 9), 1.0, hurst=0.5, rms_increment=1.0, rng=1, members=3)
     statistics = fc.surfaces.describe(stack)
     assert statistics.rms_height.dims == ("member",)
-    one = fc.surfaces.describe(stack.isel(member=2, drop=True))
-    assert float(statistics.rms_slope[2]) == float(one.rms_slope)
+    single = fc.surfaces.describe(stack.isel(member=2, drop=True))
+    assert float(statistics.rms_slope[2]) == float(single.rms_slope)
     for name, variable in {**statistics.data_vars, **statistics.coords}.items():
         assert variable.attrs["units"] == QUANTITIES[name].units
         assert variable.attrs["long_name"]

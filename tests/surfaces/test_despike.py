@@ -34,7 +34,7 @@ def test_wide_spike_is_removed_from_its_edge_inwards(surface):
     assert removed[70, 10]
 
 
-def test_slope_is_no_spike_and_units_do_not_matter(surface):
+def test_slope_is_not_removed_and_units_do_not_matter(surface):
     x = np.arange(90) * 3e-4
     tilted = surface + 2.0 * x
     assert fc.surfaces.despike(tilted, threshold=9.0).removed_points == 0

@@ -1,4 +1,4 @@
-"""Properties of every generator: shape, streams, members, units, files; and lean import."""
+"""Properties of every generator: shape, streams, members, units, files; import without heavy libraries."""
 
 import json
 import subprocess

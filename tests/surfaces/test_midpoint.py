@@ -35,7 +35,7 @@ def test_first_two_stages_are_exact(covariance_of, hurst):
         assert spread(edge, neighbours) == pytest.approx(exact(edge, neighbours), rel=1e-12)
 
 
-def test_both_axes_are_alike(covariance_of):
+def test_both_axes_have_the_same_statistics(covariance_of):
     covariance = covariance_of(lambda rng: midpoint((5, 5), hurst=0.7, additions=True, rng=rng).values)
     plane = covariance.reshape(5, 5, 5, 5)
     variogram = np.einsum("ijij->ij", plane)[:, :, None, None] + np.einsum("ijij->ij", plane) - 2 * plane
