@@ -117,13 +117,13 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
 
 def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
     """Check the block and the shears, which must not push it off its face."""
-    from fractalcontact import joints
-
     joint_presses = bool(scene.want.domains) and not scene.want.contact
     if not (scene.want.joints or joint_presses):
         return
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
         return
+    from fractalcontact import joints  # only here: other scenes do not load it
+
     with problems.collect("joint: "):
         crack = joints.Crack(surfaces["surface"], surfaces.get("upper"), **crack_options(scene))
         for stage in stages_of(scene) if _is_valid(problems, "joint") else ():
