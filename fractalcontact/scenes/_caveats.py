@@ -82,7 +82,7 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
     unresolved = touching & (low < MIN_CELLS)
     if not unresolved.any():
         return
-    greatest = int(np.flatnonzero(touching)[-1])
+    greatest = int(np.flatnonzero(unresolved)[-1])
     ends = dict.fromkeys(f"{end[greatest]:.2g}" for end in (low, high))
     where = (
         "at every load"
@@ -91,8 +91,8 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
     )
     source = "" if "state" in pressed else ", from their perimeter"
     yield (
-        f"{path}: the spots of contact are not resolved {where}: the median island has {' to '.join(ends)} "
-        f"cells at the last load{source}, and {MIN_CELLS} are needed. Areas of single islands and their "
+        f"{path}: the spots of contact are not resolved {where}: at the last of them the median of the cells "
+        f"per island is {' to '.join(ends)}{source}; {MIN_CELLS} are needed. Areas of single islands and their "
         "shape are those of the grid."
     )
 

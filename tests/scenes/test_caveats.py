@@ -41,7 +41,7 @@ def smooth():
 def test_unresolved_spots_at_every_load(rough):
     cells = fc.domains.islands(rough.state.isel(step=-1)).cells
     assert "not resolved at every load" in text(study(rough))
-    assert f"the median island has {float(np.median(cells)):.2g} cells at the last load" in text(study(rough))
+    assert f"the cells per island is {float(np.median(cells)):.2g}; 30 are needed" in text(study(rough))
 
 
 def test_many_small_spots_are_not_resolved_by_their_sum(rough):
