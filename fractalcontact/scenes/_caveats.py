@@ -92,8 +92,8 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
     source = "" if "state" in pressed else ", from their perimeter"
     yield (
         f"{path}: the spots of contact are not resolved {where}: at the last of them the median of the cells "
-        f"per island is {' to '.join(ends)}{source}; {MIN_CELLS} are needed. Areas of single islands and their "
-        "shape are those of the grid."
+        f"per island is {' to '.join(ends)}{source}; {MIN_CELLS} are needed. Areas of single islands and "
+        "their shape are those of the grid."
     )
 
 
