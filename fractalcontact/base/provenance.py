@@ -19,15 +19,10 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base import rng as streams
+from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import CONVENTIONS
 from fractalcontact.base.threads import thread_count
 
-PAPER = (
-    "Borri-Brunetto, Carpinteri and Chiaia, Contact, closure and friction behaviour of rough crack concrete "
-    "surfaces, FRAMCOS-3 (1998)"
-)
-
-NO_REFERENCES = "none"
 MEMBER = "member"
 LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
@@ -117,12 +112,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
-
-
-def joined_references(*texts: str) -> str:
-    """Return the sources of several methods, each once."""
-    sources = dict.fromkeys(source for text in texts for source in text.split("; ") if text != NO_REFERENCES)
-    return "; ".join(sources) or NO_REFERENCES
 
 
 def checksum(values: np.ndarray[Any, Any]) -> str:

@@ -28,7 +28,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.provenance import NO_REFERENCES, stamp
+from fractalcontact.base.provenance import stamp
+from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems, did_you_mean
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid
-from fractalcontact.base.provenance import PAPER, joined_references
+from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.validation import Problems, float_array, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._scaled_problem import length_unit, make_units, scaled_body

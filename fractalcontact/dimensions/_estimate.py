@@ -13,7 +13,7 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.power_law import fit_line
-from fractalcontact.base.provenance import joined_references
+from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions import (

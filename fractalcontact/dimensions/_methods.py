@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fractalcontact.base.provenance import PAPER
+from fractalcontact.base.references import PAPER
 
 DEFAULT = "likelihood"
 _INCREMENTS = (

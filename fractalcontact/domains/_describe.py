@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
-from fractalcontact.base.provenance import joined_references
+from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.domains import (
     _boundary,

@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.spatial import cKDTree
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.provenance import joined_references
+from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import Problems, word_tuple

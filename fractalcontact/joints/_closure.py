@@ -14,7 +14,7 @@ import fractalcontact as fc  # loads `contact` on first use: a study of rigid fa
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import PAPER, joined_references
+from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.validation import Problems, float_array, word_tuple

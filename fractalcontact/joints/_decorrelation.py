@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.polynomial import detrended
-from fractalcontact.base.provenance import PAPER
+from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import (

@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.power_law import fit_line
-from fractalcontact.base.provenance import PAPER
+from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import check_direction, read_direction

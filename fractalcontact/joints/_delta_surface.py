@@ -16,7 +16,7 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.provenance import PAPER
+from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions

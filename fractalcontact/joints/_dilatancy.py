@@ -12,7 +12,7 @@ import xarray as xr
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import PAPER
+from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._closure import (

@@ -11,7 +11,7 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.provenance import joined_references
+from fractalcontact.base.references import joined_references
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._stages import STAGES, public_function
 

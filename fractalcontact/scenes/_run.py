@@ -14,6 +14,7 @@ import xarray as xr
 
 from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, output_folder
+from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
@@ -147,7 +148,7 @@ def _assemble(
         "fractalcontact.scenes.run",
         {"scene": dict(scene.tables)},
         title=str(scene.tables.get("title", scene.name)),
-        references=provenance.PAPER if scene.paper else OWN_REFERENCES,
+        references=PAPER if scene.paper else OWN_REFERENCES,
         stages={
             name: {
                 "run_time": second,
@@ -172,7 +173,7 @@ def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:
         "merged": [json.loads(description.attrs["provenance"])]
     }
     sources = (dataset.attrs["references"] for dataset in (heights, description))
-    references = provenance.joined_references(*sources)
+    references = joined_references(*sources)
     return merged.assign_attrs(provenance=json.dumps(entry), references=references)
 
 
