@@ -25,6 +25,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions import _whittle
+from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -118,6 +119,14 @@ class FreeModes:
         if not valid:
             return fits[0]
         return min(valid, key=lambda fit: float(np.sum(np.log(fit.amplitude * fit.total))))
+
+    def blurred(self) -> BlurredFit | None:
+        """Fit a blurred surface, if no heights are missing."""
+        if self.gapped is not None:
+            return None
+        return fit_blurred(
+            self.power, lambda hurst: expected_power(self.lattice, hurst)[self.chosen], self.order
+        )
 
     def error(self, fit: _whittle.WhittleFit) -> float:
         """Return the standard error of H, with the correlation of the modes at edges and gaps.

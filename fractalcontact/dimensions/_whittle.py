@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from fractalcontact.dimensions._blur import BlurredFit
 from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, normal_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -58,6 +59,9 @@ class Modes(Protocol):
     def error(self, fit: WhittleFit) -> float:
         """Return the standard error of H."""
 
+    def blurred(self) -> BlurredFit | None:
+        """Fit the model with the blur of an instrument; None where there is no such fit."""
+
 
 def fit_interval(modes: Modes, start: float, noise: bool) -> tuple[WhittleFit, Estimate]:
     """Fit modes, and return the estimate with its interval.
@@ -77,6 +81,11 @@ def fit_interval(modes: Modes, start: float, noise: bool) -> tuple[WhittleFit, E
         if not noise and (with_noise := modes.fit(start, True)).converged:
             interval = _holding(interval, modes, with_noise)
             noise_note = ", and that of a fit with white noise"
+        if (blurred := modes.blurred()) is not None:
+            low, high = normal_interval(blurred.hurst, blurred.standard_error)
+            interval = min(interval[0], low), max(interval[1], high)
+            noise_note += f", and that of a blurred surface, {blurred.hurst:.2f} with a spread of "
+            noise_note += f"{blurred.spread:.1f} spacings"
         notes.append(
             f"the exponent changes with scale ({result.misfit:+.1f} standard deviations): "
             f"the interval holds that of the longer and of the shorter half of the modes{noise_note}"
