@@ -10,6 +10,7 @@ import argparse
 import gc
 import os
 import sys
+import textwrap
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -221,9 +222,10 @@ def _estimators(options: argparse.Namespace) -> int:
 def _methods(options: argparse.Namespace) -> int:
     del options
     from fractalcontact import dimensions
+    from fractalcontact.base.tables import screen_width
 
     for name, line in dimensions.methods().items():
-        print(f"{name:<20} {line}")
+        print(textwrap.fill(f"{name:<20} {line}", screen_width(), subsequent_indent=" " * 21))
     return 0
 
 

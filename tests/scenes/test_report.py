@@ -90,8 +90,9 @@ def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch
 
 def test_command_fits_the_screen(monkeypatch):
     monkeypatch.setenv("COLUMNS", "72")
-    done = command("run", "--plan", "concrete_crack")
-    assert max(map(len, done.stdout.splitlines())) <= 72
+    for words in (("run", "--plan", "concrete_crack"), ("methods",)):
+        lines = command(*words).stdout.splitlines()
+        assert 50 < max(map(len, lines)) <= 72
 
 
 def test_units_follow_the_values():
