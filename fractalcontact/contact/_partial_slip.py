@@ -37,7 +37,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import OPEN, SLIP, SLIP_MAPS, STICK
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.contact._load_path import Step, scaled_path, solve_path
-from fractalcontact.contact._masing import ShearState, shear_states
+from fractalcontact.contact._masing_rules import ShearState, shear_states
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._scaled_problem import sum_by_rows
 
