@@ -49,17 +49,17 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
             with warnings.catch_warnings():
                 warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
                 values = np.nanquantile(variable.values.astype(float), share, variable.dims.index(MEMBER))
-            kept = variable.isel({MEMBER: 0}, drop=True)
-            reduced[name] = kept.copy(data=values)
+            first = variable.isel({MEMBER: 0}, drop=True)
+            reduced[name] = first.copy(data=values)
     rest = flat.drop_dims(MEMBER)
     return rest.assign(reduced).set_coords(loads)
 
 
 def draw_with_band(drawings: Sequence[Callable[[], Figure]], members: int) -> Figure:
     """Draw the median, and for every curve the band between the same curves of the two other drawings."""
-    middle, *ends = drawings
+    median, *ends = drawings
     with recorded_scales() as record:
-        figure = middle()
+        figure = median()
     bounds = []
     for drawing in ends:
         with replayed_scales(record):
@@ -84,7 +84,7 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
     """Fill between the curves of two axes, in the colour of the same curve; return how many were filled."""
     count, limits = 0, (ax.get_xlim(), ax.get_ylim())
     lines = [list(axes.get_lines()) for axes in (ax, low, high)]
-    if len({len(found) for found in lines}) > 1:
+    if len({len(group) for group in lines}) > 1:
         return 0
     for line, *bounds in zip(*lines, strict=True):
         (x_low, y_low), (x_high, y_high) = (
@@ -94,9 +94,9 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         same = x_low.size == x_high.size and bool(np.all((x_low == x_high) & (y_low == y_high)))
         if x_low.size < 2 or x_low.size != x_high.size or same:
             continue
-        known = np.isfinite(x_low + y_low + x_high + y_high)
-        x = np.concatenate([x_low[known], x_high[known][::-1]])
-        y = np.concatenate([y_low[known], y_high[known][::-1]])
+        finite = np.isfinite(x_low + y_low + x_high + y_high)
+        x = np.concatenate([x_low[finite], x_high[finite][::-1]])
+        y = np.concatenate([y_low[finite], y_high[finite][::-1]])
         ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5)
         limits = _widened(limits[0], x), _widened(limits[1], y)
         count += 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fractalcontact.accuracy import _cramer_rao as cramer_rao
+from fractalcontact.accuracy import _estimators as cramer_rao
 
 
 def test_brownian_bound_matches_the_table():
@@ -14,7 +14,7 @@ def test_brownian_bound_matches_the_table():
 
 def test_aliased_density_matches_a_sum_over_many_more_images():
     hurst = 0.4
-    w = (np.arange(cramer_rao.POINTS) + 0.5) / cramer_rao.POINTS * np.pi
+    w = (np.arange(cramer_rao.BOUND_POINTS) + 0.5) / cramer_rao.BOUND_POINTS * np.pi
     j = np.arange(-400, 401)
     corner = (
         np.sum(((w[-1] + 2 * np.pi * j[:, None]) ** 2 + (w[-1] + 2 * np.pi * j) ** 2) ** (-1 - hurst))
