@@ -7,7 +7,6 @@ finishes the current task and keeps the results; a second SIGINT stops at once.
 from __future__ import annotations
 
 import argparse
-import gc
 import os
 import sys
 import textwrap
@@ -17,18 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
-from fractalcontact.base.memory import block_dask_import
+from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
-# allocations between two garbage collections: with Python's 700 they take 5 % of the run time of a study
-GC_THRESHOLD = 10_000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     if arguments is None:
-        gc.set_threshold(GC_THRESHOLD)
+        collect_garbage_less_often()
         block_dask_import()
     options = _parser().parse_args(arguments)
     warnings.showwarning = _say_warning
@@ -136,7 +133,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _memory() -> str:
     """Return the peak memory of this process, where the system reports it."""
-    from fractalcontact.base.memory import peak_memory
+    from fractalcontact.base.process import peak_memory
 
     peak = peak_memory()
     return f"; peak memory {peak / 1e6:.0f} MB" if peak else ""

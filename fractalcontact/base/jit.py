@@ -8,11 +8,11 @@ depend on the number of threads is done by rows in the kernel, then serially ove
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any, TypeVar, cast
 
 import numba
 
+from fractalcontact.base.process import ignore_full_disk
 from fractalcontact.base.threads import thread_count
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -64,25 +64,5 @@ def _compile(function: F, **options: Any) -> F:
         compiled = numba.njit(cache=True, **_OPTIONS, **options)(function)
     except RuntimeError:  # no cache folder can be written: the kernel is compiled in every process
         return cast("F", numba.njit(**_OPTIONS, **options)(function))
-    _ignore_full_disk(compiled)
+    ignore_full_disk(compiled)
     return compiled
-
-
-def _ignore_full_disk(compiled: Any) -> None:
-    """Let a kernel run even if its compiled code cannot be saved.
-
-    Numba writes the cache inside the first call and lets an OSError (disk full, quota) end the call, hours
-    into a run, although the kernel is ready in memory. Numba has no option for it, and a wrapper around the
-    call would keep kernels from calling each other, so the private cache object is patched here. Where
-    a version of Numba has no such object, or the compiler is disabled, nothing is done.
-    """
-    cache = getattr(compiled, "_cache", None)
-    save = getattr(cache, "save_overload", None)
-    if cache is None or save is None:
-        return
-
-    def save_if_possible(*arguments: Any) -> None:
-        with suppress(OSError):
-            save(*arguments)
-
-    cache.save_overload = save_if_possible

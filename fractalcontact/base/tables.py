@@ -58,10 +58,10 @@ def _column_widths(rows: Sequence[Sequence[str]], width: int) -> list[int]:
     widths = [max(len(head) + GAP, *map(len, cells), 0) for head, *cells in columns]
     shortest = [max(_longest_word(head) + GAP, *map(_longest_word, cells), 0) for head, *cells in columns]
     while _total(widths) > width:
-        room = [size - least for size, least in zip(widths, shortest, strict=True)]
-        if max(room) <= 0:
+        slack = [size - least for size, least in zip(widths, shortest, strict=True)]
+        if max(slack) <= 0:
             break
-        widths[max((i for i, spare in enumerate(room) if spare > 0), key=lambda i: widths[i])] -= 1
+        widths[max((i for i, unused in enumerate(slack) if unused > 0), key=lambda i: widths[i])] -= 1
     return widths
 
 

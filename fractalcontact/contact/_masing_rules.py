@@ -50,9 +50,9 @@ def shear_states(forces: Array) -> list[ShearState]:
             if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
                 points[-1] = value
             else:
-                forget_loops(points, closed, at_closure=True)
+                discard_closed_loops(points, closed, at_closure=True)
                 points.append(value)
-            forget_loops(points, closed)
+            discard_closed_loops(points, closed)
         branches = []
         for number, (start, stop) in enumerate(pairwise(points)):
             weight = 2.0 if number else 1.0
@@ -61,10 +61,12 @@ def shear_states(forces: Array) -> list[ShearState]:
     return states
 
 
-def forget_loops(points: list[float], closed: list[tuple[float, float]], *, at_closure: bool = False) -> None:
+def discard_closed_loops(
+    points: list[float], closed: list[tuple[float, float]], *, at_closure: bool = False
+) -> None:
     """Take the reversals of closed loops out of `points` and note the loops in `closed`.
 
-    A loop that has just closed is forgotten `at_closure` only: up to there its stick set is that of its own
+    A loop that has just closed is discarded with `at_closure` only: up to there its stick set is that of its own
     last branch. A loop of two branches dissipates as 4 first branches of its L do. The first branch together
     with the part of the second that mirrors it is like a first branch the other way, and dissipates 2 more.
     """

@@ -5,7 +5,7 @@ The workers then share the libraries that every study needs. dask stays out, as 
 
 import importlib
 
-from fractalcontact.base.memory import block_dask_import
+from fractalcontact.base.process import block_dask_import
 
 block_dask_import()
 for _name in ("netCDF4", "numba", "scipy.fft", "scipy.special", "fractalcontact.scenes._study"):

@@ -16,7 +16,7 @@ import tracemalloc
 from functools import _lru_cache_wrapper
 from pathlib import Path
 
-from fractalcontact.base.memory import block_dask_import, peak_memory
+from fractalcontact.base.process import block_dask_import, peak_memory
 
 TASK, REPORT = "task.pickle", "report.json"
 PACKAGE = "fractalcontact"

@@ -74,7 +74,7 @@ CHAIN = """
 import gc, importlib, json, pickle, sys
 sys.path.insert(0, sys.argv[1])
 import probe
-from fractalcontact.base.memory import block_dask_import
+from fractalcontact.base.process import block_dask_import
 block_dask_import()
 from fractalcontact import scenes
 

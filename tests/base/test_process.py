@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from fractalcontact.base.memory import peak_memory
+from fractalcontact.base.process import peak_memory
 
 
 def test_peak_memory_includes_a_large_block():
@@ -18,7 +18,7 @@ def test_peak_memory_includes_a_large_block():
 
 def test_dask_is_not_imported_to_save_a_result(tmp_path):
     code = (
-        "import sys; from fractalcontact.base.memory import block_dask_import; block_dask_import()\n"
+        "import sys; from fractalcontact.base.process import block_dask_import; block_dask_import()\n"
         "import fractalcontact as fc\n"
         "surface = fc.surfaces.spectral((8, 8), 1e-4, hurst=0.7, rms_height=1e-6, rng=1)\n"
         "fc.save(surface, sys.argv[1])\n"
