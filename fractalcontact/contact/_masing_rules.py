@@ -66,9 +66,10 @@ def discard_closed_loops(
 ) -> None:
     """Take the reversals of closed loops out of `points` and note the loops in `closed`.
 
-    A loop that has just closed is discarded with `at_closure` only: up to there its stick set is that of its own
-    last branch. A loop of two branches dissipates as 4 first branches of its L do. The first branch together
-    with the part of the second that mirrors it is like a first branch the other way, and dissipates 2 more.
+    A loop that has just closed is discarded with `at_closure` only: up to there its stick set is that of its
+    own last branch. A loop of two branches dissipates as 4 first branches of its length do. The first branch
+    together with the part of the second that mirrors it is like a first branch the other way, and dissipates
+    2 more.
     """
     while len(points) > 2:
         length = abs(points[-1] - points[-2])

@@ -152,7 +152,8 @@ def test_kept_stages_of_a_changed_scene_are_not_used(tmp_path, monkeypatch, old,
     assert set(calls) & {"closure", "dilatancy"} == recomputed
 
 
-def test_summary_and_info_print_the_main_results(study, tmp_path):
+def test_summary_and_info_print_the_main_results(study, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")  # no head of a table is broken
     tree, out = study
     text = fc.scenes.summary(tree)
     for word in (
