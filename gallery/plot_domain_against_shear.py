@@ -9,8 +9,8 @@ cells, it soon rises, away from that of the null: the contacts that are left sta
 the paper is one of coverage.
 """
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from shared_study import study
 
 import fractalcontact as fc
@@ -23,7 +23,8 @@ windows = {
 }
 print(windows["boxes of 1 to 250 cells"])
 
-figure, panels = plt.subplots(1, 2, figsize=(8.5, 3.4), sharex=True, layout="constrained")
+figure = Figure(figsize=(8.5, 3.4), layout="constrained")
+panels = figure.subplots(1, 2, sharex=True)
 for ax, (title, result) in zip(panels, windows.items(), strict=True):
     shear = result["shear"] * 1e3
     ax.semilogx(shear, result["box_dimension"], "o-", label="contact domain")
