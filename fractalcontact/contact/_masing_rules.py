@@ -31,17 +31,17 @@ class Branch:
 
 @dataclass(frozen=True)
 class ShearState:
-    """What a step remembers: its branches, and the weights and forces L of the loops that have closed."""
+    """Loading history of a step: its branches, and the weights and forces L of the loops that have closed."""
 
     branches: tuple[Branch, ...]
     closed: tuple[tuple[float, float], ...]
 
 
 def shear_states(forces: Array) -> list[ShearState]:
-    """Return what each step of a path of tangential forces remembers.
+    """Return the loading history of each step of a path of tangential forces.
 
-    `points` holds 0, the reversals that are not forgotten, and the force now. Masing's rule: a branch that
-    becomes longer than the one before it has closed a loop, which is forgotten.
+    `points` holds 0, the reversals of loops still open, and the current force. Masing's rule: a branch that
+    becomes longer than the one before it has closed a loop, which is discarded.
     """
     points, states = [0.0], []
     closed: list[tuple[float, float]] = []

@@ -158,7 +158,7 @@ def _run_on_workers(
 
 @contextmanager
 def _mark(store: PartStore) -> Iterator[Path | None]:
-    """Provide a file that tells workers which see the folder whether the run was stopped."""
+    """Provide a file by which workers with access to the folder detect that the run was stopped."""
     if store.folder is None:
         yield None
         return
