@@ -12,12 +12,9 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-from fractalcontact.base.process import ignore_full_disk
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.kernel_cache import protect
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-prange = numba.prange
 
 # no kernel is called from C, so the entry point for C is not compiled
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -42,27 +39,11 @@ def gap_sum_kernel(function: F) -> F:
     return _compile(function, fastmath={"reassoc", "nsz"})
 
 
-def parallel_kernel(function: F) -> F:
-    """Compile a loop whose `prange` runs on the threads of `base.threads`.
-
-    The iterations of its `prange` must not share a sum. With one thread, or with the compiler disabled, the
-    same source runs serially.
-    """
-    return _compile(function, parallel=True)
-
-
-def use_threads() -> int:
-    """Set the number of threads of Numba's parallel loops to that of `base.threads`; return it."""
-    threads = max(1, min(thread_count(), int(numba.config.NUMBA_NUM_THREADS)))
-    numba.set_num_threads(threads)
-    return threads
-
-
 def _compile(function: F, **options: Any) -> F:
     compiled: F
     try:
         compiled = numba.njit(cache=True, **_OPTIONS, **options)(function)
     except RuntimeError:  # no cache folder can be written: the kernel is compiled in every process
         return cast("F", numba.njit(**_OPTIONS, **options)(function))
-    ignore_full_disk(compiled)
+    protect(compiled)
     return compiled

@@ -1,15 +1,13 @@
-"""The running process: its peak memory, and three measured adjustments of its libraries.
+"""The running process: its peak memory, and two measured adjustments of its libraries.
 
-No other module changes the garbage collector, the table of imported modules or private parts of a library.
+No other module changes the garbage collector or the table of imported modules.
 """
 
 from __future__ import annotations
 
 import gc
 import sys
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 # allocations between two garbage collections: with Python's 700 they take 5 % of the run time of a study
 GC_THRESHOLD = 10_000
@@ -45,23 +43,3 @@ def block_dask_import() -> None:
 def collect_garbage_less_often() -> None:
     """Raise the threshold of the garbage collector; only for the command line, which owns its process."""
     gc.set_threshold(GC_THRESHOLD)
-
-
-def ignore_full_disk(compiled: Any) -> None:
-    """Let a kernel run even if its compiled code cannot be saved.
-
-    Numba writes the cache inside the first call and lets an OSError (disk full, quota) end the call, hours
-    into a run, although the kernel is ready in memory. Numba has no option for it, and a wrapper around the
-    call would keep kernels from calling each other, so the private cache object is patched here. Where
-    a version of Numba has no such object, or the compiler is disabled, nothing is done.
-    """
-    cache = getattr(compiled, "_cache", None)
-    save = getattr(cache, "save_overload", None)
-    if cache is None or save is None:
-        return
-
-    def save_if_possible(*arguments: Any) -> None:
-        with suppress(OSError):
-            save(*arguments)
-
-    cache.save_overload = save_if_possible

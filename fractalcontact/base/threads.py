@@ -64,8 +64,9 @@ def in_bands(function: Callable[..., None], count: int, work: int, *arguments: A
     """Call ``function(start, stop, *arguments)`` over bands of ``range(count)``, in parallel.
 
     The function must release the global interpreter lock, and its result must not depend on the bands: keep
-    sums for each item and add them up afterwards. Unlike a `prange` loop this may be called from several
-    threads at once, and it compiles fast.
+    sums for each item and add them up afterwards. Unlike a `prange` loop of Numba this may be called from
+    several threads at once and in a forked process, and it compiles fast. Where the system has no more
+    threads, the calling thread does all the work.
 
     Parameters
     ----------
@@ -84,6 +85,9 @@ def in_bands(function: Callable[..., None], count: int, work: int, *arguments: A
     edges = [count * k // threads for k in range(threads + 1)]
     bands = [_Band(function, (edges[k], edges[k + 1], *arguments)) for k in range(1, threads)]
     queue = _worker_queue(threads - 1)
+    if queue is None:
+        function(0, count, *arguments)
+        return
     for band in bands:
         queue.put(band)
     try:
@@ -114,24 +118,53 @@ class _Band:
         self.done.release()
 
 
-_queues: dict[tuple[int, int], SimpleQueue[_Band]] = {}
+_Queue = SimpleQueue[_Band | None]
+_queues: dict[int, _Queue] = {}  # by number of threads
 _lock = threading.Lock()
 
 
-def _worker_queue(count: int) -> SimpleQueue[_Band]:
-    """Return the queue of `count` waiting threads.
+def _worker_queue(count: int) -> _Queue | None:
+    """Return the queue of `count` waiting threads; None if the system cannot start so many.
 
     Handing over a call takes a third of the time of an executor of `concurrent.futures`.
     """
-    key = (os.getpid(), count)  # threads do not survive a fork
     with _lock:
-        if key not in _queues:
-            _queues[key] = SimpleQueue()
-            for _ in range(count):
-                threading.Thread(target=_work, args=(_queues[key],), daemon=True).start()
-        return _queues[key]
+        if count not in _queues:
+            queue = _started(count)
+            if queue is None:
+                return None
+            _queues[count] = queue
+        return _queues[count]
 
 
-def _work(queue: SimpleQueue[_Band]) -> None:
-    while True:
-        queue.get().run()
+def _started(count: int) -> _Queue | None:
+    """Start threads that wait at a new queue; if one cannot be started, end the others and return None."""
+    queue: _Queue = SimpleQueue()
+    started = 0
+    try:
+        for _ in range(count):
+            threading.Thread(target=_work, args=(queue,), daemon=True).start()
+            started += 1
+    except RuntimeError:  # a limit of the system, or the interpreter is about to end
+        return None
+    finally:
+        if started < count:
+            for _ in range(started):
+                queue.put(None)
+    return queue
+
+
+def _work(queue: _Queue) -> None:
+    while (band := queue.get()) is not None:
+        band.run()
+
+
+def _forget_threads() -> None:
+    """Start anew in a forked process: threads do not survive a fork, nor does the owner of the lock."""
+    global _lock
+    _lock = threading.Lock()
+    _queues.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_threads)

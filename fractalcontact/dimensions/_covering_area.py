@@ -99,10 +99,9 @@ def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> 
     Cells of every position are used. For a profile (one row): the length of the chords over that of their
     plan.
     """
-    from fractalcontact.base.jit import use_threads
+    from fractalcontact.base.threads import in_bands
     from fractalcontact.dimensions._kernels import prism_sums
 
-    use_threads()
     ratios = np.empty(len(edges))
     is_profile = heights.shape[0] == 1
     for k, (ey, ex) in enumerate(edges):
@@ -112,7 +111,8 @@ def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> 
             continue
         sums = np.zeros(heights.shape[0] - ey)
         counts = np.zeros(sums.size, dtype=np.int64)
-        prism_sums(heights, ey, ex, ey * spacing[0], ex * spacing[1], sums, counts)
+        cell = (ey, ex, ey * spacing[0], ex * spacing[1])
+        in_bands(prism_sums, sums.size, heights.size, heights, *cell, sums, counts)
         ratios[k] = np.cumsum(sums)[-1] / counts.sum() if counts.any() else np.nan
     return ratios
 

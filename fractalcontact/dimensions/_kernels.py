@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import gap_sum_kernel, parallel_kernel, prange
+from fractalcontact.base.jit import gap_sum_kernel, kernel
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -49,15 +49,16 @@ def increment_sums(start: int, stop: int, heights: Array, stride: int, edges: Ar
                 sums[j, block, column], sums[j, block, column + 3] = first, second
 
 
-@parallel_kernel
-def whiten(covariances: Array, columns: Array, log_determinants: Array) -> None:
-    """Factor each covariance (chunks, n, n) in place and solve for its columns (chunks, n, k) in place.
+@kernel
+def whiten(start: int, stop: int, covariances: Array, columns: Array, log_determinants: Array) -> None:
+    """Factor covariances (chunks, n, n) from start up to stop, and solve for their columns (chunks, n, k).
 
-    With covariance = U' U, columns become U'^-1 columns. Only the upper triangle is used. The updates run
-    along rows, so that they need no reordered sums. A chunk that is not positive definite gets NaN.
+    Both in place: with covariance = U' U, columns become U'^-1 columns. Only the upper triangle is used. The
+    updates run along rows, so that they need no reordered sums. A chunk that is not positive definite gets
+    NaN.
     """
-    chunks, n, k = columns.shape
-    for c in prange(chunks):
+    _, n, k = columns.shape
+    for c in range(start, stop):
         total = 0.0
         for p in range(n):
             pivot = covariances[c, p, p]
@@ -79,18 +80,25 @@ def whiten(covariances: Array, columns: Array, log_determinants: Array) -> None:
         log_determinants[c] = total
 
 
-@parallel_kernel
+@kernel
 def pair_sums(
-    heights: Array, rows: int, columns: Array, lags: Array, measure: int, sums: Array, counts: Array
+    start: int,
+    stop: int,
+    heights: Array,
+    columns: Array,
+    lags: Array,
+    measure: int,
+    sums: Array,
+    counts: Array,
 ) -> None:
-    """Sum increments from the first `rows` rows and the columns from columns[0] up to columns[1].
+    """Sum increments from the rows from start up to stop, and the columns from columns[0] up to columns[1].
 
     `lags` (k, 2) are steps in y (not negative) and x. `measure` 0 sums squares of first differences, 1
     their absolute values, 2 squares of second differences. `sums` and `counts` are (rows, k); an increment
     with a NaN in it is left out.
     """
     ny, nx = heights.shape
-    for j in prange(rows):
+    for j in range(start, stop):
         for k in range(lags.shape[0]):
             dy, dx = lags[k, 0], lags[k, 1]
             reach = 2 if measure == 2 else 1
@@ -112,8 +120,10 @@ def pair_sums(
             counts[j, k] = number
 
 
-@parallel_kernel
+@kernel
 def prism_sums(
+    start: int,
+    stop: int,
     heights: Array,
     step_y: int,
     step_x: int,
@@ -122,13 +132,13 @@ def prism_sums(
     sums: Array,
     counts: Array,
 ) -> None:
-    """Sum area over plan area of the four triangles on every cell of step_y x step_x points.
+    """Sum area over plan area of the four triangles on every cell of step_y x step_x points, by rows.
 
     The apex is the mean of the corners. `sums` and `counts` are (rows,), rows = ny - step_y; a cell with a
     NaN corner is left out.
     """
     nx = heights.shape[1]
-    for j in prange(sums.size):
+    for j in range(start, stop):
         low, high = heights[j], heights[j + step_y]
         total = 0.0
         number = 0
@@ -156,18 +166,27 @@ def prism_sums(
         counts[j] = number
 
 
-@parallel_kernel
+@kernel
 def roughness_sums(
-    heights: Array, size_y: int, size_x: int, rows: Array, columns: Array, sums: Array, counts: Array
+    start: int,
+    stop: int,
+    heights: Array,
+    size_y: int,
+    size_x: int,
+    rows: Array,
+    columns: Array,
+    sums: Array,
+    counts: Array,
 ) -> None:
     """Sum the rms deviation from its own plane over windows that start at `rows` and `columns`.
 
-    `sums` and `counts` are (rows.size,); a window with a NaN in it is left out.
+    From rows[start] up to rows[stop]. `sums` and `counts` are (rows.size,); a window with a NaN in it is left
+    out.
     """
     squares_x = size_y * size_x * (size_x * size_x - 1.0) / 12.0
     squares_y = size_x * size_y * (size_y * size_y - 1.0) / 12.0
     number = size_y * size_x
-    for r in prange(rows.size):
+    for r in range(start, stop):
         for c in range(columns.size):
             j0, i0 = rows[r], columns[c]
             mean = 0.0

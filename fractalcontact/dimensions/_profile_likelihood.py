@@ -127,7 +127,7 @@ class ProfileIncrements:
 
         The covariance is that of unit increments over one spacing, plus `noise` on the heights.
         """
-        from fractalcontact.base.jit import use_threads
+        from fractalcontact.base.threads import in_bands
         from fractalcontact.dimensions._kernels import whiten
 
         columns = np.stack([self.jumps, self.gaps], axis=-1)
@@ -138,8 +138,8 @@ class ProfileIncrements:
             positions = positions[:1]
         covariances = _covariance(positions, hurst, noise)
         log_determinants = np.empty(len(positions))
-        use_threads()
-        whiten(covariances, columns, log_determinants)
+        work = covariances.size * columns.shape[1]
+        in_bands(whiten, len(positions), work, covariances, columns, log_determinants)
         if self.is_regular:
             jumps, gaps = columns[0, :, :-1].T, np.broadcast_to(columns[0, :, -1], self.jumps.shape)
             log_determinants = np.repeat(log_determinants, len(self.jumps))

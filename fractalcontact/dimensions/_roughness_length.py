@@ -87,17 +87,18 @@ def _mean_roughness(heights: Array, edges: Array) -> tuple[Array, Array]:
 
     Windows overlap by half; their edge in points is that of `edges`, at least one point along y.
     """
-    from fractalcontact.base.jit import use_threads
+    from fractalcontact.base.threads import in_bands
     from fractalcontact.dimensions._kernels import roughness_sums
 
-    use_threads()
     means, numbers = np.full(len(edges), np.nan), np.zeros(len(edges), dtype=np.int64)
     for k, (ey, ex) in enumerate(edges):
         size_y, size_x = max(int(ey), 1), int(ex)
         rows = np.arange(0, heights.shape[0] - size_y + 1, max(size_y // 2, 1))
         columns = np.arange(0, heights.shape[1] - size_x + 1, max(size_x // 2, 1))
         sums, counts = np.zeros(rows.size), np.zeros(rows.size, dtype=np.int64)
-        roughness_sums(heights, size_y, size_x, rows, columns, sums, counts)
+        work = rows.size * columns.size * size_y * size_x
+        windows = (size_y, size_x, rows, columns)
+        in_bands(roughness_sums, rows.size, work, heights, *windows, sums, counts)
         numbers[k] = counts.sum()
         if numbers[k]:
             means[k] = np.cumsum(sums)[-1] / numbers[k]

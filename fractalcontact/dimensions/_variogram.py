@@ -277,15 +277,15 @@ def mean_increments(
     measure : int
         `SQUARE`, `ABSOLUTE` or `SECOND`.
     """
-    from fractalcontact.base.jit import use_threads
+    from fractalcontact.base.threads import in_bands
     from fractalcontact.dimensions._kernels import pair_sums
 
-    use_threads()
     row_sums, counts = [], np.zeros(len(vectors), dtype=np.int64)
     for heights, rows in slabs:
         sums = np.zeros((rows, len(vectors)))
         number = np.zeros((rows, len(vectors)), dtype=np.int64)
-        pair_sums(heights, rows, np.array(columns), vectors, measure, sums, number)
+        work = rows * heights.shape[1] * len(vectors)
+        in_bands(pair_sums, rows, work, heights, np.array(columns), vectors, measure, sums, number)
         row_sums.append(sums)
         counts += number.sum(axis=0)
     # added row after row, so that neither slabs nor threads change a bit

@@ -1,6 +1,8 @@
 """Number of threads: environment variables, limits, and the bands of a loop."""
 
+import contextvars
 import os
+import threading
 
 import numpy as np
 import pytest
@@ -69,3 +71,42 @@ def test_error_of_a_band_is_raised_after_all_bands_ended():
     with threads.limit(2), pytest.raises(ZeroDivisionError, match="2 to 4"):
         threads.in_bands(work, 4, 4 * threads.SHARE)
     assert ended == [2]
+
+
+@pytest.mark.parametrize("available", [0, 3])
+def test_bands_run_where_threads_cannot_be_started(monkeypatch, available):
+    """On a system that starts only so many threads; afterwards the same call uses threads again."""
+    numbers, starts, start = [], [], threading.Thread.start
+    before = threading.active_count()
+
+    def limited(thread):
+        starts.append(thread)
+        if len(starts) > available:
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    def work(first, last):
+        numbers.extend(range(first, last))
+
+    count = 6 + available  # a number of threads that no other test has
+    with monkeypatch.context() as patch, threads.limit(count):
+        patch.setattr(threading.Thread, "start", limited)
+        threads.in_bands(work, 40, 40 * threads.SHARE)
+        assert sorted(numbers) == list(range(40))
+        for thread in starts[:available]:
+            thread.join(timeout=10)
+        assert threading.active_count() == before
+    numbers.clear()
+    with threads.limit(count):
+        _call_within(20, threads.in_bands, work, 40, 40 * threads.SHARE)
+    assert sorted(numbers) == list(range(40))
+    assert threading.active_count() > before
+
+
+def _call_within(seconds, function, *arguments):
+    """Call a function in this context; fail if it does not return."""
+    context = contextvars.copy_context()
+    thread = threading.Thread(target=context.run, args=(function, *arguments), daemon=True)
+    thread.start()
+    thread.join(seconds)
+    assert not thread.is_alive(), f"no return within {seconds} s"
