@@ -104,6 +104,12 @@ def _parser() -> argparse.ArgumentParser:
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
     methods.set_defaults(action=_methods)
 
+    report = commands.add_parser("report", help="write the report of a result file: one HTML file")
+    report.add_argument("file", help="a result file of `fractalcontact run`")
+    report.add_argument("-o", "--out", help="the file to write (default: report.html beside the result)")
+    report.add_argument("--csv", metavar="FOLDER", help="also write every curve there as a CSV file")
+    report.set_defaults(action=_report)
+
     info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
     info.add_argument("file", help="a NetCDF file that this package wrote")
     info.set_defaults(action=_info)
@@ -127,7 +133,8 @@ def _run(options: argparse.Namespace) -> int:
         figures = len(list(Path(options.out).glob("*.png")))
         size = (Path(options.out) / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""
-        print(f"\nwritten to {options.out}: {RESULT} ({size / 1e6:.2g} MB){drawn}{_memory()}")
+        files = f"{RESULT} ({size / 1e6:.2g} MB), report.html"
+        print(f"\nwritten to {options.out}: {files}{drawn}{_memory()}")
     return 0
 
 
@@ -213,6 +220,18 @@ def _estimators(options: argparse.Namespace) -> int:
 
         estimator_errors(result).savefig(file.with_suffix(".png"), dpi=150)
         print(f"\nwritten to {options.out}: estimators.nc, estimators.png")
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from fractalcontact import open as open_result
+    from fractalcontact import scenes
+
+    tree = open_result(options.file)
+    path = scenes.report(tree, options.out or Path(options.file).with_name("report.html"))
+    print(f"written: {path}")
+    if options.csv is not None:
+        print(f"written to {options.csv}: {len(scenes.tables(tree, options.csv))} CSV files")
     return 0
 
 

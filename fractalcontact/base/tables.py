@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from tabulate import tabulate
 
@@ -16,9 +18,22 @@ GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
 QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])|(?<=±) ")
 
 
+_fixed: ContextVar[int | None] = ContextVar("width of a page, in characters", default=None)
+
+
 def screen_width() -> int:
-    """Return the width of the terminal, which the environment variable COLUMNS overrides."""
-    return shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
+    """Return the width of the terminal, which the environment variable COLUMNS overrides, or of a page."""
+    return _fixed.get() or shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
+
+
+@contextmanager
+def fixed_width(columns: int) -> Iterator[None]:
+    """Within this context write for a page of so many characters instead of the terminal."""
+    token = _fixed.set(columns)
+    try:
+        yield
+    finally:
+        _fixed.reset(token)
 
 
 def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:

@@ -1,4 +1,5 @@
 from ._contents import contents as contents
+from ._html_report import report as report
 from ._paper import paper_criteria as paper_criteria
 from ._paper import paper_table as paper_table
 from ._plan import plan as plan
@@ -7,6 +8,7 @@ from ._reproduce import reproduce as reproduce
 from ._run import run as run
 from ._scene import Scene as Scene
 from ._scene_file import load as load
+from ._tables import tables as tables
 from ._validation import validate as validate
 
 __all__ = [
@@ -16,8 +18,10 @@ __all__ = [
     "paper_criteria",
     "paper_table",
     "plan",
+    "report",
     "reproduce",
     "run",
     "summary",
+    "tables",
     "validate",
 ]

@@ -20,6 +20,7 @@ from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
+from fractalcontact.scenes._html_report import REPORT, report
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
@@ -43,8 +44,8 @@ def run(
     ----------
     scene : Scene or path-like
     out : path-like, optional
-        Folder for `result.nc` and the figures; nothing is written without it. Finished parts are kept in
-        `out/.stages` until the study is complete: a run that was stopped resumes there.
+        Folder for `result.nc`, `report.html` and the figures; nothing is written without it. Finished parts
+        are kept in `out/.stages` until the study is complete: a run that was stopped resumes there.
     progress : bool, default True
         Show a bar for stages of several parts.
     workers : int, default 0
@@ -110,10 +111,12 @@ def _run(
             raise signals.Stopped(
                 stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
             )
+        figures = []
         if scene.want.figures:
-            _draw(tree, folder, progress, paper=scene.paper)
+            figures = _draw(tree, folder, progress, paper=scene.paper)
             _note_run_time(tree, start)
         netcdf.save(tree, folder / RESULT)
+        report(tree, folder / REPORT, figures=figures)
         (folder / PARTIAL_RESULT).unlink(missing_ok=True)
         store.clear()
     return tree
@@ -201,12 +204,13 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
     return facts if facts or words is None else {"error": words}
 
 
-def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> None:
-    """Draw the figures and note the time they took."""
+def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> list[Path]:
+    """Draw the figures, note the time they took, and return their files."""
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    plotting.draw(tree, folder, progress=progress, paper=paper)
+    files = plotting.draw(tree, folder, progress=progress, paper=paper)
     entry = json.loads(tree.attrs["provenance"])
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)
+    return files

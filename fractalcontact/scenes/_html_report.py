@@ -1,0 +1,451 @@
+"""The report of a study: one HTML file with summary, surface, maps, figures, tables and provenance."""
+
+from __future__ import annotations
+
+import base64
+import html
+import importlib.resources
+import io
+import json
+import math
+import os
+import string
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.netcdf import open as open_result
+from fractalcontact.base.netcdf import unfinished
+from fractalcontact.base.schema import CORE_DIMS
+from fractalcontact.base.tables import fixed_width
+from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._report import compares_with_paper, first_member, member_count, summary
+from fractalcontact.scenes._tables import tables
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+REPORT = "report.html"
+SUMMARY_WIDTH = 110  # characters
+SURFACE_CELLS = 128  # along the longer side of the surface that can be turned
+MAP_CELLS = 400  # along the longer side of a map
+MAPS = 120  # pictures of one set of maps
+ROWS = 100  # of a table on the page; the CSV file has all
+RELIEF = 0.25  # height range of the drawn surface over its longer side
+NO_HEIGHT = 65535  # of the 16-bit levels: a point without height
+SAME_LOAD = 1e-3  # relative difference of loads that count as one
+QUALITY = 85  # of the figures, as WebP
+# dark blue, grey, yellow: equally spaced in lightness, told apart by colour-blind readers
+HEIGHT_COLOURS = ((0, 34, 78), (124, 123, 120), (254, 232, 56))
+FLAG_COLOURS = {
+    "open": "#f1f1ee",
+    "contact": "#0b5394",
+    "yielded": "#d55e00",
+    "stick": "#0b5394",
+    "slip": "#e69f00",
+}
+OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
+LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
+HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
+
+
+def report(
+    result: xr.DataTree | str | os.PathLike[str],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    figures: Sequence[str | os.PathLike[str]] | None = None,
+) -> Path:
+    """Write the report of a study: one HTML file that opens in any browser and needs no network.
+
+    It holds the summary, the surface, which can be turned, the contact maps with sliders for load and shear,
+    the figures, every curve as a table with a CSV file to download, the scene and the provenance.
+    `fractalcontact.scenes.run` writes it for every study.
+
+    Parameters
+    ----------
+    result : DataTree or path-like
+        From `fractalcontact.scenes.run`, or a file that it wrote.
+    path : path-like, optional
+        The file to write. Without it, `report.html` beside the file `result`.
+    figures : sequence of path-like, optional
+        PNG files to embed. Without it the figures are drawn.
+
+    Returns
+    -------
+    Path
+        The file that was written.
+
+    Raises
+    ------
+    InvalidInput
+        `result` is no study, or `path` is missing and `result` no file.
+    UnreadableFile
+        There is no such file, or it is not complete.
+
+    Notes
+    -----
+    The surface is shown by block means of at most 128 points along its longer side, a map by at most 400
+    cells (a block has the highest flag among its cells). At most 120 maps are shown, evenly spread over loads
+    and shears. Of an ensemble, surface and maps are those of member 0.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fractalcontact as fc
+    >>> result = fc.scenes.run("rigid_sliding", progress=False)
+    >>> path = fc.scenes.report(result, tempfile.mkdtemp() + "/report.html")
+    >>> path.name, path.stat().st_size < 2e6
+    ('report.html', True)
+    """
+    is_tree = isinstance(result, xr.DataTree)
+    with Problems("fractalcontact.scenes.report") as problems:
+        expected = "a DataTree or a file"
+        problems.require(is_tree or isinstance(result, (str, os.PathLike)), "result", expected, result)
+        problems.require(path is not None or not is_tree, "path", "the file to write", path)
+    tree = result if isinstance(result, xr.DataTree) else _study(result)
+    target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
+    pictures = _drawn(tree) if figures is None else [_picture_file(Path(file)) for file in figures]
+    return _write(_page(tree, pictures), target)
+
+
+def _study(path: str | os.PathLike[str]) -> xr.DataTree:
+    tree = open_result(path)
+    with Problems("fractalcontact.scenes.report") as problems:
+        found = type(tree).__name__
+        problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", f"a {found}")
+    return tree  # type: ignore[no-any-return]
+
+
+def _write(text: str, target: Path) -> Path:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = unfinished(target)
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target
+
+
+def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]]) -> str:
+    """Return the text of the page."""
+    single = first_member(tree)
+    surface, maps = _surface(single), list(_maps(single))
+    of_member = " Member 0 of the ensemble." if member_count(tree) else ""
+    sections = {
+        "Summary": _summary(tree),
+        "Surface": _surface_section(surface, of_member) if surface else "",
+        "Maps": "".join(_map_section(each, number, of_member) for number, each in enumerate(maps)),
+        "Figures": "".join(_figure(name, content) for name, content in figures),
+        "Tables": _table_section(tree),
+        "Scene and provenance": _provenance_section(tree),
+    }
+    shown = {name: text for name, text in sections.items() if text}
+    template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
+    return string.Template(template.read_text(encoding="utf-8")).substitute(
+        title=html.escape(_title(tree)),
+        subtitle=html.escape(_subtitle(tree)),
+        generator=html.escape(str(tree.attrs.get("source", "fractalcontact"))),
+        contents="".join(f'<li><a href="#{_anchor(name)}">{name}</a></li>' for name in shown),
+        sections="\n".join(
+            f'<section id="{_anchor(name)}"><h2>{name}</h2>\n{text}\n</section>'
+            for name, text in shown.items()
+        ),
+        surface=_json(surface),
+        maps=_json([each.data for each in maps]),
+    )
+
+
+def _anchor(name: str) -> str:
+    return name.lower().replace(" ", "-")
+
+
+def _json(data: Any) -> str:
+    """Return JSON that can stand inside a script element."""
+    return json.dumps(data).replace("<", "\\u003c")
+
+
+def _title(tree: xr.DataTree) -> str:
+    return str(tree.attrs.get("title", tree.name or "Result"))
+
+
+def _subtitle(tree: xr.DataTree) -> str:
+    written = str(tree.attrs.get("history", "")).split(" ")[0]
+    parts = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
+    return " · ".join(str(part) for part in parts if part)
+
+
+def _summary(tree: xr.DataTree) -> str:
+    with fixed_width(SUMMARY_WIDTH):
+        text = summary(tree)
+    return f"<pre>{html.escape(text.removeprefix(_title(tree)).lstrip())}</pre>"
+
+
+def _surface(tree: xr.DataTree) -> dict[str, Any] | None:
+    """Return what the page draws of the surface: 16-bit levels, lengths in metres, and words."""
+    height = _heights(tree)
+    if height is None:
+        return None
+    block = math.ceil(max(height.shape) / SURFACE_CELLS)
+    coarse = height.coarsen(y=block, x=block, boundary="trim").mean() if block > 1 else height
+    values = np.asarray(coarse.values, dtype=float)
+    known = np.isfinite(values)
+    if min(values.shape) < 2 or not known.any():
+        return None
+    lowest, highest = float(values[known].min()), float(values[known].max())
+    steps = [float(coarse[dim][1] - coarse[dim][0]) for dim in CORE_DIMS]
+    extent = [step * size for step, size in zip(steps, coarse.shape, strict=True)]
+    scaled = np.where(known, (values - lowest) / ((highest - lowest) or 1.0), 0.0)
+    levels = np.where(known, np.rint(scaled * (NO_HEIGHT - 1)), NO_HEIGHT).astype("<u2")
+    return {
+        "heights": base64.b64encode(levels.tobytes()).decode(),
+        "shape": list(coarse.shape),
+        "extent": extent,
+        "lowest": lowest,
+        "highest": highest,
+        "exaggeration": RELIEF * max(extent) / (highest - lowest) if highest > lowest else 1.0,
+        "colours": HEIGHT_COLOURS,
+        "labels": [f"{dim}, {quantity_text(length, 'm')}" for dim, length in zip("yx", extent, strict=True)],
+        "block": block,
+    }
+
+
+def _heights(tree: xr.DataTree) -> xr.DataArray | None:
+    """Return the first surface that the study stores, None if it stores none."""
+    for node in tree.subtree:
+        if "height" in node.data_vars and node["height"].dims == CORE_DIMS:
+            return node["height"]
+    return None
+
+
+def _surface_section(surface: dict[str, Any], of_member: str) -> str:
+    block = surface["block"]
+    means = f" Means of blocks of {block} × {block} points are drawn." if block > 1 else ""
+    low, high = (quantity_text(surface[end], "m") for end in ("lowest", "highest"))
+    ramp = ", ".join(f"rgb{colour}" for colour in HEIGHT_COLOURS)
+    return f"""<figure>
+<canvas id="surface-view" width="1000" height="620" tabindex="0" role="img"
+ aria-label="The surface in perspective; heights from {low} to {high}"></canvas>
+<figcaption>Drag to turn, or use the arrow keys. Heights are enlarged
+<output id="exaggeration-value"></output>.{means}{of_member}
+<span class="key" style="display:inline-block">{low}
+<i style="width:8em;background:linear-gradient(to right, {ramp})"></i> {high}</span></figcaption>
+<label class="controls">Enlargement of heights
+<input type="range" id="exaggeration" min="-4" max="4" step="0.25" value="0"></label>
+</figure>"""
+
+
+@dataclass(frozen=True)
+class Maps:
+    """A set of maps: its title, its key of colours by meaning, and what the page needs to show them."""
+
+    title: str
+    key: dict[str, str]
+    block: int
+    data: dict[str, Any]
+
+
+def _maps(tree: xr.DataTree) -> Iterator[Maps]:
+    """Yield every set of maps of flags that the study stores."""
+    for node in tree.subtree:
+        for name, variable in node.data_vars.items():
+            if variable.dims[-2:] == CORE_DIMS and "flag_meanings" in variable.attrs and variable.size:
+                yield _map_set(node.path.strip("/"), node.to_dataset(), str(name))
+
+
+def _map_set(path: str, dataset: xr.Dataset, name: str) -> Maps:
+    state = dataset[name]
+    dims = [str(dim) for dim in state.dims[:-2]]
+    limit = MAPS if len(dims) < 2 else math.isqrt(MAPS)
+    dataset = dataset.isel({dim: _spread(state.sizes[dim], limit) for dim in dims})
+    state = dataset[name]
+    key = _key(state)
+    block = math.ceil(max(state.shape[-2:]) / MAP_CELLS)
+    palette = list(key.values())
+    pictures, alternatives = [], []
+    for place in np.ndindex(*state.shape[:-2]):
+        here = dataset.isel(dict(zip(dims, place, strict=True)))
+        flags = np.searchsorted(np.asarray(state.attrs["flag_values"]), here[name].values)
+        pictures.append(_picture(flags, palette, block))
+        alternatives.append(_caption(here, flags, list(key)))
+    axes = [
+        {"name": dim, "labels": [_label(dataset, dim, i) for i in range(state.sizes[dim])]} for dim in dims
+    ]
+    long_name = str(state.attrs.get("long_name", name))
+    data = {"axes": axes, "pictures": pictures, "alternatives": alternatives}
+    return Maps(f"{long_name}: {path.replace('/', ', ').replace('_', ' ')}", key, block, data)
+
+
+def _spread(size: int, limit: int) -> Array:
+    """Return at most `limit` places, evenly spread from the first to the last."""
+    return np.unique(np.linspace(0, size - 1, min(size, limit)).round().astype(int))
+
+
+def _key(state: xr.DataArray) -> dict[str, str]:
+    """Return the colour of every flag by its meaning."""
+    spare = iter(OTHER_COLOURS * 4)
+    meanings = str(state.attrs["flag_meanings"]).split()
+    return {meaning: FLAG_COLOURS.get(meaning) or next(spare) for meaning in meanings}
+
+
+def _picture(flags: Array, palette: Sequence[str], block: int) -> str:
+    """Return a map as PNG in base64, y upwards; a block has the highest flag among its cells."""
+    from PIL import Image
+
+    if block > 1:
+        from skimage.measure import block_reduce
+
+        flags = block_reduce(flags, (block, block), np.max)
+    picture = Image.fromarray(np.ascontiguousarray(flags[::-1]).astype(np.uint8), mode="P")
+    picture.putpalette([int(colour[i : i + 2], 16) for colour in palette for i in (1, 3, 5)])
+    content = io.BytesIO()
+    picture.save(content, "PNG", optimize=True, bits=2 if len(palette) <= 4 else 4)
+    return base64.b64encode(content.getvalue()).decode()
+
+
+def _caption(here: xr.Dataset, flags: Array, meanings: Sequence[str]) -> str:
+    """Return the load, the shear and the shares of the flags of one map."""
+    places = [
+        f"{symbol} = {_value(here[name])}"
+        for name, symbol in LOADS.items()
+        if name in here and not here[name].ndim
+    ]
+    if "shear" in here.coords:
+        places.append(f"shear {_value(here['shear'])}")
+    shares = np.bincount(flags.ravel(), minlength=len(meanings)) / flags.size
+    parts = [
+        f"{meaning} {100 * share:.3g} %" for meaning, share in zip(meanings, shares, strict=True) if share
+    ]
+    return ", ".join(places) + (": " if places else "") + ", ".join(parts)
+
+
+def _label(dataset: xr.Dataset, dim: str, place: int) -> str:
+    """Return where on one of its axes a map lies: the load of a step, or the value of the coordinate."""
+    if dim == "step":
+        for name, symbol in LOADS.items():
+            if name in dataset.variables and "step" in dataset[name].dims:
+                values = dataset[name].isel(step=place)
+                if float(values.max() - values.min()) <= SAME_LOAD * abs(float(values.max())):
+                    return f"{symbol} = {_value(values.max(keep_attrs=True))}"
+        return str(place)
+    return _value(dataset[dim][place]) if dim in dataset.coords else str(place)
+
+
+def _value(scalar: xr.DataArray) -> str:
+    if scalar.dtype.kind not in "fiu":
+        return str(scalar.values)
+    return quantity_text(float(scalar), str(scalar.attrs.get("units", "")), 4)
+
+
+def _map_section(maps: Maps, number: int, of_member: str) -> str:
+    sliders = "".join(
+        f'<label class="controls">{html.escape(axis["name"])}: <output id="axis-value-{number}-{i}"></output>'
+        f'<input type="range" id="axis-{number}-{i}" max="{last}" value="{last}"></label>'
+        for i, axis in enumerate(maps.data["axes"])
+        for last in [len(axis["labels"]) - 1]
+    )
+    key = "".join(
+        f'<span><i style="background:{colour}"></i>{name}</span>' for name, colour in maps.key.items()
+    )
+    blocks = (
+        f" A pixel stands for {maps.block} × {maps.block} cells: the highest flag among them."
+        if maps.block > 1
+        else ""
+    )
+    return f"""<h3>{html.escape(maps.title)}</h3>
+<figure class="two"><div><img class="map" id="map-{number}" alt="">
+<figcaption id="map-caption-{number}"></figcaption></div>
+<div>{sliders}<p class="key">{key}</p>
+<p class="soft">x to the right, y upwards.{blocks}{of_member}</p></div></figure>"""
+
+
+def _drawn(tree: xr.DataTree) -> list[tuple[str, bytes]]:
+    """Return name and picture of every figure of a study."""
+    from fractalcontact import plotting
+
+    with tempfile.TemporaryDirectory() as folder:
+        files = plotting.draw(tree, folder, paper=compares_with_paper(tree))
+        return [_picture_file(file) for file in files]
+
+
+def _picture_file(path: Path) -> tuple[str, bytes]:
+    """Return the name of a picture and its content as WebP, which is smaller than PNG."""
+    from PIL import Image
+
+    content = io.BytesIO()
+    with Image.open(path) as picture:
+        picture.convert("RGB").save(content, "WEBP", quality=QUALITY, method=2)
+    return path.stem, content.getvalue()
+
+
+def _figure(name: str, content: bytes) -> str:
+    title = name.replace("_", " ").capitalize()
+    source = base64.b64encode(content).decode()
+    return (
+        f'<figure><img src="data:image/webp;base64,{source}" alt="{title}" loading="lazy">'
+        f"<figcaption>{title}</figcaption></figure>\n"
+    )
+
+
+def _table_section(tree: xr.DataTree) -> str:
+    intro = '<p class="soft">Every table is also a CSV file in SI units, with all rows and columns.</p>\n'
+    parts = [
+        _table(name, frame)
+        for name, frame in tables(tree).items()
+        if not set(frame.columns) <= {"run_time (s)"}
+    ]
+    return intro + "\n".join(parts) if parts else ""
+
+
+def _table(name: str, frame: Any) -> str:
+    """Return one table, closed, with a link to all of it as CSV."""
+    csv = base64.b64encode(frame.to_csv(index=False, float_format="%.9g").encode()).decode()
+    link = f'<a download="{name}.csv" href="data:text/csv;base64,{csv}">{name}.csv</a>'
+    shown = frame[[column for column in frame.columns if column.split(" (")[0] not in HIDDEN]].head(ROWS)
+    heads, columns = zip(*(_column(head, shown[head]) for head in shown.columns), strict=True)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+        for row in zip(*columns, strict=True)
+    )
+    more = f", the first {ROWS} of {len(frame)} rows" if len(frame) > ROWS else ""
+    title = name.replace("_", " ")
+    head = "".join(f"<th>{html.escape(text)}</th>" for text in heads)
+    return (
+        f"<details><summary>{title}{more}</summary><p>{link}</p>"
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+        "</details>"
+    )
+
+
+def _column(head: str, values: Any) -> tuple[str, list[str]]:
+    """Return head and cells of a column, numbers in the unit with the prefix that suits them."""
+    name, _, units = head.partition(" (")
+    name, units = name.replace("_", " "), units.rstrip(")")
+    if values.dtype.kind != "f":
+        return (f"{name} ({raise_exponents(units)})" if units else name), [str(value) for value in values]
+    scale = scale_for(units, values.to_numpy())
+    cells = ["-" if not np.isfinite(value) else f"{value:.4g}" for value in scale(values.to_numpy())]
+    return scale.label(name), cells
+
+
+def _provenance_section(tree: xr.DataTree) -> str:
+    try:
+        entry = json.loads(tree.attrs.get("provenance", "{}"))
+    except (TypeError, ValueError):
+        entry = {}
+    scene = entry.get("parameters", {}).get("scene") if isinstance(entry, dict) else None
+    parts = [f"<h3>Scene</h3>{_as_json(scene)}"] if scene else []
+    parts.append(f"<details><summary>Provenance</summary>{_as_json(entry)}</details>")
+    references = tree.attrs.get("references")
+    if references:
+        parts.append(f"<h3>References</h3><p>{html.escape(str(references))}</p>")
+    return "".join(parts)
+
+
+def _as_json(entry: Any) -> str:
+    return f'<pre class="wrap">{html.escape(json.dumps(entry, indent=1))}</pre>'
