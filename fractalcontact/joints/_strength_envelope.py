@@ -14,6 +14,7 @@ from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import LARGEST_JRC, SAMPLE_LENGTH, roughness_coefficient
+from fractalcontact.joints._strength_criteria import scaled_constants
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -23,6 +24,8 @@ LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
 FITTED_STRESS = (0.01, 0.3)  # normal stress over wall strength of the tests of Barton and Choubey
 SHEARED_POWER, DILATION_POWER = 1.5, 4.0  # K1 and K2 of Ladanyi and Archambault
 STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray)
+RIGHT_ANGLE = 90.0  # degree
+NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
 OUTSIDE = "outside the range of the criterion where in_range is False"
 
 
@@ -37,6 +40,9 @@ class Joint(NamedTuple):
     residual_angle: float
     cohesion: float
     length: float
+    area_fraction: float
+    shape: float
+    theta_max: float
 
 
 class Criterion(NamedTuple):
@@ -71,7 +77,7 @@ def _check(
     problems.number("cohesion", cohesion, at_least=0, at_most=LARGEST, optional=True)
     problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST, optional=True)
     if criterion is not None and problems.choices("criterion", criterion, CRITERIA):
-        given = {"cohesion": cohesion, "length": length}
+        given = {"cohesion": cohesion, "length": length, "residual_friction_angle": residual_friction_angle}
         problems.require(len(word_tuple(criterion)) > 0, "criterion", "at least one", "an empty sequence")
         for name in word_tuple(criterion):
             needs = CRITERIA[name].needs
@@ -88,7 +94,8 @@ def _check(
     references=(
         "Patton (1966), 1st ISRM Congress 1:509; Ladanyi and Archambault (1970), 11th US Symposium on Rock "
         "Mechanics; Barton and Choubey (1977), Rock Mechanics 10:1; Barton and Bandis (1982), 23rd US "
-        "Symposium on Rock Mechanics"
+        "Symposium on Rock Mechanics; Grasselli and Egger (2003), Int. J. Rock Mech. Min. Sci. 40:25; Xia, "
+        "Tang, Xiao and Song (2014), Rock Mech. Rock Eng. 47:1423"
     ),
     achieved_error="that of the criteria, which are empirical",
     check=_check,
@@ -123,16 +130,16 @@ def strength_envelope(
     basic_friction_angle : float
         Degree.
     criterion : str or sequence of str, optional
-        Of "patton", "ladanyi_archambault", "barton_choubey" and "barton_bandis". Default: all whose arguments
-        are given.
+        Of "patton", "ladanyi_archambault", "barton_choubey", "barton_bandis", "grasselli_egger" and "xia".
+        Default: all whose arguments are given.
     direction : str or float
         Direction in which the block slides: compass word, or azimuth in degrees.
     residual_friction_angle : float, optional
-        Degree, of weathered or sheared walls. Default: the basic friction angle.
+        Degree, of weathered or sheared walls. Default: the basic friction angle; "grasselli_egger" needs it.
     asperity_angle : float, optional
         i, degree. Default: the mean dip that faces the shear, at the spacing of the surface.
     tensile_strength : float, optional
-        Of the material, Pa, for "ladanyi_archambault". Default: a tenth of the wall strength.
+        Of the material, Pa. Default: a tenth of the wall strength.
     cohesion : float, optional
         Of sheared asperities, Pa; "patton" needs it.
     length : float, optional
@@ -156,7 +163,8 @@ def strength_envelope(
     Patton: the lesser of sigma tan(phi_b + i) and c + sigma tan(phi_r). Ladanyi and Archambault: asperities
     shear off over the share 1 - (1 - sigma/JCS)^1.5 of the area, the rest dilates at the rate
     (1 - sigma/JCS)^4 tan i. Barton and Choubey: sigma tan(phi_r + JRC log10(JCS/sigma)), not above 70
-    degrees. Barton and Bandis: the same with JRC and JCS of the length.
+    degrees. Barton and Bandis: the same with JRC and JCS of the length. Grasselli and Egger, Xia: from
+    `directional_roughness`, with the equations on page `theory_joints`.
 
     Examples
     --------
@@ -166,20 +174,24 @@ def strength_envelope(
     ...     surface, nominal_pressure=[0.5e6, 2e6], wall_strength=60e6, basic_friction_angle=30, cohesion=1e6
     ... )
     >>> result.criterion.values.tolist()
-    ['patton', 'ladanyi_archambault', 'barton_choubey']
+    ['patton', 'ladanyi_archambault', 'barton_choubey', 'xia']
     >>> bool((result.friction_angle.diff("nominal_pressure") <= 1e-9).all())  # the angle falls with stress
     True
     """
     pressure = float_array(nominal_pressure)
-    given = {None: True, "cohesion": cohesion is not None, "length": length is not None}
+    given = {
+        None: True,
+        "cohesion": cohesion is not None,
+        "length": length is not None,
+        "residual_friction_angle": residual_friction_angle is not None,
+    }
     usable = tuple(name for name, rule in CRITERIA.items() if given[rule.needs])
     chosen = usable if criterion is None else word_tuple(criterion)
     roughness = roughness_coefficient(surface, direction=direction).roughness_coefficient
+    facets = directional_roughness(surface, azimuth=read_direction(direction).azimuth).isel(azimuth=0)
     joint = Joint(
         roughness=roughness.item(),
-        asperity_angle=_asperity_angle(surface, direction)
-        if asperity_angle is None
-        else float(asperity_angle),
+        asperity_angle=float(facets.mean_dip if asperity_angle is None else asperity_angle),
         wall_strength=float(wall_strength),
         tensile_strength=float(
             wall_strength / STRENGTH_RATIO if tensile_strength is None else tensile_strength
@@ -190,6 +202,9 @@ def strength_envelope(
         ),
         cohesion=0.0 if cohesion is None else float(cohesion),
         length=SAMPLE_LENGTH if length is None else float(length),
+        area_fraction=facets.area_fraction.item(),
+        shape=facets["shape"].item(),
+        theta_max=facets.theta_max.item(),
     )
     with Problems(WHERE) as problems:
         total = joint.asperity_angle + joint.basic_angle
@@ -216,6 +231,9 @@ def strength_envelope(
     )
     result["shear_strength"].attrs["long_name"] = "peak shear strength"
     result["friction_angle"].attrs["long_name"] = "angle whose tangent is the strength over the normal stress"
+    if np.isnan(strengths).any():
+        for name in ("shear_strength", "friction_angle"):
+            result[name].attrs["reason"] = NO_STRENGTH
     if not np.all(ranges):
         result["shear_strength"].attrs["comment"] = OUTSIDE
     if "comment" in roughness.attrs:
@@ -223,11 +241,6 @@ def strength_envelope(
     if not np.isfinite(joint.roughness):
         result["roughness_coefficient"].attrs["reason"] = "NaN: the profiles are straight lines; taken as 0"
     return result
-
-
-def _asperity_angle(surface: xr.DataArray, direction: str | float) -> float:
-    """Return the mean apparent dip of the facets that face the shear, degree."""
-    return float(directional_roughness(surface, azimuth=read_direction(direction).azimuth).mean_dip.item())
 
 
 def _patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
@@ -262,9 +275,8 @@ def _barton_choubey(pressure: Array, joint: Joint) -> tuple[Array, Array]:
 
 def _barton_bandis(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return the strength of Barton and Choubey with JRC and JCS of the length of the joint."""
-    jrc, ratio = _scale_roughness(joint), joint.length / SAMPLE_LENGTH
-    wall_strength = joint.wall_strength * ratio ** (-0.03 * jrc)
-    return _barton(pressure, jrc * ratio ** (-0.02 * jrc), wall_strength, joint)
+    constants = scaled_constants(_scale_roughness(joint), joint.wall_strength, joint.length)
+    return _barton(pressure, constants.roughness, constants.wall_strength, joint)
 
 
 def _scale_roughness(joint: Joint) -> float:
@@ -282,6 +294,33 @@ def _barton(pressure: Array, roughness: float, wall_strength: float, joint: Join
     return pressure * np.tan(np.radians(np.minimum(angle, limit))), inside
 
 
+def _grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return sigma tan(phi_r') [1 + exp(-theta_max A0 sigma/(9 C sigma_t))], with a fitted angle phi_r'."""
+    decay = joint.theta_max * joint.area_fraction / (9.0 * joint.shape) if joint.shape > 0 else math.inf
+    with np.errstate(under="ignore"):
+        share = np.exp(-decay * pressure / joint.tensile_strength)
+    strength = pressure * math.tan(math.radians(joint.residual_angle)) * (1.0 + share)
+    return strength, _by_facets(pressure, joint)
+
+
+def _xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return sigma tan(phi_b + 4 A0 t [1 + exp(-t sigma/(9 A0 sigma_t))]), t = theta_max/(C + 1), degree."""
+    if joint.area_fraction == 0:
+        return pressure * math.tan(math.radians(joint.basic_angle)), _by_facets(pressure, joint)
+    metric = joint.theta_max / (joint.shape + 1.0)
+    with np.errstate(under="ignore"):
+        share = np.exp(-metric / (9.0 * joint.area_fraction) * pressure / joint.tensile_strength)
+    angle = joint.basic_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
+    possible = angle < RIGHT_ANGLE
+    strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
+    return strength, _by_facets(pressure, joint) & possible
+
+
+def _by_facets(pressure: Array, joint: Joint) -> Array:
+    """Return where a criterion of the facets may be used: rough, and sigma up to the tensile strength."""
+    return (pressure <= joint.tensile_strength) & (joint.area_fraction > 0)
+
+
 CRITERIA = {
     "patton": Criterion(_patton, "cohesion", "asperities of one angle, overridden or sheared off as a whole"),
     "ladanyi_archambault": Criterion(
@@ -292,5 +331,13 @@ CRITERIA = {
     ),
     "barton_bandis": Criterion(
         _barton_bandis, "length", "as barton_choubey, with JRC and wall strength of the length of the joint"
+    ),
+    "grasselli_egger": Criterion(
+        _grasselli_egger,
+        "residual_friction_angle",
+        "fresh tensile fractures; dips of facets, which depend on the spacing; a fitted residual angle",
+    ),
+    "xia": Criterion(
+        _xia, None, "fresh mated fractures; dips of facets, which depend on the spacing of the surface"
     ),
 }

@@ -74,13 +74,47 @@ def test_default_criteria_are_those_with_their_arguments(surface):
     assert fc.joints.strength_envelope(surface, **options).criterion.values.tolist() == [
         "ladanyi_archambault",
         "barton_choubey",
+        "xia",
     ]
-    result = fc.joints.strength_envelope(surface, **options, cohesion=MPA, length=1.0)
-    assert result.sizes == {"criterion": 4, "nominal_pressure": 1}
-    assert (result.shear_strength > MPA * np.tan(np.radians(30))).all()
+    given = {"cohesion": MPA, "length": 1.0, "residual_friction_angle": 30}
+    result = fc.joints.strength_envelope(surface, **options, **given)
+    assert result.sizes == {"criterion": 6, "nominal_pressure": 1}
+    assert (result.shear_strength > 0.999 * MPA * np.tan(np.radians(30))).all()
     tangent = np.tan(np.radians(result.friction_angle)) * result.nominal_pressure
     np.testing.assert_allclose(tangent, result.shear_strength)
     assert all(len(text) > 10 for text in result.assumption.values)
+
+
+def test_xia_on_teeth_of_one_dip(make_face):
+    # A0 = 1/2, C = 0, t = 5 degrees: at sigma = sigma_t 30 + 10 (1 + exp(-5/4.5)) = 43.2919 degrees
+    x = np.arange(41) % 20
+    gentle = make_face(np.minimum(x, 20 - x) * np.tan(np.radians(5)) * np.ones((5, 1)) * S, S)
+    found, inside = strength(gentle, "xia", [5, 50, 1e-9], tensile_strength=5 * MPA)
+    expected = [4.71043, 50 * np.tan(np.radians(40 + 10 * np.exp(-10 / 0.9))), 1e-9 * np.tan(np.radians(50))]
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    assert inside.tolist() == [True, False, True]
+
+
+def test_grasselli_egger_on_dips_spread_evenly(make_face):
+    # equal areas at all dips up to 10 degrees: C = 1, A0 = 1/2, and exp(-10/18) = 0.573753 at sigma_t
+    dips = np.radians(np.linspace(0, 10, 400))
+    arch = np.concatenate([[0], np.cumsum(np.tan(np.concatenate([dips, -dips[::-1]])))]) * S
+    found, _ = strength(
+        make_face(arch * np.ones((4, 1)), S), "grasselli_egger", [5, 1e-9],
+        residual_friction_angle=35, tensile_strength=5 * MPA,
+    )  # fmt: skip
+    expected = np.tan(np.radians(35)) * np.array([5 * 1.573753, 2e-9])
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_xia_has_no_strength_on_a_surface_too_rough_for_it(make_face):
+    x = np.arange(401) % 20
+    steep = make_face(np.minimum(x, 20 - x) * S * np.ones((5, 1)), S)
+    options = {"wall_strength": 100 * MPA, "basic_friction_angle": 30, "asperity_angle": 20}
+    result = fc.joints.strength_envelope(steep, nominal_pressure=MPA, criterion="xia", **options)
+    assert np.isnan(result.shear_strength).all()
+    assert "90 degrees" in result.shear_strength.attrs["reason"]
+    assert not result.in_range.any()
 
 
 def test_asperity_angle_is_the_mean_dip_towards_the_shear(make_face):
@@ -119,6 +153,7 @@ def test_a_plane_has_the_basic_strength(make_face):
     [
         ({"criterion": "patton"}, "cohesion: expected a value, for criterion 'patton'"),
         ({"criterion": "barton_bandis"}, "length: expected a value"),
+        ({"criterion": "grasselli_egger"}, "residual_friction_angle: expected a value"),
         ({"criterion": "barton_chubey"}, "did you mean 'barton_choubey'"),
         ({"criterion": []}, "at least one"),
         ({"nominal_pressure": 0.0}, "nominal_pressure: expected .*>= 1e-30"),
