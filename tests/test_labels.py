@@ -98,10 +98,16 @@ CALLS = {
     ),
     "joints.delta_dimension": lambda: fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4]),
     "joints.dilatancy": slid,
+    "joints.direct_shear": lambda: fc.joints.direct_shear(
+        crack(), 2e-4, nominal_pressure=[1e6, 1e7], hardness=1e9, keep=("residual_lower", "residual_upper")
+    ),
     "joints.directional_roughness": lambda: fc.joints.directional_roughness(rough()),
     "joints.friction": lambda: fc.joints.friction(slid()),
     "joints.register": lambda: fc.joints.register(rough(), rough() + 1e-5),
     "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(rough(), lag=4e-4),
+    "joints.shear_curve": lambda: fc.joints.shear_curve(
+        rough(), [0, 1e-3], nominal_pressure=[1e5, 1e6], wall_strength=1e8, residual_friction_angle=30
+    ),
     "joints.strength_envelope": lambda: fc.joints.strength_envelope(
         rough(), nominal_pressure=[1e5, 1e6], wall_strength=1e8, basic_friction_angle=30
     ),

@@ -72,6 +72,12 @@ FUNCTIONS = {
     "strength_envelope": lambda z: fc.joints.strength_envelope(
         z, nominal_pressure=1e6, wall_strength=1e8, basic_friction_angle=30
     ),
+    "direct_shear": lambda z: fc.joints.direct_shear(
+        crack(z), 1e-4, nominal_pressure=1e6, hardness=1e9, keep=("residual_lower",)
+    ),
+    "shear_curve": lambda z: fc.joints.shear_curve(
+        z, [0, 1e-3], nominal_pressure=1e6, wall_strength=1e8, residual_friction_angle=30
+    ),
     "directional_roughness": fc.joints.directional_roughness,
     "transmissivity": lambda z: fc.joints.transmissivity(z - z.min()),
 }

@@ -52,6 +52,10 @@ CALLS = {
     },
     "joints.Crack": {"lower": SURFACE, "young": 1e10, "poisson": 0.2},
     "joints.delta_surface": {"crack": CRACK, "shear": 1e-4},
+    "joints.direct_shear": {
+        "crack": CRACK, "path": 1e-4, "nominal_pressure": 1e6, "hardness": 1e9, "normal_stiffness": 1e9,
+        "shear_stiffness": 1e12, "distance": 1e-4,
+    },
     "joints.directional_roughness": {"surface": SURFACE},
     "joints.dilatancy": {"crack": CRACK, "shear": [0.0, 1e-4]},
     "joints.friction": {"dilatancy": SHEARED},
@@ -59,6 +63,10 @@ CALLS = {
     "joints.roughness_coefficient": {"surface": SURFACE, "lag": 1e-4},
     "joints.strength_envelope": {
         "surface": SURFACE, "nominal_pressure": 1e6, "wall_strength": 1e8, "basic_friction_angle": 30,
+    },
+    "joints.shear_curve": {
+        "surface": SURFACE, "displacement": 1e-3, "nominal_pressure": 1e6, "wall_strength": 1e8,
+        "residual_friction_angle": 30, "length": 0.1, "damage_coefficient": 1.5, "normal_stiffness": 1e9,
     },
     "joints.transmissivity": {"gap": SURFACE - SURFACE.min()},
     "joints.bandis_closure": {"nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4},

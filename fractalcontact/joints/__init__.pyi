@@ -6,10 +6,12 @@ from ._decorrelation import decorrelation_length as decorrelation_length
 from ._delta_dimension import delta_dimension as delta_dimension
 from ._delta_surface import delta_surface as delta_surface
 from ._dilatancy import dilatancy as dilatancy
+from ._direct_shear import direct_shear as direct_shear
 from ._directional_roughness import directional_roughness as directional_roughness
 from ._friction import friction as friction
 from ._registration import register as register
 from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
+from ._shear_curve import shear_curve as shear_curve
 from ._strength_criteria import PARK_PAULAY as PARK_PAULAY
 from ._strength_criteria import bandis_closure as bandis_closure
 from ._strength_criteria import bandis_constants as bandis_constants
@@ -34,11 +36,13 @@ __all__ = [
     "delta_dimension",
     "delta_surface",
     "dilatancy",
+    "direct_shear",
     "directional_roughness",
     "friction",
     "register",
     "roughness_coefficient",
     "self_weight_strength",
+    "shear_curve",
     "size_effect",
     "strength_envelope",
     "transmissivity",

@@ -19,6 +19,7 @@ from ._islands import islands as islands
 from ._lacunarity import lacunarity as lacunarity
 from ._paper import paper_figure as paper_figure
 from ._partial_slip import slip_domains as slip_domains
+from ._shear_curve import shear_curve as shear_curve
 from ._shear_scheme import sliding_scheme as sliding_scheme
 from ._strength_envelope import strength_envelope as strength_envelope
 from ._surface import field as field
@@ -48,6 +49,7 @@ __all__ = [
     "local_slopes",
     "paper_figure",
     "rigid_dilatancy",
+    "shear_curve",
     "sliding_scheme",
     "slip_domains",
     "strength_envelope",

@@ -19,7 +19,7 @@ OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is ou
 
 
 @_style.styled
-def strength_envelope(result: Any, *, ax: Axes | None = None) -> Figure:
+def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None = None) -> Figure:
     r"""Draw the peak shear strength against the normal stress, one curve per criterion.
 
     A curve is dotted where its criterion is used out of its range.
@@ -28,6 +28,8 @@ def strength_envelope(result: Any, *, ax: Axes | None = None) -> Figure:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.strength_envelope`.
+    tests : Dataset or node of a DataTree, optional
+        From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
     ax : Axes, optional
         Draw here; otherwise on a new figure.
 
@@ -69,6 +71,13 @@ def strength_envelope(result: Any, *, ax: Axes | None = None) -> Figure:
         entries.append(_style.legend_line(authors, color=colour))
     if not in_range.all():
         entries.append(_style.legend_line("out of range", **OUTSIDE_LINE))
+    if tests is not None:
+        names = ("peak_shear_strength", "residual_shear_strength", "nominal_pressure")
+        found = result_of(tests, "strength_envelope", names, ("nominal_pressure",))
+        for name, marker in (("peak_shear_strength", "o"), ("residual_shear_strength", "x")):
+            style: dict[str, Any] = {"ls": "", "marker": marker, "color": _style.BLACK, "zorder": 3}
+            ax.plot(scale(found["nominal_pressure"]), scale(found[name]), clip_on=False, **style)
+            entries.append(_style.legend_line(f"direct shear, {name.partition('_')[0]}", **style))
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
     ax.set_xlabel(axis_label(pressure, scale))

@@ -1,0 +1,91 @@
+"""Shear stress and dilatancy of a joint against shear displacement."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.units import scale_for
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import result_of
+from fractalcontact.plotting._units import axis_label
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure, SubFigure
+
+SHOWN = ("shear_stress", "dilatancy")
+BESIDE: dict[str, Any] = {"lw": 1.0, "ls": "--"}  # curves to compare with
+
+
+@_style.styled
+def shear_curve(
+    result: Any, *, beside: Any | None = None, figure: Figure | SubFigure | None = None
+) -> Figure:
+    r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.direct_shear` or `fractalcontact.joints.shear_curve`.
+    beside : Dataset or node of a DataTree, optional
+        Such a result to draw dashed, in the colours of the same normal stresses.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> result = fc.joints.shear_curve(
+    ...     surface, [0, 1e-3, 5e-3], nominal_pressure=1e6, wall_strength=6e7, residual_friction_angle=30
+    ... )
+    >>> print(fc.plotting.shear_curve(result).axes[0].get_ylabel())
+    shear stress $\tau$ (MPa)
+    """
+    data = [_read(result)] + ([] if beside is None else [_read(beside)])
+    sheet = _style.figure_or_new(figure, (_style.WIDTH, 3.1))
+    axes = sheet.subplots(1, 2, sharex=True)
+    pressures = np.unique(np.concatenate([each["nominal_pressure"].values for each in data]))
+    colours = dict(zip(pressures.tolist(), _style.sequence_colours(pressures.size), strict=True))
+    displacements = np.concatenate([each["shear_displacement"].values.ravel() for each in data])
+    along = scale_for("m", displacements)
+    for ax, name in zip(axes, SHOWN, strict=True):
+        _style.style_axes(ax)
+        across = scale_for(
+            data[0][name].attrs["units"], np.concatenate([each[name].values.ravel() for each in data])
+        )
+        for each, style in zip(data, ({}, BESIDE), strict=False):
+            for i, pressure in enumerate(each["nominal_pressure"].values.tolist()):
+                x = np.broadcast_to(each["shear_displacement"].values, each[name].shape)[i]
+                ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], **style)
+        ax.set_ylabel(axis_label(data[0][name], across))
+        ax.set_xlabel(axis_label(data[0]["shear_displacement"], along))
+    stress = scale_for("Pa", pressures)
+    labels = [f"{value:.3g}" for value in stress(pressures)]
+    entries = [
+        _style.legend_line(text, color=colours[key]) for text, key in zip(labels, colours, strict=True)
+    ]
+    if beside is not None:
+        entries += [
+            _style.legend_line(each.attrs.get("title", ""), **style)
+            for each, style in zip(data, ({}, BESIDE), strict=True)
+        ]
+    _style.side_legend(axes[1], entries, title=f"normal stress\n({stress.unit})")
+    return _style.root_figure(sheet)
+
+
+def _read(result: Any) -> xr.Dataset:
+    names = (*SHOWN, "shear_displacement", "nominal_pressure")
+    data = result_of(result, "shear_curve", names, ("nominal_pressure",))
+    return data.transpose("nominal_pressure", ..., missing_dims="ignore")
