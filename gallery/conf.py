@@ -61,6 +61,11 @@ sphinx_gallery_conf = {
 
 PAGES = (
     "index",
+    "install",
+    "first_scan",
+    "howto",
+    "faq",
+    "validation",
     "scene_files",
     "data_model",
     "conventions",

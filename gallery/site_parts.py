@@ -1,5 +1,8 @@
 """Extensions of sphinx for this site: figures without pyplot, and tables made from the package."""
 
+import re
+from pathlib import Path
+
 from docutils import nodes
 from docutils.parsers.rst import Directive
 
@@ -8,6 +11,7 @@ def setup(app):
     """Register the directives and hooks of this file."""
     app.add_directive("names", Names)
     app.add_directive("extremes", Extremes)
+    app.add_directive("extras", Extras)
     app.connect("autodoc-process-docstring", prepare_docstring)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -34,6 +38,21 @@ class Names(Directive):
             for name, quantity in sorted(QUANTITIES.items())
         ]
         return [table((28, 12, 60), ("name", "units", "meaning"), rows)]
+
+
+class Extras(Directive):
+    """The optional dependencies of the package with their purpose, from the comments of pyproject.toml."""
+
+    def run(self):
+        import tomllib
+
+        text = (Path(__file__).parent.parent / "pyproject.toml").read_text(encoding="utf-8")
+        rows = []
+        for name, packages in tomllib.loads(text)["project"]["optional-dependencies"].items():
+            purpose = re.search(rf"^{name} = .*?# *(.*)$", text, re.MULTILINE)
+            if purpose:
+                rows.append((nodes.literal(text=name), ", ".join(packages), purpose[1]))
+        return [table((10, 34, 56), ("extra", "installs", "for"), rows)]
 
 
 class Extremes(Directive):

@@ -7,6 +7,7 @@ import textwrap
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 
 import fractalcontact as fc
@@ -77,3 +78,35 @@ def test_loop_over_members_of_the_data_model_runs():
         alone = fc.contact.press(face, contact_modulus=1e9, nominal_pressure=1e5)
         assert names["pressed"].contact_fraction[number].item() == alone.contact_fraction.item()
     assert {names[name].sizes["member"] for name in ("pressed", "roughness", "closed")} == {3}
+
+
+PAGES = [page.name for page in sorted((ROOT / "gallery").glob("*.rst")) if ">>> " in page.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_examples_of_a_page_run(page):
+    """All blocks of a page in one namespace, in the order of the page."""
+    text = (ROOT / "gallery" / page).read_text(encoding="utf-8")
+    test = doctest.DocTestParser().get_doctest(text, {}, page, page, 0)
+    result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(test)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_scene_of_the_first_scan_runs():
+    text = (ROOT / "gallery" / "first_scan.rst").read_text(encoding="utf-8")
+    (scene,) = re.findall(r"code-block:: toml\n\n(.*?)(?=\n\S)", text, flags=re.DOTALL)
+    heights = fc.surfaces.sample("concrete_crack").values[:256, :256]
+    np.savetxt("scan.csv", heights * 1e3, delimiter=",")
+    Path("study.toml").write_text(textwrap.dedent(scene), encoding="utf-8")
+    tree = fc.scenes.run("study.toml", out="out", progress=False)
+    assert {path.name for path in Path("out").iterdir()} >= {"result.nc", "report.html", "islands.png"}
+    assert tree["joints/closure/contact_fraction"].size == 3
+
+
+def test_every_test_on_the_validation_page_exists():
+    text = (ROOT / "gallery" / "validation.rst").read_text(encoding="utf-8")
+    named = re.findall(r"``([a-z_]+/test_[a-z_]+\.py)::(test_[a-z0-9_]+)``", text)
+    assert len(named) > 20
+    for file, name in named:
+        assert f"def {name}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), (file, name)
