@@ -307,6 +307,7 @@ QUANTITIES: dict[str, Quantity] = {
     "null_count": Quantity("1", "expected number of boxes that meet the random null"),
     "differs_from_random": Quantity("1", "the set differs from the random null of equal coverage"),
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
+    "follows_power_law": Quantity("1", "the local slopes of the window agree with one power law"),
     "minkowski_dimension": Quantity("1", "Minkowski dimension of the set"),
     "minkowski_dimension_low": Quantity(
         "1", "lower end of the interval of the Minkowski dimension", _NO_INTERVAL

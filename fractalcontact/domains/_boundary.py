@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,10 @@ LAGS = np.hypot(*OFFSETS.T)  # in cells
 SINGLE_LAG, DOUBLE_LAG = [0, 1, 4, 5], [2, 3, 6, 7]
 BLOCKS = 4  # along each axis, for the jackknife
 FEWEST_SIDES = 200  # of cells on the boundary, below which no interval is given
+# a set with an interior holds whole blocks of cells: the edge of a block, and the least share of its cells
+# that lie in one; dimensions outside ROUGH are compared with the small block only
+SMALL_BLOCK, LARGE_BLOCK = (3, 0.1), (9, 0.06)
+ROUGH = 1.3, 1.85
 SMOOTH, SMOOTH_FACTOR = 1.3, 2.0  # below this dimension blocks are not independent: the error grows
 
 
@@ -41,7 +46,7 @@ def _check(problems: Problems, *, mask: Any, periodic: Any, valid: Any) -> None:
 def boundary_dimension(
     mask: xr.DataArray, *, periodic: bool | None = None, valid: xr.DataArray | None = None
 ) -> xr.Dataset:
-    """Dimension of the boundary of a set, from the pairs of cells at short lags that it separates.
+    """Dimension of the boundary of a set with an interior, from the pairs of cells that it separates.
 
     Near a boundary of dimension D the share of pairs of which one cell is in the set and one outside grows
     with the lag r as r^(2 - D). The lags are one and two steps, along the axes and along the diagonals. For
@@ -71,10 +76,12 @@ def boundary_dimension(
 
     Notes
     -----
-    NaN without a boundary (an empty or a full plane). The interval is NaN where fewer than 200 sides of cells
-    lie on the boundary, or where one block holds all of them. The dimension is that at the scale of the cell:
-    a set smooth at that scale has the dimension 1 however rough it is at larger scales. Validation: see the
-    documentation, "Theory: contact domains".
+    NaN without a boundary (an empty or a full plane), and where the set or its complement has no interior, as
+    a dust, a curve or a cluster of percolation: too few of its cells lie in whole blocks of 3 x 3 and 9 x 9
+    cells, and the pairs measure the set and not its boundary. `comment` states the reason. The interval is
+    NaN where fewer than 200 sides of cells lie on the boundary, or where one block holds all of them. The
+    dimension is that at the scale of the cell: a set smooth at that scale has the dimension 1 however rough
+    it is at larger scales. Validation: see the documentation, "Theory: contact domains".
 
     Examples
     --------
@@ -92,14 +99,24 @@ def analyse(planes: Planes) -> xr.Dataset:
     counts = parallel_map(
         lambda k: count_pairs(planes.cells[k], planes.valid_of(k), planes.grid), range(planes.count)
     )
-    fits = [fit_boundary_dimension(pairs, differing) for pairs, differing in counts]
-    dimension, half_width = np.array(fits, float).reshape(-1, 2).T
+    fits = np.array([fit_boundary_dimension(pairs, differing) for pairs, differing in counts])
+    dimension, half_width = fits.reshape(-1, 2).T
+    has_interior = np.array(
+        parallel_map(
+            lambda k: has_interiors(planes.cells[k], planes.valid_of(k), planes.grid, dimension[k]),
+            range(planes.count),
+        ),
+        bool,
+    )
     sides = np.array([differing[:, :2].sum() for _, differing in counts], np.int64)
+    without_interior = np.isfinite(dimension) & ~has_interior
+    notes = _notes(dimension, half_width, without_interior, planes.grid.shape)
+    dimension = np.where(has_interior, dimension, np.nan)
     variables = {
         **dimension_variables(planes, "boundary_dimension", dimension, half_width, LAGS),
         "boundary_sides": planes.variable(sides),
     }
-    return build_dataset(planes, variables, notes=_notes(dimension, half_width, planes.grid.shape))
+    return build_dataset(planes, variables, notes=notes)
 
 
 def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, Array]:
@@ -110,6 +127,57 @@ def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, A
     wrap_y, wrap_x = grid.periodic
     count_differing_pairs(cells, observed, OFFSETS, wrap_y, wrap_x, pairs, differing)
     return pairs.reshape(-1, len(OFFSETS)), differing.reshape(-1, len(OFFSETS))
+
+
+def has_interiors(cells: Array, valid: Array | None, grid: Grid, dimension: float) -> bool:
+    """Return whether both the set and its complement hold whole blocks of cells.
+
+    A set with an empty interior, as a carpet or a cluster of percolation, has holes at all scales: few of its
+    cells lie in a block of 9 x 9 cells, where the part of a rough surface above a level holds many. Smooth
+    sets may be as small as a few cells. Unobserved cells do not break a block.
+    """
+    if not np.isfinite(dimension):
+        return True
+    blocks = [SMALL_BLOCK, LARGE_BLOCK] if ROUGH[0] <= dimension <= ROUGH[1] else [SMALL_BLOCK]
+    observed = np.ones_like(cells) if valid is None else valid
+    for part in (cells, cells ^ 1):
+        own = part & observed
+        number = int(np.count_nonzero(own))
+        for edge, least in blocks:
+            inside = cells_in_blocks(part | (observed ^ 1), edge, grid.periodic)
+            if np.count_nonzero(inside & own) < least * number:
+                return False
+    return True
+
+
+def cells_in_blocks(cells: Array, edge: int, periodic: Sequence[bool]) -> Array:
+    """Mark the cells that lie in a block of `edge` x `edge` cells of the set (the opening by a square)."""
+    for axis, wraps in enumerate(periodic):
+        if wraps:
+            widths = [(0, 0), (0, 0)]
+            widths[axis] = (edge - 1, edge - 1)
+            cells = np.pad(cells, widths, mode="wrap")
+    if min(cells.shape) < edge:
+        return np.zeros_like(cells)
+    corners = cells
+    for axis in (0, 1):
+        corners = _combined(np.bitwise_and, corners, edge, axis)
+    marked = np.pad(corners, edge - 1)
+    for axis in (0, 1):
+        marked = _combined(np.bitwise_or, marked, edge, axis)
+    rows, columns = (slice(edge - 1, 1 - edge) if wraps else slice(None) for wraps in periodic)
+    return marked[rows, columns]
+
+
+def _combined(operation: np.ufunc, cells: Array, length: int, axis: int) -> Array:
+    """Combine each run of `length` cells along an axis, by doubling."""
+    lines = np.moveaxis(cells, axis, 0)
+    reached = 1
+    while reached < length:
+        step = min(reached, length - reached)
+        lines = operation(lines[:-step], lines[step:])
+        reached += step
+    return np.moveaxis(lines, 0, axis)
 
 
 def _shares(pairs: Array, differing: Array) -> Array:
@@ -162,16 +230,25 @@ def fit_boundary_dimension(pairs: Array, differing: Array) -> tuple[float, float
     return 2.0 - slope, float(np.hypot(stdtrit(freedom, 0.975) * error, 1.5 * bend))
 
 
-def _notes(dimension: Array, half_width: Array, shape: tuple[int, ...]) -> dict[str, dict[str, str]]:
+def _notes(
+    dimension: Array, half_width: Array, without_interior: Array, shape: tuple[int, ...]
+) -> dict[str, dict[str, str]]:
     notes = {
         **interval_notes("95 % interval of the dimension of the boundary"),
         **window_notes("shortest lag", "longest lag"),
     }
     has_value = np.isfinite(dimension)
+    comments = []
     if not has_value.all():
-        count = int((~has_value).sum())
         reason = "there is no boundary" if min(shape) > 2 else "no boundary can be compared at two steps"
-        notes["boundary_dimension"] = {"comment": f"NaN where {reason} ({count} planes)"}
+        comments.append(f"NaN where {reason} ({int((~has_value).sum())} planes)")
+    if without_interior.any():
+        comments.append(
+            "NaN where the set or its complement has no interior: too few of its cells lie in whole blocks "
+            f"of cells, and the pairs measure the set, not a boundary ({int(without_interior.sum())} planes)"
+        )
+    if comments:
+        notes["boundary_dimension"] = {"comment": "; ".join(comments)}
     if np.isnan(half_width[has_value]).any():
         reason = (
             f"NaN where fewer than {FEWEST_SIDES} sides lie on the boundary, or one block holds all of them"

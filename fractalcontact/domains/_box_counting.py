@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import stdtrit
 
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
@@ -27,10 +26,17 @@ from fractalcontact.domains._mask_input import (
 )
 from fractalcontact.domains._scaling_fit import (
     ROUNDING,
-    default_sizes,
+    Fit,
+    deviations_of_95_percent,
     dimension_variables,
-    fit_line,
+    drift_of,
+    fit_regression,
+    fit_steady_ratio,
     interval_notes,
+    longer_sizes,
+    ratio_slopes,
+    steadiest_window,
+    weighted_mean,
     window_notes,
 )
 
@@ -38,9 +44,9 @@ SOURCE = (
     "Falconer, Fractal Geometry (1990), ch. 3 (box dimension); Borri-Brunetto, Carpinteri and Chiaia, "
     "FRAMCOS-3 (1998) (of contact domains)"
 )
-RATIOS = (2, 3)  # of the sizes whose local slopes are averaged
-TINY = 1e-24  # variance of slopes that differ by rounding alone
 COVER_DIFFERENCE = 0.02  # of the dimensions of two covers, up to which it widens the interval as it is
+BETWEEN_CLUSTERS = 0.06  # of the dimension in a chosen window, which no scatter within one cluster shows
+NO_POWER_LAW = 0.15  # range of the local slopes in a window from which on there is no power law
 MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in the deviation of the null
 
 
@@ -88,8 +94,10 @@ def box_dimension(
         Boolean, or integer flags where contact means value > 0.
     scales : sequence of int, optional
         Edges of the boxes in cells, for a least-squares slope of ln N over ln s. By default the sizes are
-        the products of 2 and 3 from 1 to the geometric mean of the cell and the extent (at least to 9). The
-        dimension is then the mean local slope over the ratio of sizes, 2 or 3, at which it varies least.
+        products of 2 and 3 up to a quarter of the shorter side (at least to 9), of which each plane uses
+        those to the geometric mean of the cell and the extent, or a window of longer boxes in which its
+        local slopes are steadier by far. The dimension is then the mean local slope over the
+        ratio of sizes, 2 or 3, at which it varies least.
     cover : {"minimum", "mean", "aligned"}
         The fewest boxes over all offsets of the grid, their mean over all offsets, or the boxes of the one
         grid that starts at the first cell. The default fit combines the first two.
@@ -103,7 +111,8 @@ def box_dimension(
     Dataset
         Over the leading dims: `box_dimension`, `ci_low`, `ci_high`; `scale_min`, `scale_max` (cells);
         `coverage`; `null_dimension` and `null_spread` of the random null of equal coverage;
-        `differs_from_random`. Over `box_size` (cells; `box_length` in m) too: `box_count`, of whole boxes;
+        `differs_from_random`; `follows_power_law`, False where the local slopes of the window differ by
+        more than 0.15. Over `box_size` (cells; `box_length` in m) too: `box_count`, of whole boxes;
         `box_measure`, where boxes cut by the edge count by their part inside; `local_slope`; `null_count`.
 
     Raises
@@ -184,22 +193,28 @@ def box_counts(
 def analyse(planes: Planes, *, scales: Any = None, cover: str = "minimum") -> xr.Dataset:
     """Return the result of `box_dimension` for planes, without labels."""
     shape = planes.grid.shape
-    default = default_sizes(shape)
+    default = longer_sizes(shape)
     sizes = read_box_sizes(scales, default[default <= _longest_box(shape, cover)])
     by_regression = scales is not None
     curve = cover_curve(planes, sizes, cover)
-    dimension, half_width = _fit(planes, sizes, curve, cover, by_regression=by_regression)
-    null = _null(planes, sizes, by_regression=by_regression)
+    fits = _fit(planes, sizes, curve, cover, by_regression=by_regression)
+    dimension, half_width = (
+        np.array([getattr(fit, name) for fit in fits]) for name in ("value", "half_width")
+    )
+    windows = [fit.window for fit in fits]
+    null = _null(planes, sizes, windows, by_regression=by_regression)
+    steady = np.array([fit.slope_range <= NO_POWER_LAW for fit in fits])  # False for NaN
     variables = {
-        **dimension_variables(planes, "box_dimension", dimension, half_width, sizes),
+        **dimension_variables(planes, "box_dimension", dimension, half_width, sizes, windows),
         "coverage": planes.variable(planes.coverage),
+        "follows_power_law": planes.variable(steady),
         **{name: planes.variable(values) for name, values in null.items() if name != "null_count"},
         "box_count": planes.variable(curve.count, "box_size"),
         "box_measure": planes.variable(curve.measure, "box_size"),
         "local_slope": planes.variable(0.0 - local_slope(sizes, curve.measure), "box_size"),
         "null_count": planes.variable(null["null_count"], "box_size"),
     }
-    notes = _notes(dimension, sizes, by_regression=by_regression)
+    notes = _notes(fits, sizes, by_regression=by_regression)
     return build_dataset(planes, variables, _size_coords(sizes, planes), notes=notes)
 
 
@@ -207,90 +222,62 @@ def _size_coords(sizes: Array, planes: Planes) -> dict[str, Any]:
     return {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
 
 
-def _fit(
-    planes: Planes, sizes: Array, curve: Curve, cover: str, *, by_regression: bool
-) -> tuple[Array, Array]:
-    """Return the dimension and the half-width of its interval for every plane."""
+@dataclass(frozen=True)
+class WindowFit:
+    """The dimension of one plane, the half-width of its interval, and the sizes that it rests on.
+
+    `slope_low` and `slope_high` are the extreme local slopes of the window.
+    """
+
+    value: float
+    half_width: float
+    window: slice
+    slope_low: float
+    slope_high: float
+
+    @property
+    def slope_range(self) -> float:
+        return self.slope_high - self.slope_low
+
+
+def _fit(planes: Planes, sizes: Array, curve: Curve, cover: str, *, by_regression: bool) -> list[WindowFit]:
+    """Return the dimension, its interval and its window of sizes for every plane."""
     if by_regression:
-        fits = [fit_regression(sizes, measure) for measure in curve.measure]
-        pairs = [(fit.dimension, 2.0 * fit.spread) for fit in fits]
-    elif cover == "aligned":
-        fits = [fit_steady_ratio(sizes, area) for area in curve.area]
-        pairs = [(fit.dimension, deviations_of_95_percent(sizes) * fit.spread) for fit in fits]
+        regressions = [fit_regression(sizes, measure) for measure in curve.measure]
+        pairs = [(fit.dimension, 2.0 * fit.spread) for fit in regressions]
+        windows = [slice(0, sizes.size)] * planes.count
+        steady = curve
     else:
         other = curve
-        if 2 * sizes.max() <= min(planes.grid.shape):
+        if cover != "aligned" and 2 * sizes.max() <= min(planes.grid.shape):
             other = cover_curve(planes, sizes, "mean" if cover == "minimum" else "minimum")
-        fewest, mean = (curve.area, other.area) if cover == "minimum" else (other.area, curve.area)
-        pairs = [
-            fit_two_covers(sizes, fewest_area, mean_area, cover)
-            for fewest_area, mean_area in zip(fewest, mean, strict=True)
-        ]
-    dimension, half_width = np.array(pairs, float).reshape(-1, 2).T
-    half_width = half_width + ROUNDING
-    has_spread = sizes.size > (2 if by_regression else 3)
-    return dimension, half_width if has_spread else np.full(half_width.shape, np.nan)
+        steady, mean = (other, curve) if cover == "mean" else (curve, other)
+        pairs, windows = [], []
+        for cells, area, mean_area in zip(planes.cells, steady.area, mean.area, strict=True):
+            window = steadiest_window(sizes, area, _longest_edge(cells) / 4.0, planes.grid.shape)
+            windows.append(window)
+            if cover == "aligned":
+                fit = fit_steady_ratio(sizes[window], area[window])
+                half_width = deviations_of_95_percent(sizes[window]) * fit.spread
+                pairs.append((fit.dimension, half_width))
+            else:
+                pairs.append(fit_two_covers(sizes[window], area[window], mean_area[window], cover))
+    fits = []
+    for (value, half_width), window, area in zip(pairs, windows, steady.area, strict=True):
+        used = sizes[window]
+        slopes = ratio_slopes(used, area[window])
+        drift = 0.0 if by_regression or window.start == 0 else drift_of(slopes) + BETWEEN_CLUSTERS
+        has_spread = used.size > (2 if by_regression else 3)
+        local = slopes[1] if slopes[1].size else np.array([np.nan])
+        width = half_width + drift + ROUNDING if has_spread else np.nan
+        fits.append(WindowFit(value, width, window, float(local.min()), float(local.max())))
+    return fits
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A dimension, the standard deviation of the local slopes it rests on, and d dimension / d ln N."""
-
-    dimension: float
-    spread: float
-    weights: Array
-
-
-def fit_regression(sizes: Array, measure: Array) -> Fit:
-    """Ordinary least squares of ln N on ln s; the spread is that of the slopes between neighbouring sizes."""
-    if sizes.size < 2 or not np.all(measure > 0):
-        return Fit(np.nan, np.nan, np.zeros(sizes.size))
-    slope, spread, weights = fit_line(np.log(sizes), np.log(measure))
-    return Fit(0.0 - float(slope), float(spread), -weights)
-
-
-def fit_steady_ratio(sizes: Array, area: Array) -> Fit:
-    """Mean local slope over a fixed ratio of sizes, for the ratio over which it varies least.
-
-    A set built by a fixed ratio has counts that oscillate about their power law with that period in ln s;
-    over the ratio itself, and only over it, the local slope does not oscillate. The slopes of each ratio are
-    weighted by the inverse square of their variance. `area` is that of the boxes, N s^2, so that integer
-    slopes are exact.
-    """
-    if not np.all(area > 0):
-        return Fit(np.nan, np.nan, np.zeros(sizes.size))
-    index_of = {int(size): index for index, size in enumerate(sizes)}
-    slopes, variances, weights = [], [], []
-    for ratio in RATIOS:
-        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
-        if pairs:
-            low, high = np.array(pairs).T
-            local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
-            slopes.append(float(local.mean()))
-            variances.append(float(local.var()))
-            weight = np.zeros(sizes.size)
-            np.add.at(weight, low, 1.0 / (np.log(ratio) * low.size))
-            np.add.at(weight, high, -1.0 / (np.log(ratio) * low.size))
-            weights.append(weight)
-    if not slopes:
-        return Fit(np.nan, np.nan, np.zeros(sizes.size))
-    dimension, spread, share = _weighted_mean(slopes, variances)
-    return Fit(dimension, spread, share @ np.array(weights))
-
-
-def _weighted_mean(slopes: Sequence[float], variances: Sequence[float]) -> tuple[float, float, Array]:
-    """Average estimates by the inverse square of their variances; return mean, spread and shares."""
-    slope, variance = np.array(slopes), np.array(variances)
-    relative = (variance + TINY) / (variance + TINY).min()
-    share = relative**-2.0
-    share = share / share.sum()
-    mean = float(slope[0] + share @ (slope - slope[0]))
-    return mean, float(np.sqrt(share @ (variance + (slope - mean) ** 2))), share
-
-
-def deviations_of_95_percent(sizes: Array) -> float:
-    """Return how many standard deviations of the local slopes make 95 %: Student's t, of the sizes less 2."""
-    return float(stdtrit(max(sizes.size - 2, 1), 0.975))
+def _longest_edge(cells: Array) -> int:
+    """Return the longer side of the rectangle that holds the set, in cells."""
+    extents = [np.flatnonzero(cells.any(axis=axis)) for axis in (0, 1)]
+    return max((int(places[-1] - places[0]) + 1 if places.size else 0) for places in extents)
 
 
 def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tuple[float, float]:
@@ -306,7 +293,7 @@ def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tupl
     if not (np.isfinite(first.dimension) and np.isfinite(second.dimension)):
         return first.dimension if cover == "minimum" else second.dimension, np.nan
     variance = first.spread**2, max(first.spread, second.spread) ** 2
-    both, spread, _ = _weighted_mean((first.dimension, second.dimension), variance)
+    both, spread, _ = weighted_mean((first.dimension, second.dimension), variance)
     difference = abs(first.dimension - second.dimension)
     deviations = deviations_of_95_percent(sizes)
     if cover == "minimum":
@@ -315,8 +302,11 @@ def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tupl
     return second.dimension, deviations * deviation + min(difference, COVER_DIFFERENCE + deviation)
 
 
-def _null(planes: Planes, sizes: Array, *, by_regression: bool) -> dict[str, Array]:
-    """Return counts, dimension and spread of the random null, and whether the set differs from it."""
+def _null(planes: Planes, sizes: Array, windows: list[slice], *, by_regression: bool) -> dict[str, Array]:
+    """Return counts, dimension and spread of the random null, and whether the set differs from it.
+
+    The null is fitted in the window of its plane.
+    """
     shorter = min(planes.grid.shape)
     small = np.array([size for size in _random_null.TESTED_SIZES if 2 * size <= shorter], np.int64)
     contents = _random_null.box_contents(planes, np.union1d(sizes, small))
@@ -326,9 +316,12 @@ def _null(planes: Planes, sizes: Array, *, by_regression: bool) -> dict[str, Arr
         by_size = contents[min(plane, len(contents) - 1)]
         boxes = [by_size[size] for size in sizes.tolist()]
         null = _random_null.expected_counts(cells, observed, sizes, boxes)
-        fit = fit_regression(sizes, null) if by_regression else fit_steady_ratio(sizes, null * sizes**2)
+        used, part = sizes[windows[plane]], null[windows[plane]]
+        fit = fit_regression(used, part) if by_regression else fit_steady_ratio(used, part * used**2)
         has_value = np.isfinite(fit.dimension)
-        deviation = _null_deviation(cells, observed, sizes, boxes, null, fit) if has_value else np.nan
+        deviation = np.nan
+        if has_value:
+            deviation = _null_deviation(cells, observed, used, boxes[windows[plane]], part, fit)
         small_boxes = [by_size[size] for size in small.tolist()]
         differs = has_value and _random_null.differs_from_null(
             cells, observed, small, mean[plane], small_boxes
@@ -360,7 +353,7 @@ def _null_deviation(
     return _random_null.fit_deviation(cells, observed, sizes, boxes, null, fit.weights)
 
 
-def _notes(dimension: Array, sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:
+def _notes(fits: list[WindowFit], sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:
     interval = "two standard deviations" if by_regression else "from the spread"
     interval = f"interval of the box dimension ({interval} of the local slopes)"
     notes = {
@@ -368,10 +361,19 @@ def _notes(dimension: Array, sizes: Array, *, by_regression: bool) -> dict[str, 
         **window_notes("smallest box of the fit", "largest box of the fit"),
         "local_slope": {"long_name": "local dimension, -d ln(box_measure)/d ln(box_size)"},
     }
+    empty = sum(np.isnan(fit.value) for fit in fits)
     if sizes.size < 2:
         reason = "" if by_regression else "; the mask is too narrow"
         notes["box_dimension"] = {"comment": f"NaN: one size of box gives no slope{reason}"}
-    elif np.isnan(dimension).any():
-        count = int(np.isnan(dimension).sum())
-        notes["box_dimension"] = {"comment": f"NaN where the set is empty ({count} planes)"}
+        return notes
+    without = [fit for fit in fits if fit.slope_range > NO_POWER_LAW]
+    comments = [f"NaN where the set is empty ({empty} planes)"] if empty else []
+    if without:
+        low, high = min(fit.slope_low for fit in without), max(fit.slope_high for fit in without)
+        comments.append(
+            f"no power law in {len(without)} of {len(fits)} planes: local slopes from {low:.2f} to "
+            f"{high:.2f} within the window"
+        )
+    if comments:
+        notes["box_dimension"] = {"comment": "; ".join(comments)}
     return notes

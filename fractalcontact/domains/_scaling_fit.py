@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from fractalcontact.domains._mask_input import Array, Planes
 
 DEVIATIONS = 2.5  # of the local slopes, to either side of a dimension
 ROUNDING = 1e-14  # smallest half-width of an interval
+RATIOS = (2, 3)  # of the sizes whose local slopes are averaged
+TINY = 1e-24  # variance of slopes that differ by rounding alone
+LEAST_RATIO, LEAST_SIZES = 8, 6  # of the sizes in a window, and how many it holds
+STEADY = 3e-3  # spread of local slopes below which a longer window is better than a steadier one
+STEADIER = 0.5  # of the unsteadiness of the usual window, from which on another one replaces it
 
 
 def default_sizes(shape: Sequence[int]) -> Array:
@@ -23,6 +30,15 @@ def default_sizes(shape: Sequence[int]) -> Array:
     largest = min(max(int((ny * nx) ** 0.25 + 1e-9), 9), ny, nx)
     powers = (2**i * 3**j for i in range(largest.bit_length()) for j in range(largest.bit_length()))
     return np.array(sorted(size for size in powers if size <= largest), np.int64)
+
+
+def longer_sizes(shape: Sequence[int]) -> Array:
+    """Return the default sizes, continued by 2^i and 3 2^i up to a quarter of the shorter side."""
+    sizes = default_sizes(shape)
+    quarter = min(shape) // 4
+    further = [size for i in range(quarter.bit_length()) for size in (2**i, 3 * 2**i)]
+    more = [size for size in further if sizes[-1] < size <= quarter]
+    return np.array(sorted([*sizes.tolist(), *more]), np.int64)
 
 
 def fit_line(x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -55,17 +71,145 @@ def fit_power_law(scales: Array, curves: Array, sign: float) -> tuple[Array, Arr
     return np.asarray((0.0 if sign > 0 else 2.0) + sign * slope), DEVIATIONS * spread + ROUNDING
 
 
+@dataclass(frozen=True)
+class Fit:
+    """A dimension, the standard deviation of the local slopes it rests on, and d dimension / d ln N."""
+
+    dimension: float
+    spread: float
+    weights: Array
+
+
+def fit_regression(sizes: Array, measure: Array) -> Fit:
+    """Ordinary least squares of ln N on ln s; the spread is that of the slopes between neighbouring sizes."""
+    if sizes.size < 2 or not np.all(measure > 0):
+        return Fit(np.nan, np.nan, np.zeros(sizes.size))
+    slope, spread, weights = fit_line(np.log(sizes), np.log(measure))
+    return Fit(0.0 - float(slope), float(spread), -weights)
+
+
+def fit_steady_ratio(sizes: Array, area: Array) -> Fit:
+    """Mean local slope over a fixed ratio of sizes, for the ratio over which it varies least.
+
+    A set built by a fixed ratio has counts that oscillate about their power law with that period in ln s;
+    over the ratio itself, and only over it, the local slope does not oscillate. The slopes of each ratio are
+    weighted by the inverse square of their variance. `area` is that of the boxes, N s^2, so that integer
+    slopes are exact.
+    """
+    if not np.all(area > 0):
+        return Fit(np.nan, np.nan, np.zeros(sizes.size))
+    index_of = {int(size): index for index, size in enumerate(sizes)}
+    slopes, variances, weights = [], [], []
+    for ratio in RATIOS:
+        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
+        if pairs:
+            low, high = np.array(pairs).T
+            local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
+            slopes.append(float(local.mean()))
+            variances.append(float(local.var()))
+            weight = np.zeros(sizes.size)
+            np.add.at(weight, low, 1.0 / (np.log(ratio) * low.size))
+            np.add.at(weight, high, -1.0 / (np.log(ratio) * low.size))
+            weights.append(weight)
+    if not slopes:
+        return Fit(np.nan, np.nan, np.zeros(sizes.size))
+    dimension, spread, share = weighted_mean(slopes, variances)
+    return Fit(dimension, spread, share @ np.array(weights))
+
+
+def weighted_mean(slopes: Sequence[float], variances: Sequence[float]) -> tuple[float, float, Array]:
+    """Average estimates by the inverse square of their variances; return mean, spread and shares."""
+    slope, variance = np.array(slopes), np.array(variances)
+    relative = (variance + TINY) / (variance + TINY).min()
+    share = relative**-2.0
+    share = share / share.sum()
+    mean = float(slope[0] + share @ (slope - slope[0]))
+    return mean, float(np.sqrt(share @ (variance + (slope - mean) ** 2))), share
+
+
+def deviations_of_95_percent(sizes: Array) -> float:
+    """Return how many standard deviations of the local slopes make 95 %: Student's t, of the sizes less 2."""
+    return float(stdtrit(max(sizes.size - 2, 1), 0.975))
+
+
+def ratio_slopes(sizes: Array, area: Array) -> tuple[Array, Array]:
+    """Return ln s and the local dimensions between sizes of the ratio 2 or 3, whichever vary less."""
+    index_of = {int(size): index for index, size in enumerate(sizes)}
+    best = np.zeros(0), np.zeros(0)
+    for ratio in RATIOS:
+        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
+        if not pairs or not np.all(area > 0):
+            continue
+        low, high = np.array(pairs).T
+        local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
+        if best[1].size < 2 or (local.size > 1 and local.var() < best[1].var()):
+            best = np.log(sizes[low]), local
+    return best
+
+
+def drift_of(slopes: tuple[Array, Array]) -> float:
+    """Return by how much the local slopes rise or fall over the window, as a straight line through them."""
+    x, y = slopes
+    if x.size < 3:
+        return 0.0
+    centred = x - x.mean()
+    return float(abs(centred @ (y - y.mean())) / (centred @ centred) * np.ptp(x))
+
+
+def steadiest_window(sizes: Array, area: Array, longest: float, shape: Sequence[int]) -> slice:
+    """Return the window of sizes of the fit: the usual one, or a steadier one of longer boxes.
+
+    The usual window reaches from one cell to the geometric mean of the cell and the extent. The counts of a
+    cluster that grew on the lattice rise too slowly at boxes of a few cells. Windows that hold sizes of a
+    ratio of at least 8, up to a quarter of the set (`longest`), are compared by the spread of their local
+    slopes over their length in ln s. The best replaces the usual one if it is steadier by far and its
+    dimension is higher: slopes that fall from 2 with the size are those of islands, which are resolved.
+    """
+    usual = default_sizes(shape).max()
+    count = int(np.searchsorted(sizes, max(longest, usual), side="right"))
+    chosen = slice(0, int(np.searchsorted(sizes, usual, side="right")))
+    first = fit_steady_ratio(sizes[chosen], area[chosen])
+    if not np.isfinite(first.dimension):
+        return chosen
+    lowest = STEADIER * _unsteadiness(sizes[chosen], first)
+    for stop in range(chosen.stop, count + 1):
+        for start in range(1, stop - LEAST_SIZES + 1):
+            part = slice(start, stop)
+            if sizes[stop - 1] < LEAST_RATIO * sizes[start]:
+                break
+            fit = fit_steady_ratio(sizes[part], area[part])
+            score = _unsteadiness(sizes[part], fit)
+            if score < lowest and fit.dimension > first.dimension:
+                chosen, lowest = part, score
+    return chosen
+
+
+def _unsteadiness(sizes: Array, fit: Fit) -> float:
+    return float(np.hypot(fit.spread, STEADY) / np.log(sizes[-1] / sizes[0])) if sizes.size > 1 else 0.0
+
+
 def dimension_variables(
-    planes: Planes, name: str, dimension: Array, half_width: Array, scales: Array
+    planes: Planes,
+    name: str,
+    dimension: Array,
+    half_width: Array,
+    scales: Array,
+    windows: Sequence[slice] | None = None,
 ) -> dict[str, Any]:
-    """Return a dimension, its interval and its window of scales; NaN in planes without a dimension."""
+    """Return a dimension, its interval and its window of scales; NaN in planes without a dimension.
+
+    A set in the plane has a dimension from 0 to 2: dimension and interval are limited to it. `windows` are
+    the scales used in each plane, all by default.
+    """
     has_value = np.isfinite(dimension)
+    used = [scales[window] for window in windows or [slice(0, scales.size)] * planes.count]
+    smallest, largest = (np.array([end(scale) for scale in used]) for end in (np.min, np.max))
     return {
-        name: planes.variable(dimension),
-        "ci_low": planes.variable(dimension - half_width),
-        "ci_high": planes.variable(dimension + half_width),
-        "scale_min": planes.variable(np.where(has_value, scales.min(), np.nan)),
-        "scale_max": planes.variable(np.where(has_value, scales.max(), np.nan)),
+        name: planes.variable(np.clip(dimension, 0.0, 2.0)),
+        "ci_low": planes.variable(np.clip(dimension - half_width, 0.0, 2.0)),
+        "ci_high": planes.variable(np.clip(dimension + half_width, 0.0, 2.0)),
+        "scale_min": planes.variable(np.where(has_value, smallest, np.nan)),
+        "scale_max": planes.variable(np.where(has_value, largest, np.nan)),
     }
 
 

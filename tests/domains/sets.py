@@ -1,5 +1,6 @@
 """Sets whose dimension is known, and masks made of them."""
 
+import numba
 import numpy as np
 import xarray as xr
 from scipy import ndimage
@@ -54,6 +55,42 @@ def percolating_cluster(n, rng):
         cluster = labels == np.bincount(labels.ravel())[1:].argmax() + 1
         if min(np.ptp(places) for places in np.nonzero(cluster)) > 0.9 * n:
             return cluster
+
+
+@numba.njit
+def _grow(cells, rng):
+    n = len(cells)
+    centre, radius = n // 2, 1.0
+    cells[centre, centre] = True
+    while radius < n // 2 - 12:
+        angle = 2 * np.pi * rng.random()
+        y = round(centre + (radius + 3) * np.sin(angle))
+        x = round(centre + (radius + 3) * np.cos(angle))
+        while True:
+            beyond = np.hypot(y - centre, x - centre) - radius
+            if beyond > 3 * radius + 20:
+                break
+            if beyond > 8:  # far away: jump to a circle that does not meet the cluster
+                angle = 2 * np.pi * rng.random()
+                y += round((beyond - 3) * np.sin(angle))
+                x += round((beyond - 3) * np.cos(angle))
+                continue
+            side = int(4 * rng.random())
+            y += (side == 0) - (side == 1)
+            x += (side == 2) - (side == 3)
+            if min(y, x) < 2 or max(y, x) >= n - 2:
+                break
+            if cells[y + 1, x] or cells[y - 1, x] or cells[y, x + 1] or cells[y, x - 1]:
+                cells[y, x] = True
+                radius = max(radius, np.hypot(y - centre, x - centre))
+                break
+
+
+def aggregate(n, rng):
+    """Return a cluster of diffusion-limited aggregation on the square lattice (D about 1.71)."""
+    cells = np.zeros((n, n), np.bool_)
+    _grow(cells, rng)
+    return cells
 
 
 def fractal_percolation(keep, ratio, levels, rng):

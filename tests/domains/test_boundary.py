@@ -3,7 +3,20 @@
 import numpy as np
 import pytest
 import xarray as xr
-from domains.sets import as_mask, level_set
+from domains.sets import (
+    DIMENSION,
+    GENERATORS,
+    aggregate,
+    as_mask,
+    fractal_percolation,
+    koch_raster,
+    lattice_set,
+    level_set,
+    percolating_cluster,
+    random_lattice_set,
+    random_null,
+    ratio_of,
+)
 
 import fractalcontact as fc
 
@@ -30,9 +43,11 @@ def differing_share(cells, valid, wraps, down, right):
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
 def test_dimension_and_sides_match_shifted_planes(wraps):
     rng = np.random.default_rng(1)
-    for shape in ((13, 17), (16, 9), (30, 31)):
+    for shape in ((26, 34), (32, 18), (30, 31)):
+        # blocks of cells, so that set and complement have an interior
+        blocks = np.kron(rng.random((6, 6)) < 0.4, np.ones((6, 6), bool))
         valid = rng.random(shape) < 0.9
-        cells = (rng.random(shape) < 0.4) & valid
+        cells = blocks[: shape[0], : shape[1]] & valid
         single, double = (
             np.array(
                 [differing_share(cells, valid, wraps, lag * down, lag * right) for down, right in OFFSETS]
@@ -49,6 +64,58 @@ def test_dimension_and_sides_match_shifted_planes(wraps):
         rows, columns = slice(None if wraps[0] else -1), slice(None if wraps[1] else -1)
         sides = (down & both_down)[rows].sum() + (right & both_right)[:, columns].sum()
         assert int(result.boundary_sides) == sides
+
+
+def sets_without_interior(n, rng):
+    """Yield sets whose interior is empty: the pairs of cells measure them, and not a boundary."""
+    for name in GENERATORS:
+        yield lattice_set(name, int(np.log(n) / np.log(ratio_of(name))))
+    yield koch_raster(n, rng)
+    yield percolating_cluster(n, rng)
+    yield aggregate(n, rng)
+    for ratio, keeps in ((2, (2, 3)), (3, (4, 6, 7, 8)), (4, (5, 8, 11, 14)), (5, (8, 13, 18, 22))):
+        for keep in keeps:
+            yield random_lattice_set(keep, ratio, int(np.log(n) / np.log(ratio)), rng)
+    for ratio, keep in ((2, 0.7), (2, 0.85), (3, 0.6)):
+        yield fractal_percolation(keep, ratio, int(np.log(n) / np.log(ratio)), rng)
+    yield random_null(n, n * n // 10, rng)
+
+
+def test_sets_without_interior_are_refused_with_the_reason():
+    assert DIMENSION["cantor_dust"] < 1.3  # measured as 2.7 from pairs at one and two steps
+    rng = np.random.default_rng(9)
+    for cells in sets_without_interior(300, rng):
+        for part in (cells, ~np.asarray(cells, bool)):
+            result = fc.domains.boundary_dimension(as_mask(part))
+            assert np.isnan(result.boundary_dimension)
+            assert np.isnan(result.ci_low)
+            assert np.isnan(result.scale_min)
+            assert "no interior" in result.boundary_dimension.attrs["comment"]
+            assert int(result.boundary_sides) > 0
+
+
+def test_sets_with_interior_are_measured_within_zero_and_two():
+    rng = np.random.default_rng(10)
+    planes = [brownian_level_set(192, h, rng, c) for h in (0.1, 0.3, 0.6, 0.9) for c in (0.5, 0.25)]
+    result = fc.domains.boundary_dimension(as_mask(np.array(planes)))
+    assert np.isfinite(result.boundary_dimension.values).all()
+    for name in ("boundary_dimension", "ci_low", "ci_high"):
+        assert result[name].min() >= 0
+        assert result[name].max() <= 2
+
+
+def test_unobserved_and_wrapping_cells_do_not_break_an_interior():
+    y, x = np.indices((96, 96))
+    disc = np.hypot(y - 48, x - 48) < 30
+    rng = np.random.default_rng(11)
+    valid = rng.random(disc.shape) < 0.8
+    gappy = fc.domains.boundary_dimension(as_mask(disc & valid), valid=as_mask(valid))
+    assert np.isfinite(gappy.boundary_dimension)
+    corner = np.roll(np.hypot(y - 48, x - 48) < 3, (48, 48), (0, 1))  # four pieces without a 3 x 3 block
+    pieces = [corner[:48, :48], corner[48:, :48]]
+    assert max(piece.sum() for piece in pieces) < 20
+    wrapped = fc.domains.boundary_dimension(as_mask(corner, periodic=(True, True)))
+    assert np.isfinite(wrapped.boundary_dimension)
 
 
 def test_boundary_sides_match_the_perimeter_of_islands():

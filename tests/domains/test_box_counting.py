@@ -6,6 +6,7 @@ import xarray as xr
 from domains.sets import (
     DIMENSION,
     GENERATORS,
+    aggregate,
     as_mask,
     fractal_percolation,
     koch_raster,
@@ -305,14 +306,71 @@ def test_unobserved_cells_change_the_dimension_little():
 
 
 def test_default_sizes_are_products_of_two_and_three():
-    for shape, sizes in (
-        ((1024, 1024), [1, 2, 3, 4, 6, 8, 9, 12, 16, 18, 24, 27, 32]),
-        ((250, 250), [1, 2, 3, 4, 6, 8, 9, 12]),
-        ((3, 100), [1, 2, 3]),
+    for shape, sizes, further in (
+        ((1024, 1024), [1, 2, 3, 4, 6, 8, 9, 12, 16, 18, 24, 27, 32], [48, 64, 96, 128, 192, 256]),
+        ((250, 250), [1, 2, 3, 4, 6, 8, 9, 12], [16, 24, 32, 48]),
+        ((3, 100), [1, 2, 3], []),
     ):
         mask = as_mask(np.zeros(shape))
-        assert fc.domains.box_dimension(mask).box_size.values.tolist() == sizes
+        assert fc.domains.box_dimension(mask).box_size.values.tolist() == sizes + further
         assert fc.domains.correlation_dimension(mask).box_size.values.tolist() == sizes
+
+
+def test_window_of_a_percolating_cluster_leaves_out_the_lattice():
+    # the counts of boxes of a few cells have the slope 1.31, far below 91/48
+    cells = percolating_cluster(512, np.random.default_rng(21))
+    result = fc.domains.box_dimension(as_mask(cells))
+    assert float(result.scale_min) > 2
+    assert float(result.scale_max) >= 8 * float(result.scale_min)
+    assert float(result.box_dimension) == pytest.approx(91 / 48, abs=0.07)
+    assert float(result.ci_low) <= 91 / 48 <= float(result.ci_high)
+    small = fc.domains.box_dimension(as_mask(cells), scales=[1, 2, 3, 4, 6, 8, 9, 12, 16, 18])
+    assert float(small.box_dimension) < 91 / 48 - 0.1
+    # the null of equal coverage is fitted in the same window
+    inside = (result.box_size >= result.scale_min) & (result.box_size <= result.scale_max)
+    steps = -np.diff(np.log(result.null_count[inside])) / np.diff(np.log(result.box_size[inside]))
+    assert steps.min() <= float(result.null_dimension) <= steps.max()
+
+
+@pytest.mark.slow
+def test_natural_clusters_are_within_a_twentieth():
+    errors = []
+    for seed in range(6):
+        cluster = percolating_cluster(1024, np.random.default_rng(seed))
+        errors.append(float(fc.domains.box_dimension(as_mask(cluster)).box_dimension) - 91 / 48)
+    assert abs(np.mean(errors)) <= 0.05
+    errors = []
+    for seed in range(3):
+        result = fc.domains.box_dimension(as_mask(aggregate(1024, np.random.default_rng(seed))))
+        errors.append(float(result.box_dimension) - 1.71)
+        assert float(result.ci_low) <= 1.71 <= float(result.ci_high)
+    assert abs(np.mean(errors)) <= 0.05
+
+
+def test_set_without_a_power_law_says_so():
+    islands = level_set(256, 0.8, 0.06, np.random.default_rng(22))  # resolved: slopes fall from 2
+    result = fc.domains.box_dimension(as_mask(np.array([islands, islands[::-1], islands > 1])))
+    assert result.follows_power_law.values.tolist() == [False, False, False]
+    assert "no power law in 2 of 3 planes: local slopes from" in result.box_dimension.comment
+    assert float(result.scale_min[0]) == 1
+    carpet = fc.domains.box_dimension(as_mask(lattice_set("carpet", 5)))
+    assert bool(carpet.follows_power_law)
+    assert "comment" not in carpet.box_dimension.attrs
+
+
+@pytest.mark.parametrize("cover", ["minimum", "mean", "aligned"])
+def test_intervals_stay_within_zero_and_two(cover):
+    rng = np.random.default_rng(23)
+    planes = np.array([random_null(100, count, rng) for count in (1, 3, 30, 1000, 9000, 9990)])
+    result = fc.domains.box_dimension(as_mask(planes), cover=cover)
+    for name in ("box_dimension", "ci_low", "ci_high"):
+        values = result[name].values[np.isfinite(result[name].values)]
+        assert values.size
+        assert (values >= 0).all()
+        assert (values <= 2).all()
+    assert bool(
+        (result.ci_low <= result.box_dimension).all() & (result.ci_high >= result.box_dimension).all()
+    )
 
 
 def test_chosen_scales_and_labels():

@@ -56,3 +56,17 @@ def test_one_scale_gives_no_slope():
 def test_scales_must_be_integers():
     with pytest.raises(ValueError, match="scales: expected integers, got 1.5"):
         fc.domains.correlation_dimension(as_mask(np.ones((5, 9))), scales=[1.5])
+
+
+def test_interval_stays_within_zero_and_two():
+    rng = np.random.default_rng(3)
+    planes = np.array([rng.random((81, 81)) < share for share in (2e-3, 0.02, 0.2, 0.9, 0.999)])
+    result = fc.domains.correlation_dimension(as_mask(planes))
+    for name in ("correlation_dimension", "ci_low", "ci_high"):
+        assert result[name].min() >= 0
+        assert result[name].max() <= 2
+    assert (result.ci_high == 2).any()  # limited: two and a half deviations reach beyond
+    lattice = np.zeros((48, 48))
+    lattice[::4, ::4] = 1  # the mass jumps from 1 to 4 and 9: slopes above 2
+    mask = as_mask(lattice, periodic=(True, True))
+    assert float(fc.domains.correlation_dimension(mask, scales=[6, 9, 10]).correlation_dimension) == 2.0
