@@ -21,6 +21,8 @@ from fractalcontact.surfaces._units import UNITS, in_metres
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
+# formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map
+FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "xyz")
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
 
@@ -31,7 +33,7 @@ class Reading:
     Attributes
     ----------
     heights : ndarray, shape (ny, nx) or (nx,)
-        In metres, the first row at the smallest y, NaN where missing.
+        In metres, rows as the reader library orders them, NaN where missing.
     spacing : tuple of float
         (y, x) in metres.
     periodic : bool
@@ -39,6 +41,8 @@ class Reading:
         The format is that of a microscope or a profiler.
     entries : dict
         For the provenance: what the file states, and the reader.
+    first_row : {"bottom", "top"}
+        Where the format has its first row.
     """
 
     heights: Array
@@ -46,6 +50,7 @@ class Reading:
     periodic: bool
     microscope: bool
     entries: dict[str, Any]
+    first_row: str
 
 
 def read_instrument(
@@ -93,7 +98,8 @@ def read_instrument(
         "reader": f"SurfaceTopography {_version()}",
         "reader_warnings": sorted({str(message.message) for message in messages}) or None,
     }
-    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, entries)
+    first_row = "bottom" if name in FROM_BOTTOM else "top"
+    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, entries, first_row)
 
 
 @contextmanager

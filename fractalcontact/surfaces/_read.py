@@ -46,14 +46,14 @@ def _check(problems: Problems, *, path: Any, channel: Any, units: Any, spacing: 
     if spacing is not None:
         check_spacing(problems, spacing)
     problems.choice("units", units, UNITS, optional=True)
-    problems.choice("first_row", first_row, ("bottom", "top"))
+    problems.choice("first_row", first_row, ("bottom", "top"), optional=True)
     if not problems.path("path", path):
         return
     source = Path(path)
     problems.require(source.is_file(), "path", "an existing file", source.name)
     if file_suffix(source) in NETCDF:
         expected = "'bottom' for a NetCDF file, which has its y"
-        problems.require(first_row == "bottom", "first_row", expected, first_row)
+        problems.require(first_row in (None, "bottom"), "first_row", expected, first_row)
         problems.require(
             channel is None or isinstance(channel, str), "channel", "the name of a variable", channel
         )
@@ -71,7 +71,7 @@ def read(
     channel: str | int | None = None,
     units: str | None = None,
     spacing: float | Sequence[float] | None = None,
-    first_row: str = "bottom",
+    first_row: str | None = None,
 ) -> xr.DataArray:
     """Read a measured surface from a file.
 
@@ -88,9 +88,10 @@ def read(
         tables. A unit other than that of the file replaces it, with a warning.
     spacing : float, or (y, x), optional
         Distance between points in metres; replaces that of the file.
-    first_row : {"bottom", "top"}
-        Whether the first row of the file has the smallest y, or is the top of an image, which is flipped.
-        NetCDF files have their own y.
+    first_row : {"bottom", "top"}, optional
+        Whether the first row of the file has the smallest y, or is the top of the map, which is flipped.
+        Default: "top" for an instrument's file (its reader orders the rows as an image), "bottom" for `.npy`,
+        tables and points. NetCDF files have their own y.
 
     Returns
     -------
@@ -149,7 +150,7 @@ def file_content(
     channel: str | int | None = None,
     units: str | None = None,
     spacing: Any = None,
-    first_row: str = "bottom",
+    first_row: str | None = None,
 ) -> FileContent:
     """Read a file with the reader of its format."""
     suffix = file_suffix(path)
@@ -161,7 +162,7 @@ def file_content(
 
 
 def _table_content(
-    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str
+    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
 ) -> FileContent:
     """Read an array of numbers.
 
@@ -197,13 +198,13 @@ def _table_content(
     return FileContent(heights, {"stated_unit": None})
 
 
-def _from_bottom(values: Array, first_row: str) -> Array:
+def _from_bottom(values: Array, first_row: str | None) -> Array:
     """Return heights with the first row at the smallest y."""
     return values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
 
 
 def _instrument_content(
-    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str
+    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
 ) -> FileContent:
     # SurfaceTopography is optional and slow to import
     from fractalcontact.surfaces._instruments import read_instrument
@@ -216,8 +217,9 @@ def _instrument_content(
             raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
         raise
     periodic = (reading.periodic,) * len(reading.spacing)
-    heights = surface_array(_from_bottom(reading.heights, first_row), reading.spacing, periodic)
-    return FileContent(heights, reading.entries, reading.microscope)
+    row = first_row or reading.first_row
+    heights = surface_array(_from_bottom(reading.heights, row), reading.spacing, periodic)
+    return FileContent(heights, reading.entries | {"first_row": row}, reading.microscope)
 
 
 def _netcdf_content(path: Path, channel: Any, units: str | None, spacing: Any) -> FileContent:

@@ -207,20 +207,51 @@ def test_instrument_files(measured, name):
 def test_orientation_of_a_microscope_scan(measured):
     pytest.importorskip("SurfaceTopography")
     surface = fc.surfaces.read(measured / "instruments" / "di-3.di")
-    reference = fc.surfaces.read(measured / "afm_10um_di3.npy", spacing=3.90625e-8)
+    image = np.load(measured / "afm_10um_di3.npy")  # the first row is the top
+    np.testing.assert_allclose(surface.values, image[::-1], rtol=1e-15)
+    reference = fc.surfaces.read(measured / "afm_10um_di3.npy", spacing=3.90625e-8, first_row="top")
     np.testing.assert_allclose(surface.values, reference.values, rtol=1e-15)
-    assert np.abs(surface.values - reference.values.T).max() > 1e-8
 
 
-def test_instrument_file_is_flipped_on_request_only(tmp_path):
+TEXT = "# Channel: Height\n# Width: 4 um\n# Height: 3 um\n# Value units: nm\n"
+
+
+def test_first_row_of_an_instrument_file_is_the_top(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    text = "# Channel: Height\n# Width: 4 um\n# Height: 3 um\n# Value units: nm\n"
-    (tmp_path / "a.asc").write_text(text + "1 2 3 4\n5 6 7 8\n9 10 11 13\n")
-    plain, flipped = (fc.surfaces.read(tmp_path / "a.asc", first_row=row) for row in ("bottom", "top"))
-    assert plain.shape == (3, 4)
-    np.testing.assert_array_equal(flipped.values, plain.values[::-1])
-    np.testing.assert_array_equal(flipped.y, plain.y)
-    assert provenance(flipped)["parameters"]["first_row"] == "top"
+    (tmp_path / "a.asc").write_text(TEXT + "1 2 3 4\n5 6 7 8\n9 10 11 13\n")
+    default, bottom, top = (
+        fc.surfaces.read(tmp_path / "a.asc", first_row=row) for row in (None, "bottom", "top")
+    )
+    assert default.sel(y=default.y.max()).values == pytest.approx([1e-9, 2e-9, 3e-9, 4e-9])
+    np.testing.assert_array_equal(default.values, top.values)
+    np.testing.assert_array_equal(bottom.values, top.values[::-1])
+    np.testing.assert_array_equal(bottom.y, top.y)
+    assert provenance(top)["parameters"]["first_row"] == "top"
+    assert (provenance(default)["first_row"], provenance(bottom)["first_row"]) == ("top", "bottom")
+
+
+def test_azimuth_of_grooves_in_an_instrument_file(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    y, x = np.indices((48, 48))
+    up = (47 - y) * np.sin(np.radians(30)) + x * np.cos(np.radians(30))  # as the image shows it
+    across = up * 2 * np.pi / 6 + 0.05 * np.random.default_rng(1).standard_normal((48, 48))
+    rows = "\n".join(" ".join(f"{v:.6f}" for v in row) for row in 9 * np.cos(across))
+    (tmp_path / "a.asc").write_text(TEXT.replace("4 um", "48 um").replace("3 um", "48 um") + rows)
+    surface = fc.surfaces.read(tmp_path / "a.asc")
+    power = np.abs(np.fft.rfft2(surface.values - surface.values.mean())) ** 2
+    row, column = np.unravel_index(power.argmax(), power.shape)
+    azimuth = np.degrees(np.arctan2(np.fft.fftfreq(48)[row], np.fft.rfftfreq(48)[column]))
+    assert azimuth == pytest.approx(30, abs=4)  # of the waves; -30 if the map were upside down
+
+
+def test_rows_of_points_and_arrays_are_not_flipped(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    points = [f"{x} {y} {10 * y + x}" for y in range(4) for x in range(5)]
+    (tmp_path / "a.xyz").write_text("\n".join(points))
+    surface = fc.surfaces.read(tmp_path / "a.xyz", units="um", spacing=1e-6)
+    np.testing.assert_allclose(surface.values[0], np.arange(5) * 1e-6)
+    np.save(tmp_path / "a.npy", HEIGHTS)
+    np.testing.assert_array_equal(fc.surfaces.read(tmp_path / "a.npy", spacing=1e-6).values, HEIGHTS)
 
 
 def test_netcdf_is_never_flipped(tmp_path):
@@ -256,7 +287,7 @@ def test_phases_need_a_unit(measured):
     surface = fc.surfaces.read(path, units="m")
     assert surface.shape == (305, 75)
     first = np.array(gzip.decompress(path.read_bytes()).decode().splitlines()[4].split(), dtype=float)
-    np.testing.assert_allclose(surface.values[0], first * 2.91818e-8, rtol=1e-12)
+    np.testing.assert_allclose(surface.values[-1], first * 2.91818e-8, rtol=1e-12)
 
 
 def test_corrupt_file_has_a_short_message(measured):
