@@ -2,139 +2,268 @@
 
 At the nodes in contact the traction q = (q_x, q_y) minimises
 
-    f(q) = q K q / 2 + q s0,    |q| <= mu p,    sum q = Q,                                         (1)
+    f(q) = q K q / 2 + q s0,    |q| <= b = mu p,    sum q = Q,                                     (1)
 
 s0 the slip before the step. That is one implicit step of Coulomb's law: with the displacement delta of the
 upper body, the multiplier of the sum, the gradient g = K q + s0 - delta is zero where the surfaces stick, and
--g, the slip in this step and before, is parallel to q where they slip. The minimum is unique.
+-g, the slip of the step, is parallel to q where they slip. The minimum is unique. The residual is
 
-Each iteration takes a projected step along the gradient, which finds the nodes that slip, and a step of
-Newton's method for these (Bertsekas 1982): a sticking node is free, a slipping one moves along its circle,
-whose curvature adds the multiplier |g|/|q|. The system is solved by preconditioned conjugate gradients.
+    sum (g q + b |g|),                                                                             (2)
+
+the gap between (1) and its dual, which bounds the error of f; it is zero for the solution only.
+
+Each iteration is a step of Newton's method on the sets of sticking and slipping nodes of the last one, a
+semismooth Newton method or primal-dual active set (Hintermueller, Ito and Kunisch 2003, SIAM J. Optim.
+13:865; for friction Alart and Curnier 1991, Comput. Methods Appl. Mech. Eng. 92:353):
+
+    (3)  sticking nodes are free, slipping ones move along their circle, which adds the compliance |g|/b;
+         the linear system is solved by conjugate gradients, only as well as the step deserves
+    (4)  a node slips next if q - g/(compliance of a node) is outside of its circle
+    (5)  traction beyond the circles is put back on them; a constant times b restores the sum
+
+It starts from the superposition, whose sets are nearly right, and takes four or five iterations with two or
+three conjugate gradients each. Where a step of (3) does not lower f or the residual, a quarter of it is
+taken, and in the end a projected step along the gradient, which always lowers f.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.base import fft
+from fractalcontact.base.schema import SLIP, STICK
+from fractalcontact.contact._load_path import Step
+from fractalcontact.contact._tangential_operator import (
+    LOCAL_STIFFNESS,
+    TangentialOperator,
+    TangentialPreconditioner,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MAX_ITERATIONS = 60
-MAX_INNER = 60
+MAX_ITERATIONS = 100
+MAX_INNER = 40
 AT_BOUND = 1e-12  # relative distance from the circle at which a node is on it
-FORCING = 0.2  # reduction of the residual of the Newton system in each iteration
-STIFFNESS_FORCING = 0.001  # the same for the stiffness, whose error is its square
-BIN, DECAY, FADE = 4, 0.65, 0.04  # of the extension, as in `_preconditioner`
-STIFF = 1.0  # spacings over the modulus: a node of more curvature is left out of the extension
-OWN = 1.1  # displacement of a node under unit traction on itself alone, roughly
-
-
-class TangentialOperator:
-    """Periodic bodies: displacement (2, ny, nx) from traction, on the nodes in contact.
-
-    For a contact modulus of 1 the modes are 2/|k| along the wave vector k and 2/((1 - nu)|k|) across it.
-    """
-
-    def __init__(self, contact: Array, spacing: tuple[float, float], poisson: float) -> None:
-        self.shape = (contact.shape[0], contact.shape[1])
-        self.nodes, self.spacing = np.flatnonzero(contact), spacing
-        ky = fft.wavenumbers(self.shape[0], spacing[0])[:, None]
-        kx = fft.wavenumbers(self.shape[1], spacing[1], real=True)[None, :]
-        k2 = kx**2 + ky**2
-        k2[0, 0] = 1.0
-        product = kx * ky
-        for axis, n in enumerate(self.shape):  # the highest mode has no sign: no coupling there
-            if n % 2 == 0:
-                product[(slice(None), -1) if axis else (n // 2, slice(None))] = 0.0
-        excess = poisson / (1 - poisson)
-        k = np.sqrt(k2)
-        self.symbol = (
-            2 / k * (1 + excess * ky**2 / k2),
-            2 / k * (1 + excess * kx**2 / k2),
-            -2 / k * excess * product / k2,
-        )
-        determinant = self.symbol[0] * self.symbol[1] - self.symbol[2] ** 2
-        self.inverse = (
-            self.symbol[1] / determinant,
-            self.symbol[0] / determinant,
-            -self.symbol[2] / determinant,
-        )
-        for table in self.symbol:
-            table[0, 0] = 0.0
-        extent = float(np.sqrt(self.shape[0] * spacing[0] * self.shape[1] * spacing[1]))
-        for table, mean in zip(self.inverse, (1 / extent, 1 / extent, 0.0), strict=True):
-            table[0, 0] = mean
-        self.transforms = 0
-
-    def apply(self, q: Array) -> Array:
-        """Return the displacement (2, nodes) under a traction (2, nodes), without its mean on the plane."""
-        planes = np.zeros((2, self.shape[0] * self.shape[1]))
-        planes[:, self.nodes] = q
-        u = self.multiply(planes.reshape(2, *self.shape), self.symbol)
-        return np.asarray(u.reshape(2, -1)[:, self.nodes])
-
-    def multiply(self, planes: Array, symbol: tuple[Array, Array, Array]) -> Array:
-        """Return planes (2, ny, nx) with their modes times a symbol (xx, yy, xy)."""
-        self.transforms += 2
-        x, y = (fft.rfft2(plane) for plane in planes)
-        xx, yy, xy = symbol
-        return np.stack([fft.irfft2(xx * x + xy * y, self.shape), fft.irfft2(xy * x + yy * y, self.shape)])
+FORCING = 0.1  # greatest reduction of the residual that (3) is solved to
+FORCING_GROWTH = 100.0  # and over the residual, so that the iteration converges faster than linearly
+LAST_SHARE = 0.3  # of the tolerance, beyond which (3) is not solved
+MAX_CUTS = 3
+STIFFNESS_FORCING = 0.01  # reduction of the error of the stiffness, which is the square of this
+PARALLEL = 1e-12  # relative determinant from which all slipping nodes move along one line
 
 
 @dataclass
 class CoulombState:
-    """A step: traction, displacement of the surface, gradient (2, nodes), displacement of the upper body."""
+    """Traction q and displacement u of the surface (2, nodes), that of the upper body, and what they miss."""
 
     q: Array
     u: Array
     g: Array
+    slips: Array
     displacement: Array
+    objective: float
     residual: float
-    iterations: int
-    converged: bool
+    iterations: int = 0
+    converged: bool = False
+
+    @property
+    def direction(self) -> Array:
+        """Direction of the traction where it slips, zero where it sticks."""
+        return np.where(self.slips, self.q / np.where(self.slips, np.hypot(*self.q), 1.0), 0.0)
+
+    @property
+    def compliance(self) -> Array:
+        """The compliance |g|/b that a circle adds across the traction (3)."""
+        outward = -np.sum(self.g * self.direction, axis=0)
+        return np.where(self.slips, outward / np.where(self.slips, np.hypot(*self.q), 1.0), 0.0)
 
     @property
     def slip(self) -> Array:
-        """Slip since the start of the path."""
-        return self.displacement[:, None] - self.u
+        """Slip in the step: exactly zero where it sticks, and nowhere against the traction."""
+        return np.where(self.slips, -self.g, 0.0)
 
 
-def coulomb_step(
-    operator: TangentialOperator,
-    bound: Array,
-    slip: Array,
-    force: Array,
-    start: Array,
-    scale: float,
-    tolerance: float,
-) -> CoulombState:
-    """Minimise (1) from `start`; the residual is the duality gap over `scale`."""
-    q = project(start, bound, force)
-    u = operator.apply(q)
-    length = 1.0  # of the gradient step, adapted
-    for iteration in range(MAX_ITERATIONS + 1):
-        delta = multiplier(q, u + slip, bound)
-        g = u + slip - delta[:, None]
-        residual = float(np.sum(g * q) + np.sum(bound * np.hypot(*g))) / scale
-        if residual <= tolerance or iteration == MAX_ITERATIONS:
-            break
-        q, u, length = gradient_step(operator, q, u, g, bound, force, length)
-        delta = multiplier(q, u + slip, bound)
-        q, u = newton_step(operator, q, u, slip, u + slip - delta[:, None], bound, force)
-    return CoulombState(q, u, g, delta, residual, iteration, residual <= tolerance)
+class CoulombSolver:
+    """Solves (1) step by step on one contact; residuals are (2) over `scale`."""
+
+    def __init__(self, operator: TangentialOperator, bound: Array, scale: float, tolerance: float) -> None:
+        self.operator, self.bound, self.scale, self.tolerance = operator, bound, scale, tolerance
+        self.node_stiffness = LOCAL_STIFFNESS / float(np.sqrt(operator.body.cell_area))
+
+    def step(self, slip: Array, force: Array, start: Array) -> CoulombState:
+        """Minimise (1) with the slip before the step, from a traction `start`."""
+        q = project(start, self.bound, force)
+        state, length, iterations = self.evaluate(q, self.operator.apply(q), slip), self.node_stiffness, 0
+        for _ in range(MAX_ITERATIONS):
+            if state.residual <= self.tolerance:
+                break
+            better, inner = self.newton_step(state, slip, force)
+            iterations += inner
+            if better is None:
+                better, length = self.gradient_step(state, slip, force, length)
+            state = better
+        state.iterations, state.converged = iterations, state.residual <= self.tolerance
+        return state
+
+    def evaluate(self, q: Array, u: Array, slip: Array) -> CoulombState:
+        """Return the state of a traction that meets the bounds, with its sets and residual."""
+        v = u + slip
+        size = np.hypot(*q)
+        on_circle = size >= self.bound * (1 - AT_BOUND)
+        slips = on_circle
+        for _ in range(2):  # a node on its circle that is drawn inwards sticks
+            direction = np.where(slips, q / np.where(slips, size, 1.0), 0.0)
+            displacement = multiplier(v, self.bound, direction)
+            g = v - displacement[:, None]
+            slips = on_circle & (np.sum(g * q, axis=0) < 0)
+        residual = float(np.sum(g * q) + np.sum(self.bound * np.hypot(*g))) / self.scale
+        objective = float(np.sum(q * (u / 2 + slip)))
+        return CoulombState(q, u, g, slips, displacement, objective, residual)
+
+    def newton_step(self, state: CoulombState, slip: Array, force: Array) -> tuple[CoulombState | None, int]:
+        """Take a step of (3) to (5); None if no share of it is better. Also the conjugate gradients."""
+        forcing = min(FORCING, FORCING_GROWTH * state.residual)
+        goal = max(forcing * state.residual, LAST_SHARE * self.tolerance) * self.scale
+        direction = state.direction
+        system = TangentSystem(self.operator, direction, state.compliance)
+        d, moved, inner = system.solve(-state.g, np.eye(2), lambda r, _: self.size(r) <= goal)
+        share = 1.0
+        for _ in range(MAX_CUTS + 1):
+            y, v = state.q + share * d, state.u + slip + share * moved
+            g = v - multiplier(v, self.bound, direction)[:, None]
+            z = y - self.node_stiffness * g
+            size = np.hypot(*z)
+            slips = size > self.bound  # (4)
+            y = np.where(slips & ~state.slips, z * (self.bound / np.where(slips, size, 1.0)), y)
+            q = restore_sum(y, self.bound, force, slips)  # (5)
+            if q is not None:
+                trial = self.evaluate(q, self.operator.apply(q), slip)
+                lower = trial.objective < state.objective - 1e-14 * abs(state.objective)
+                if lower or trial.residual < state.residual:
+                    return trial, inner
+            share /= 4
+        return None, inner
+
+    def size(self, r: Array) -> float:
+        """Return the part of the residual that an error r of the displacement makes."""
+        return float(np.sum(self.bound * np.hypot(*r)))
+
+    def gradient_step(
+        self, state: CoulombState, slip: Array, force: Array, length: float
+    ) -> tuple[CoulombState, float]:
+        """Take a projected step along -g, with the length that minimises (1) along it."""
+        t = project(state.q - length * state.g, self.bound, force) - state.q
+        ut = self.operator.apply(t)
+        slope, curvature = float(np.sum(t * state.g)), float(np.sum(t * ut))
+        best = -slope / curvature if curvature > 0 else 1.0
+        share = min(max(best, 0.0), 1.0)
+        trial = self.evaluate(state.q + share * t, state.u + share * ut, slip)
+        return trial, length * min(max(best, 0.2), 4.0)
+
+    def stiffness(self, state: CoulombState, unit: Array) -> float:
+        """Return the increment of force along `unit` over that of displacement, without force across.
+
+        The sticking nodes move as one, and the slipping ones along their circles.
+        """
+        system = TangentSystem(self.operator, state.direction, state.compliance)
+        across = np.array([[-unit[1]], [unit[0]]])
+        right = unit[:, None] * np.ones_like(state.q)
+        d, _, _ = system.solve(right, across, lambda _, fall: fall <= STIFFNESS_FORCING)
+        return float(d.sum(1) @ unit)
 
 
-def multiplier(q: Array, v: Array, bound: Array) -> Array:
-    """Return the displacement of the upper body: that of the sticking nodes, weighted by their bound."""
-    free = np.hypot(*q) < bound * (1 - AT_BOUND)
-    if free.any():
-        return np.asarray((v[:, free] * bound[free]).sum(1) / bound[free].sum())
-    return np.asarray(v.mean(1))
+class TangentSystem:
+    """K + C on the changes of traction across `direction` where it is not zero, and on all others."""
+
+    def __init__(self, operator: TangentialOperator, direction: Array, compliance: Array) -> None:
+        self.operator, self.direction, self.compliance = operator, direction, compliance
+        self.preconditioner = TangentialPreconditioner(operator, direction, compliance)
+
+    def solve(self, right: Array, fixed: Array, is_solved: Any) -> tuple[Array, Array, int]:
+        """Solve (K + C) d = right by conjugate gradients; return d, K d and the iterations.
+
+        The columns of `fixed` (2, n) are the directions in which the sum of d is zero. Stops once
+        `is_solved(r, fall)`, with the residual r and its fall in the norm of the preconditioner.
+        """
+        direction, operator = self.direction, self.operator
+        gram = np.eye(2) * direction.shape[1] - _products(direction, direction)
+        inverse = fixed @ np.linalg.pinv(fixed.T @ gram @ fixed) @ fixed.T
+
+        def project_out(v: Array) -> Array:
+            v = v - direction * np.sum(direction * v, axis=0)
+            c = (inverse @ v.sum(1))[:, None]
+            return np.asarray(v - (c - direction * np.sum(direction * c, axis=0)))
+
+        d, moved = np.zeros_like(right), np.zeros_like(right)
+        r = project_out(right)
+        z = project_out(self.preconditioner.apply(r))
+        t, rz = z, float(np.sum(r * z))
+        first = rz
+        for iteration in range(MAX_INNER):
+            if rz <= 0:
+                return d, moved, iteration
+            kt = operator.apply(t)
+            ht = project_out(kt + self.compliance * t)
+            tau = rz / float(np.sum(t * ht))
+            d += tau * t
+            moved += tau * kt
+            r = r - tau * ht
+            if is_solved(r, math.inf):
+                return d, moved, iteration + 1
+            z = project_out(self.preconditioner.apply(r))
+            rz, old = float(np.sum(r * z)), rz
+            if is_solved(r, math.sqrt(max(rz, 0.0) / first)):
+                return d, moved, iteration + 1
+            t = z + rz / old * t
+        return d, moved, MAX_INNER
+
+
+def multiplier(v: Array, bound: Array, direction: Array) -> Array:
+    """Return the displacement delta that v should have where nodes stick, and across the slipping ones.
+
+    The mean weighted by the bound. Where all slip along one line, the displacement along it is the greatest
+    of the nodes, so that all of them slip forward.
+    """
+    gram = np.eye(2) * bound.sum() - _products(direction * bound, direction)
+    right = (bound * (v - direction * np.sum(direction * v, axis=0))).sum(1)
+    if np.linalg.det(gram) > PARALLEL * bound.sum() ** 2:
+        return np.asarray(np.linalg.solve(gram, right))
+    line = direction.sum(1) / np.hypot(*direction.sum(1))
+    across = np.array([-line[1], line[0]])
+    mean = float((bound * (across @ v)).sum() / bound.sum())
+    return np.asarray(line * float((line @ v).max()) + across * mean)
+
+
+def restore_sum(y: Array, bound: Array, force: Array, slips: Array) -> Array | None:
+    """Return traction on the circles where it slips and inside elsewhere, with the sum `force` (5).
+
+    y + b c, put on the circles or clipped to them, c after Newton; None where there is no such c near zero.
+    """
+    c = np.zeros(2)
+    y = y / bound
+    goal = 1e-15 * float(bound.sum())
+    for _ in range(20):
+        x = y + c[:, None]
+        size = np.hypot(*x)
+        on_circle = slips | (size > 1)
+        factor = bound / np.where(on_circle & (size > 0), size, 1.0)
+        q = factor * x
+        miss = q.sum(1) - force
+        if np.abs(miss).max() <= goal:
+            return np.asarray(q)
+        unit = np.where(on_circle & (size > 0), x / np.where(size > 0, size, 1.0), 0.0)
+        jacobian = np.eye(2) * factor.sum() - _products(factor * unit, unit)
+        if not np.linalg.det(jacobian) > PARALLEL * bound.sum() ** 2:
+            return None
+        c = c - np.linalg.solve(jacobian, miss)
+        if not np.abs(c).max() < 1:
+            return None
+    return np.asarray(q) if np.abs(miss).max() <= 1e3 * goal else None
 
 
 def project(y: Array, bound: Array, force: Array) -> Array:
@@ -181,169 +310,61 @@ def _products(a: Array, b: Array) -> Array:
     return np.array([[np.sum(row * column) for column in b] for row in a])
 
 
-def gradient_step(
+def empty_maps(names: Sequence[str], shape: tuple[int, ...]) -> dict[str, Array]:
+    """Return the maps named, without any contact."""
+    return {name: np.zeros(shape, np.int8 if name == "slip_state" else np.float64) for name in names}
+
+
+def coulomb_path(
+    normal: Step,
     operator: TangentialOperator,
-    q: Array,
-    u: Array,
-    g: Array,
-    bound: Array,
-    force: Array,
-    length: float,
-) -> tuple[Array, Array, float]:
-    """Take a projected step along -g with the length that minimises (1) along it, if it falls."""
-    t = project(q - length * g, bound, force) - q
-    slope = float(np.sum(t * g))
-    if not slope < 0:
-        return q, u, length
-    ut = operator.apply(t)
-    curvature = float(np.sum(t * ut))
-    best = -slope / curvature if curvature > 0 else 1.0
-    share = min(best, 1.0)
-    return q + share * t, u + share * ut, length * min(max(best, 0.2), 4.0)
+    forces: Array,
+    starts: Array,
+    friction: float,
+    unit: Array,
+    columns: dict[str, Array],
+    maps: dict[str, Array],
+) -> None:
+    """Solve a path of tangential forces (N) along `unit` and write its columns and maps (step, ny, nx).
 
-
-def newton_step(
-    operator: TangentialOperator, q: Array, u: Array, slip: Array, g: Array, bound: Array, force: Array
-) -> tuple[Array, Array]:
-    """Take a Newton step on the sticking nodes and along the circles of the slipping ones."""
-    unit, curvature = face(q, g, bound)
-    preconditioner = TangentialPreconditioner(operator, unit, curvature)
-    tangent = TangentSpace(unit)
-    d = conjugate_gradients(operator, preconditioner, tangent, curvature, -g, FORCING)
-    value = float(np.sum(q * (u / 2 + slip)))
-    step = 1.0
-    for _ in range(6):
-        trial = project(q + step * d, bound, force)
-        ut = operator.apply(trial)
-        if float(np.sum(trial * (ut / 2 + slip))) <= value + 1e-15 * abs(value):
-            return trial, ut
-        step /= 4
-    return q, u
-
-
-def face(q: Array, g: Array, bound: Array) -> tuple[Array, Array]:
-    """Return the direction of the traction at the slipping nodes, zero at the others, and the curvature."""
-    size = np.hypot(*q)
-    outward = -np.sum(g * q, axis=0)
-    slips = (size >= bound * (1 - AT_BOUND)) & (outward >= 0)
-    size = np.where(size > 0, size, 1.0)
-    return np.where(slips, q / size, 0.0), np.where(slips, outward / size**2, 0.0)
-
-
-def stiffness(operator: TangentialOperator, state: CoulombState, bound: Array, unit: Array) -> float:
-    """Return the increment of force along `unit` over that of displacement, scaled: without force across."""
-    direction, curvature = face(state.q, state.g, bound)
-    preconditioner = TangentialPreconditioner(operator, direction, curvature)
-    tangent = TangentSpace(direction, zero_sum=False)
-    forces = np.empty((2, 2))
-    for axis in (0, 1):
-        right = np.zeros_like(state.q)
-        right[axis] = 1.0
-        d = conjugate_gradients(operator, preconditioner, tangent, curvature, right, STIFFNESS_FORCING)
-        forces[:, axis] = d.sum(1)
-    return float(1 / (unit @ np.linalg.solve((forces + forces.T) / 2, unit)))
-
-
-class TangentialPreconditioner:
-    """The inverse of the operator between smooth extensions of the displacement (see `_preconditioner`).
-
-    Each component has its set of free nodes. Outside of it the displacement is extended by its mean over the
-    set, weighted by a Poisson kernel. Slipping nodes that curvature makes stiff are left out: they have the
-    inverse of their own stiffness. Without that the iterations were five times as many.
+    `starts` (step, nodes) is the traction along `unit` to start from, in Pa; `columns` are those of the
+    solutions that it took, to which the work of this method is added.
     """
-
-    def __init__(self, operator: TangentialOperator, unit: Array, curvature: Array) -> None:
-        self.operator = operator
-        free = (unit**2 < 0.5) & (curvature < STIFF)
-        self.diagonal = np.where(curvature < STIFF, 0.0, 1 / (curvature + OWN))
-        shape, self.nodes = operator.shape, operator.nodes
-        self.edges = tuple(1 << (max(1, min(BIN, n // 8)).bit_length() - 1) for n in shape)
-        self.padded = tuple(-(-n // edge) * edge for n, edge in zip(shape, self.edges, strict=True))
-        self.bins = tuple(n // edge for n, edge in zip(self.padded, self.edges, strict=True))
-        spacing = (operator.spacing[0] * self.edges[0], operator.spacing[1] * self.edges[1])
-        k = np.hypot(
-            fft.wavenumbers(self.bins[0], spacing[0])[:, None],
-            fft.wavenumbers(self.bins[1], spacing[1], real=True)[None, :],
-        )
-        self.kernel = np.exp(-DECAY * np.sqrt(spacing[0] * spacing[1]) * k)
-        self.free = np.zeros((2, shape[0] * shape[1]), dtype=bool)
-        self.free[:, self.nodes] = free
-        self.free = self.free.reshape(2, *shape)
-        counts = [self.smooth(self.sum_bins(plane.astype(np.float64))) for plane in self.free]
-        cells = self.edges[0] * self.edges[1]
-        self.weights = [1 / (np.maximum(count, 0) + FADE * cells) for count in counts]
-
-    def sum_bins(self, plane: Array) -> Array:
-        """Sum a plane over the bins."""
-        padded = np.zeros(self.padded)
-        padded[: plane.shape[0], : plane.shape[1]] = plane
-        blocks = padded.reshape(self.bins[0], self.edges[0], self.bins[1], self.edges[1])
-        return np.asarray(blocks.sum(axis=(1, 3)))
-
-    def spread(self, bins: Array) -> Array:
-        """Give every node the value of its bin."""
-        wide = np.repeat(np.repeat(bins, self.edges[0], axis=0), self.edges[1], axis=1)
-        return np.asarray(wide[: self.operator.shape[0], : self.operator.shape[1]])
-
-    def smooth(self, bins: Array) -> Array:
-        """Apply the Poisson kernel."""
-        return fft.irfft2(fft.rfft2(bins) * self.kernel, self.bins)
-
-    def apply(self, r: Array) -> Array:
-        """Return nearly the traction (2, nodes) that causes the displacement r."""
-        planes = np.zeros((2, self.operator.shape[0] * self.operator.shape[1]))
-        planes[:, self.nodes] = r
-        planes = planes.reshape(2, *self.operator.shape)
-        wide = []
-        for plane, free, weight in zip(planes, self.free, self.weights, strict=True):
-            inside = np.where(free, plane, 0.0)
-            outside = self.spread(weight * self.smooth(self.sum_bins(inside)))
-            wide.append(np.where(free, plane, outside))
-        q = self.operator.multiply(np.stack(wide), self.operator.inverse)
-        out = []
-        for plane, free, weight in zip(q, self.free, self.weights, strict=True):
-            back = self.spread(self.smooth(weight * self.sum_bins(np.where(free, 0.0, plane))))
-            out.append(np.where(free, plane + back, 0.0).reshape(-1)[self.nodes])
-        return np.asarray(np.stack(out) + self.diagonal * r)
-
-
-class TangentSpace:
-    """Changes of traction normal to `unit` at the slipping nodes; their sum is zero with `zero_sum`."""
-
-    def __init__(self, unit: Array, *, zero_sum: bool = True) -> None:
-        self.unit = unit
-        gram = np.eye(2) * unit.shape[1] - _products(unit, unit)
-        self.inverse = np.linalg.pinv(gram) if zero_sum else np.zeros((2, 2))
-
-    def project(self, v: Array) -> Array:
-        """Return the nearest change in the space."""
-        v = v - self.unit * np.sum(self.unit * v, axis=0)
-        c = (self.inverse @ v.sum(1))[:, None]
-        return np.asarray(v - (c - self.unit * np.sum(self.unit * c, axis=0)))
-
-
-def conjugate_gradients(
-    operator: TangentialOperator,
-    preconditioner: TangentialPreconditioner,
-    tangent: TangentSpace,
-    curvature: Array,
-    right: Array,
-    forcing: float,
-) -> Array:
-    """Solve (K + curvature) d = right in the tangent space, loosely."""
-    d = np.zeros_like(right)
-    r = tangent.project(right)
-    z = tangent.project(preconditioner.apply(r))
-    t, rz = z.copy(), float(np.sum(r * z))
-    goal = forcing**2 * rz
-    for _ in range(MAX_INNER):
-        if not rz > goal or rz <= 0:
-            break
-        ht = tangent.project(operator.apply(t) + curvature * t)
-        tau = rz / float(np.sum(t * ht))
-        d += tau * t
-        r -= tau * ht
-        z = tangent.project(preconditioner.apply(r))
-        rz, old = float(np.sum(r * z)), rz
-        t = z + rz / old * t
-    return d
+    contact, units = normal.contact, normal.path.units
+    bound = friction * normal.solution.pressure[contact]
+    force, poisson = normal.solution.force, operator.poisson
+    mean_displacement = max(normal.solution.work / force, force * normal.problem.local_compliance)
+    # that of the normal solution, times mu^2 and the ratio of the compliances
+    scale = friction * friction * (2 - poisson) / (2 - 2 * poisson) * force * mean_displacement
+    solver = CoulombSolver(operator, bound, scale, normal.path.tolerance)
+    slip, dissipated = np.zeros((2, bound.size)), 0.0
+    cell = units.cell_area * units.length**2
+    for row, tangential in enumerate(forces.tolist()):
+        start, transforms = perf_counter(), operator.transforms
+        guess = unit[:, None] * (starts[row] / units.pressure)
+        state = solver.step(slip, unit * (tangential / units.force), guess)
+        dissipated += float(np.sum(state.q * state.slip))
+        slip = slip + state.slip
+        all_stick = contact.all() and not state.slips.any()
+        rigid = operator.body.periodic and all_stick
+        stiffness = math.inf if rigid else solver.stiffness(state, unit) * units.force / units.height
+        slip_area = np.count_nonzero(state.slips) * cell
+        for name, value in (
+            ("tangential_displacement", float(state.displacement @ unit) * units.height),
+            ("tangential_stiffness", stiffness),
+            ("slip_area", slip_area),
+            ("stick_area", state.slips.size * cell - slip_area),
+            ("dissipated_energy", dissipated * units.energy),
+            ("residual", max(normal.solution.residual, state.residual)),
+            ("converged", normal.solution.reason == "converged" and state.converged),
+            ("iterations", columns["iterations"][row] + state.iterations),
+            ("transforms", columns["transforms"][row] + operator.transforms - transforms),
+            ("run_time", columns["run_time"][row] + perf_counter() - start),
+        ):
+            columns[name][row] = value
+        fields = {"traction": state.q * units.pressure, "slip": slip * units.height}
+        for name, planes in maps.items():
+            if name == "slip_state":
+                planes[row][contact] = np.where(state.slips, np.int8(SLIP), np.int8(STICK))
+            else:
+                planes[row][contact] = fields[name[:-2]][int(name.endswith("y"))]

@@ -75,6 +75,44 @@ def multiply_modes(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
             parts[i, j, 1] *= symbol[i, j]
 
 
+@kernel
+def multiply_by_wave_vectors(  # type: ignore[no-untyped-def]
+    start, stop, x, y, qy, qx, signed_qy, signed_qx, factor, excess, inverse, mean
+):
+    """Multiply the modes of two planes by w along the wave vector q and by w (1 + excess) across it.
+
+    w is factor/|q|, or factor |q| with `inverse`, or `mean` where q = 0. The modes are real and imaginary
+    parts (my, mx, 2).
+    """
+    for i in range(start, stop):
+        for j in range(x.shape[1]):
+            yy, xx = qy[i] * qy[i], qx[j] * qx[j]
+            q2 = yy + xx
+            if q2 > 0:
+                q = np.sqrt(q2)
+                weight = factor * q if inverse else factor / q
+                part = weight * excess / q2
+                of_xx, of_yy = weight + part * yy, weight + part * xx
+                of_xy = -part * signed_qy[i] * signed_qx[j]
+            else:
+                of_xx, of_yy, of_xy = mean, mean, 0.0
+            for k in range(2):
+                a, b = x[i, j, k], y[i, j, k]
+                x[i, j, k] = of_xx * a + of_xy * b
+                y[i, j, k] = of_xy * a + of_yy * b
+
+
+@kernel
+def multiply_by_symbols(start, stop, x, y, of_xx, of_yy, of_xy):  # type: ignore[no-untyped-def]
+    """Multiply the modes of two planes, as real and imaginary parts (my, mx, 2), by a symmetric matrix."""
+    for i in range(start, stop):
+        for j in range(x.shape[1]):
+            for k in range(2):
+                a, b = x[i, j, k], y[i, j, k]
+                x[i, j, k] = of_xx[i, j] * a + of_xy[i, j] * b
+                y[i, j, k] = of_xy[i, j] * a + of_yy[i, j] * b
+
+
 @sum_kernel
 def objective_sums(start, stop, rows, h, u, p, p_max, out):  # type: ignore[no-untyped-def]
     """Sum p, p u, p h over all nodes, and p, p (u + h) over the nodes below p_max."""

@@ -7,7 +7,7 @@ balance. Unloading is elastic, and the surface that remains is that of the last 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -171,8 +171,12 @@ def scaled_path(
     )
 
 
-def solve_path(path: ScaledPath) -> Iterator[Step]:
-    """Yield the steps of a path as they are solved."""
+def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None = None) -> Iterator[Step]:
+    """Yield the steps of a path as they are solved.
+
+    `guess` returns the scaled pressure from which the fast method starts under an imposed value; without it,
+    or where it returns None, that is extrapolated from the steps before.
+    """
     problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
     solver: WindowSolver | Elimination | None = None
     history = PlasticHistory()
@@ -182,7 +186,10 @@ def solve_path(path: ScaledPath) -> Iterator[Step]:
         solution = closed_form(problem, control)
         if solution is None:
             solver = solver or make_solver(problem, path)
-            solution = solver.solve(control)
+            if guess is None:
+                solution = solver.solve(control)
+            else:  # the fast method
+                solution = cast("WindowSolver", solver).solve(control, guess(value))
         force = solution.force * path.units.force
         if path.control == "closure":
             closure, imposed = value, force

@@ -128,11 +128,15 @@ def padded_length(n: int) -> int:
     return fft.fast_length(2 * n - 1)
 
 
-def convolution_symbol(table: Array, padded: tuple[int, int]) -> Array:
-    """Return the transform of the even extension of `table`, which is real; shape (my, mx//2 + 1)."""
+def convolution_symbol(table: Array, padded: tuple[int, int], *, odd: bool = False) -> Array:
+    """Return the transform of the extension of `table`, which is real; shape (my, mx//2 + 1).
+
+    The extension is even along both axes, or odd along both.
+    """
     ny, nx = table.shape
+    sign = -1 if odd else 1
     plane = np.zeros(padded, dtype=table.dtype)
     plane[:ny, :nx] = table
-    plane[:ny, padded[1] - nx + 1 :] = table[:, :0:-1]
-    plane[padded[0] - ny + 1 :] = plane[ny - 1 : 0 : -1]
+    plane[:ny, padded[1] - nx + 1 :] = sign * table[:, :0:-1]
+    plane[padded[0] - ny + 1 :] = sign * plane[ny - 1 : 0 : -1]
     return np.ascontiguousarray(fft.rfft2(plane).real)

@@ -37,6 +37,7 @@ FIRST_NODES = 256  # candidates of a first step under force control
 MAX_WINDOW_SHARE = 0.75  # of the extent; a larger window is not worth having
 CANDIDATE_TOLERANCE = 1e-2  # residual at which the closure is accurate enough to verify the candidates
 ROUNDING_SHARE = 1e-13  # of the greatest pressure: less is rounding
+LEAST_CLOSURE = 1e-100  # scaled: above the gap of the nodes where a surface is flat
 CLOSURE_MARGIN = 1.1  # candidates for this much more than the expected closure
 
 
@@ -55,15 +56,17 @@ class WindowSolver:
         self.problem, self.tolerance = problem, tolerance
         self.past_steps: list[PastStep] = []  # up to two, the last one at the end
         self.iterations, self.transforms = 0, 0  # of the current step
+        self._guess: Array | None = None  # of the current step, instead of an extrapolation
         self._operator: Operator | None = None
         self._pair_tables: tuple[Array, Array] | None = None
         self._sorted_gap: Array | None = None
         self._window: tuple[Window, Problem] | None = None
         self._systems: dict[Any, ContactSystem] = {}  # of the window, by precision; free bodies only
 
-    def solve(self, control: Control) -> Solution:
-        """Solve one step of the path."""
+    def solve(self, control: Control, guess: Array | None = None) -> Solution:
+        """Solve one step of the path, from a pressure or from those of the steps before."""
         self.iterations, self.transforms = 0, 0
+        self._guess = guess if guess is not None and (guess > 0).any() else None
         if self.problem.body.periodic:
             solution = self.solve_in_window(control, WHOLE_PLANE, self.extrapolated_pressure(control))
         else:
@@ -97,6 +100,8 @@ class WindowSolver:
 
     def extrapolated_pressure(self, control: Control) -> Array | None:
         """Return the pressure extrapolated from the last two steps, linear in the log of the control."""
+        if self._guess is not None:
+            return self._guess
         if not self.past_steps:
             return None
         first, last = self.past_steps[0], self.past_steps[-1]
@@ -111,7 +116,9 @@ class WindowSolver:
         if control.closure is not None:
             return control.closure
         if not self.past_steps:
-            return None
+            if self._guess is None:
+                return None
+            return max(float(self.problem.gap[self._guess > 0].max()), LEAST_CLOSURE)
         first, last = self.past_steps[0], self.past_steps[-1]
         power = 1.0
         if first.control != last.control:
@@ -159,7 +166,7 @@ class WindowSolver:
         if closure is None:
             return min(FIRST_NODES, self.problem.gap.size)
         expected = self.count_below(closure * CLOSURE_MARGIN)
-        if expected > FEW_NODES:
+        if expected > FEW_NODES and self.past_steps:
             expected = min(expected, 4 * self.count_below(self.past_steps[-1].closure))
         return max(1, expected)
 

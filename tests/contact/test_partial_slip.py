@@ -5,23 +5,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.optimize import brentq, lsq_linear
+from slip_cases import (
+    COMPLIANCE,
+    CONTACT_RADIUS,
+    FORCE,
+    FRICTION,
+    LIMIT,
+    MODULUS,
+    POISSON,
+    ball,
+    loop_energy,
+    mindlin_displacement,
+    rough,
+    sheared,
+)
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-
-MODULUS, POISSON, FRICTION, RADIUS = 1e9, 0.2, 0.4, 1.0
-CONTACT_RADIUS = 2e-3
-FORCE = 4 / 3 * MODULUS * CONTACT_RADIUS**3 / RADIUS
-LIMIT = FRICTION * FORCE
-COMPLIANCE = 4 * (2 - POISSON) / (2 * (1 - POISSON)) / MODULUS  # S = 4 lambda / E*
-ALL = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
-
-
-def ball(cells):
-    """Return a ball that touches over `cells` spacings from its centre under FORCE."""
-    spacing = CONTACT_RADIUS / cells
-    x = spacing * np.arange(-int(1.25 * cells) - 1, int(1.25 * cells) + 2)
-    return fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / (2 * RADIUS), spacing)
 
 
 def sheared_ball(cells, shares, keep=()):
@@ -34,28 +34,6 @@ def sheared_ball(cells, shares, keep=()):
         tangential_force=LIMIT * np.asarray(shares),
         keep=keep,
     )
-
-
-def mindlin_displacement(share):
-    return 3 * LIMIT / (16 * CONTACT_RADIUS) * COMPLIANCE * (1 - (1 - share) ** (2 / 3))
-
-
-def loop_energy(share):
-    """Return the energy of a loop between -share and share of the limit (Mindlin and Deresiewicz 1953)."""
-    falling = 1 - (1 - share) ** (5 / 3) - 5 * share / 6 * (1 + (1 - share) ** (2 / 3))
-    return 9 * LIMIT**2 / (10 * CONTACT_RADIUS) * COMPLIANCE * falling
-
-
-def rough(n=48, rng=4, periodic=True):
-    surface = fc.surfaces.spectral((n, n), 1e-5, hurst=0.8, rms_slope=0.1, short_cutoff=8e-5, rng=rng)
-    return surface if periodic else fc.surfaces.from_array(surface.values, 1e-5)
-
-
-def sheared(surface, forces, **options):
-    given = {"contact_modulus": MODULUS, "poisson": POISSON, "friction_coefficient": FRICTION, "keep": ALL}
-    if not {"closure", "nominal_pressure"} & options.keys():
-        given["normal_force"] = 1.0
-    return fc.contact.partial_slip(surface, tangential_force=forces, **(given | options))
 
 
 def test_cattaneo_mindlin_ball():
@@ -370,118 +348,3 @@ def test_bad_input_with_imposed_closure():
 def test_surface_with_gaps_is_refused():
     with pytest.raises(InvalidInput, match="surface"):
         sheared(rough(12).where(rough(12).x > 2e-5), 0.1)
-
-
-def test_full_is_the_superposition_without_poisson_effect():
-    forces = [0.1, 0.3, -0.1, 0.2]
-    simple, full = (
-        sheared(rough(), forces, poisson=0.0, method=method, azimuth=25.0, tolerance=1e-10)
-        for method in ("superposition", "full")
-    )
-    for name in (*ALL, "tangential_displacement", "dissipated_energy", "stick_area", "slip_area"):
-        scale = float(abs(simple[name]).max())
-        np.testing.assert_allclose(full[name], simple[name], atol=1e-6 * scale)
-    np.testing.assert_allclose(full["tangential_stiffness"], simple["tangential_stiffness"], rtol=1e-3)
-    assert full["converged"].all()
-
-
-def periodic_operator(n, spacing, contact, poisson):
-    """Return the dense K (2 m, 2 m) of two like periodic bodies on the nodes in contact, from its modes."""
-    k = 2 * np.pi * np.fft.fftfreq(n, spacing)
-    ky, kx = np.meshgrid(k, k, indexing="ij")
-    size = np.hypot(kx, ky)
-    size[0, 0] = np.inf
-    size[0, 0], angle = 1.0, np.arctan2(ky, kx)
-    along, across = 2 / (MODULUS * size), 2 / (MODULUS * size * (1 - poisson))
-    along[0, 0] = across[0, 0] = 0.0
-    coupling = (along - across) * np.sin(angle) * np.cos(angle)
-    coupling[n // 2, :] = coupling[:, n // 2] = 0.0
-    c2, s2 = np.cos(angle) ** 2, np.sin(angle) ** 2
-    kernels = [np.fft.ifft2(m).real for m in (along * c2 + across * s2, along * s2 + across * c2, coupling)]
-    iy, ix = np.nonzero(contact)
-    xx, yy, xy = (m[(iy[:, None] - iy) % n, (ix[:, None] - ix) % n] for m in kernels)
-    return np.block([[xx, xy], [xy, yy]])
-
-
-def test_dense_operator_is_that_of_a_point_force():
-    """u_x is larger along the force than across it, by 2 nu/(2 pi G r) for two bodies (Cerruti)."""
-    contact = np.zeros((256, 256), dtype=bool)
-    contact[[0, 0, 8], [0, 8, 0]] = True  # the force, a node along it, a node across it
-    operator = periodic_operator(256, 1.0, contact, 0.3)
-    shear_modulus = MODULUS * (1 - 0.3)  # 1/E* = (1 - nu)/G for two like bodies
-    assert operator[1, 0] - operator[2, 0] == pytest.approx(0.3 / (np.pi * shear_modulus * 8), rel=0.02)
-
-
-def test_full_stiffness_of_stuck_circle():
-    """k_t/k_n = 2 (1 - nu)/(2 - nu), as in the superposition, for one round contact far from its images."""
-    x = np.arange(-32, 32)
-    cap = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2e3, 1.0, periodic=True)
-    given = {"poisson": 0.4, "normal_force": 8e8, "keep": ()}
-    simple, full = (sheared(cap, 0.0, method=method, **given) for method in ("superposition", "full"))
-    assert 100 < float(full["contact_area"]) < 400
-    ratio = float(full["tangential_stiffness"][0] / simple["tangential_stiffness"][0])
-    assert ratio == pytest.approx(1, abs=0.02)
-
-
-@pytest.mark.parametrize("poisson", [0.2, 0.5])
-def test_full_against_dense_operator(poisson):
-    """Coulomb's law at every node, with the displacement of a dense operator; its solution is unique."""
-    surface, forces = rough(32), [0.15, 0.32, -0.1]
-    result = sheared(surface, forces, poisson=poisson, method="full", tolerance=1e-10)
-    pressed = fc.contact.press(
-        surface, contact_modulus=MODULUS, normal_force=1.0, keep=("pressure",), tolerance=1e-12
-    )
-    pressure = pressed["pressure"][0].values
-    contact = pressure > 0
-    assert 40 < contact.sum() < 500
-    bound = FRICTION * pressure[contact]
-    operator = periodic_operator(32, 1e-5, contact, poisson)
-    np.testing.assert_allclose(operator, operator.T, atol=1e-12 * operator.max())  # reciprocity
-    before = np.zeros((2, bound.size))
-    for step, force in enumerate(forces):
-        q = np.stack([result[f"traction_{axis}"][step].values[contact] for axis in "xy"])
-        slip = np.stack([result[f"slip_{axis}"][step].values[contact] for axis in "xy"])
-        np.testing.assert_allclose(q.sum(1) * 1e-10, [force, 0], atol=1e-10)
-        assert (np.hypot(*q) <= bound + 1e-8 * bound.max()).all()
-        moved = (operator @ q.ravel()).reshape(2, -1) + slip  # displacement and slip: that of the upper body
-        scale = float(result["tangential_displacement"][1])
-        np.testing.assert_allclose(
-            moved, moved.mean(1, keepdims=True) * np.ones_like(moved), atol=1e-6 * scale
-        )
-        assert moved[0].mean() == pytest.approx(float(result["tangential_displacement"][step]), rel=1e-5)
-        increment, before = slip - before, slip
-        slips = result["slip_state"][step].values[contact] == 2
-        assert abs(increment[:, ~slips]).max() < 1e-6 * scale
-        work = (increment * q).sum(0)
-        np.testing.assert_allclose(work[slips], (np.hypot(*increment) * bound)[slips], atol=1e-5 * work.max())
-        assert abs(q[1]).max() > 1e-3 * bound.max()  # the directions are coupled
-
-
-def test_full_rotates_with_the_surface():
-    surface = rough(32)
-    turned = fc.surfaces.from_array(np.rot90(surface.values, -1), 1e-5, periodic=True)
-    one = sheared(surface, [0.2, -0.1], azimuth=30.0, method="full", tolerance=1e-10)
-    other = sheared(turned, [0.2, -0.1], azimuth=120.0, method="full", tolerance=1e-10)
-    for name in ("tangential_displacement", "dissipated_energy"):
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-5)
-    x, y = (np.rot90(one[name].values, -1, axes=(1, 2)) for name in ("traction_x", "traction_y"))
-    np.testing.assert_allclose(other["traction_x"], -y, atol=1e-4 * abs(x).max())
-    np.testing.assert_allclose(other["traction_y"], x, atol=1e-4 * abs(x).max())
-
-
-def test_full_stiffness_is_slope_of_the_path():
-    result = sheared(rough(), [0.2, 0.20002], method="full", keep=(), tolerance=1e-12)
-    slope = 2e-5 / float(np.diff(result["tangential_displacement"].values)[0])
-    assert float(result["tangential_stiffness"][0]) == pytest.approx(slope, rel=5e-3)
-
-
-def test_full_extremes():
-    flat = fc.surfaces.from_array(np.zeros((12, 12)), 1e-5, periodic=True)
-    result = sheared(flat, [0.0, 0.3], method="full")
-    np.testing.assert_allclose(result["traction_x"][1], 0.3 / 144e-10)
-    assert not result["slip_area"].any()
-    assert not sheared(rough(), 0.0, normal_force=0.0, method="full")["slip_state"].any()
-    with pytest.raises(InvalidInput, match="less by 1e-6"):
-        sheared(rough(), 0.4, method="full")
-    with pytest.raises(InvalidInput, match="free bodies"):
-        sheared(rough(periodic=False), 0.1, method="full")
