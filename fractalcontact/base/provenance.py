@@ -27,7 +27,12 @@ MEMBER = "member"
 LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
 # the arguments of a call that grow where results are joined along a dim
-_ALONG: Mapping[str, tuple[str, ...]] = {"shear": ("shear",), "direction": ("direction",), "step": LOADS}
+_ALONG: Mapping[str, tuple[str, ...]] = {
+    "shear": ("shear",),
+    "direction": ("direction",),
+    "step": LOADS,
+    "nominal_pressure": ("nominal_pressure",),
+}
 
 T = TypeVar("T", xr.Dataset, xr.DataArray)
 

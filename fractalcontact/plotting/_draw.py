@@ -29,6 +29,8 @@ from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import islands
 from fractalcontact.plotting._lacunarity import lacunarity
 from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
+from fractalcontact.plotting._shear_curve import shear_curve
+from fractalcontact.plotting._strength_envelope import strength_envelope
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
 
 if TYPE_CHECKING:
@@ -127,12 +129,26 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
         data = group(tree, path)
         if data is not None:
             yield name, _later(drawing, data)
+    yield from _strength_drawings(tree)
     counts = group(tree, "domains/box_dimension")
     if counts is not None and "local_slope" in counts:
         yield "local_slopes", _later(_local_slopes, counts)
     contact = group(tree, "contact")
     if contact is not None and "state" in contact:
         yield "contact_domains", _later(contact_domains, contact)
+
+
+def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Yield the figures of the strength: criteria with the tests among them, shear curves of both."""
+    envelope, tests, curve = (
+        group(tree, f"joints/{name}") for name in ("strength_envelope", "direct_shear", "shear_curve")
+    )
+    if envelope is not None:
+        yield "strength_envelope", lambda: strength_envelope(envelope, tests=tests)
+    if tests is not None:
+        yield "shear_curve", lambda: shear_curve(tests, beside=curve)
+    elif curve is not None:
+        yield "shear_curve", _later(shear_curve, curve)
 
 
 def _later(drawing: Callable[..., Figure], *arguments: Any) -> Callable[[], Figure]:

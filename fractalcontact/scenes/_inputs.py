@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
-PRESSING = ("closure", "elastic_dilatancy")  # stages of a joint that solve a contact
+PRESSING = ("closure", "elastic_dilatancy", "direct_shear")  # stages of a joint that solve a contact
+# what a criterion calls the basic friction angle of the material; there is no residual one in a scene
+FRICTION_ANGLE = {"strength_envelope": "basic_friction_angle", "shear_curve": "residual_friction_angle"}
 
 
 def read_surface(table: SurfaceTable, folder: Path) -> xr.DataArray:
@@ -122,6 +124,8 @@ def joint_options(scene: Scene, name: str) -> dict[str, Any]:
         options = {key: value for key, value in options.items() if key not in LOADS or key == load}
     if name == "friction" and "nominal_pressure" not in scene.joint.stages.get(name, {}):
         options.pop("nominal_pressure", None)  # in [joint] it is the load of the closure
+    if name in FRICTION_ANGLE and scene.material.basic_friction_angle is not None:
+        options.setdefault(FRICTION_ANGLE[name], scene.material.basic_friction_angle)
     if name in PRESSING and scene.material.hardness is not None:
         options.setdefault("hardness", scene.material.hardness)
     return options

@@ -206,7 +206,14 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
     options = joint_options(scene, name)
     if name == "friction":
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
+    if stage.row.takes_surface:
+        return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))
     crack = _crack(scene, results)
+    if name == "direct_shear":  # every pressure has a joint of its own
+        pressures = _as_list(options.pop("nominal_pressure"))
+        test = partial(call, stage.row.function, crack, **options)
+        tests = tuple(partial(test, nominal_pressure=[pressure]) for pressure in pressures)
+        return StageWork(tests, ("nominal_pressure",), (len(pressures),))
     if name == "delta_surface" and name not in scene.want.joints:
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
     if name == "closure":

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractalcontact.base.tables import table
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._autotune import Choice, choose
+from fractalcontact.scenes._inputs import FRICTION_ANGLE, joint_options
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
@@ -16,7 +17,10 @@ from fractalcontact.scenes._stages import (
     ISLAND_MAP,
     STAGES,
     StageType,
+    arguments_of,
 )
+
+STRENGTH = ("direct_shear", "shear_curve", "strength_envelope")
 
 
 @dataclass(frozen=True)
@@ -169,7 +173,7 @@ def _joint_reasons(scene: Scene) -> dict[str, str]:
         reasons.setdefault("closure", "transmissivity needs the gap")
     if "friction" in reasons and "elastic_dilatancy" not in reasons:
         reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
-    if scene.want.figures and reasons:
+    if scene.want.figures and reasons and scene.stage_options(STAGES["joints/delta_surface"], ("shear",)):
         reasons.setdefault("delta_surface", "figures are wanted")
     if reasons and scene.upper is not None:
         registered = " and registered" if scene.joint.register else ""
@@ -203,6 +207,19 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     return tuple(maps)
 
 
+def _check_strength(scene: Scene, stage: Stage, problems: Problems) -> None:
+    """Note the arguments that a stage of the strength of the joint needs and the scene does not give."""
+    name = stage.name.partition("/")[2]
+    given = set(joint_options(scene, name))
+    needed = arguments_of(stage.row.function)[1] | set(
+        FRICTION_ANGLE.get(name, ()) and [FRICTION_ANGLE[name]]
+    )
+    for key in sorted(needed - given):
+        table = "material" if key == FRICTION_ANGLE.get(name) else f"joint.{name}"
+        word = "basic_friction_angle" if table == "material" else key
+        problems.add(f"{table}.{word}", f"a value for {name}", NONE)
+
+
 def check_loads(scene: Scene, problems: Problems) -> None:
     """Note what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
     for stage in stages_of(scene):
@@ -214,8 +231,12 @@ def check_loads(scene: Scene, problems: Problems) -> None:
             problems.add("joint.shear", f"a value for {name} ({stage.reason})", NONE)
         if name == "elastic_dilatancy" and "normal_force" not in options:
             problems.add("joint.normal_force", f"a value for {name}", NONE)
+        if name in STRENGTH:
+            _check_strength(scene, stage, problems)
         direction = options.get("direction", "E")
-        if name in ("closure", "delta_surface", "decorrelation_length") and isinstance(direction, list):
+        if name in ("closure", "delta_surface", "decorrelation_length", *STRENGTH) and isinstance(
+            direction, list
+        ):
             problems.add("joint.direction", f"one direction for {name}", direction)
         if name == "closure" and len(loads := scene.joint.loads) != 1:
             expected = f"one of a closure, normal_force or nominal_pressure ({stage.reason})"

@@ -58,6 +58,7 @@ def summary(tree: xr.DataTree) -> str:
         _closure(tree),
         _dilatancy(tree),
         _friction(tree),
+        _direct_shear(tree),
         _contact_set(tree),
         "\n".join(note(caveat) for caveat in caveats(tree)),
         _paper(tree, members) if compares_with_paper(tree) else "",
@@ -268,6 +269,20 @@ def _friction(tree: xr.DataTree) -> str:
             rows.append((str(direction), pressure, *(values or ("none: the faces lock", "", ""))))
     comment = friction["peak_friction_angle"].attrs.get("comment")
     return "\n".join([table(rows), *([note(f"The peak friction angle {comment}.")] if comment else [])])
+
+
+def _direct_shear(tree: xr.DataTree) -> str:
+    test = group_of(tree, "joints/direct_shear")
+    if test is None:
+        return ""
+    rows = [("direct shear", "peak strength", "friction angle", "residual strength", "worn depth")]
+    names = ("peak_shear_strength", "peak_friction_angle", "residual_shear_strength")
+    for i in range(test.sizes["nominal_pressure"]):
+        state = test.isel(nominal_pressure=i)
+        worn = state["wear_depth"].max("point", keep_attrs=True)
+        strength, angle, residual = (amount(state[name]) for name in names)
+        rows.append((amount(state["nominal_pressure"]), strength, angle, residual, amount(worn)))
+    return table(rows)
 
 
 def _contact_set(tree: xr.DataTree) -> str:

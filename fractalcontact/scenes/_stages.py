@@ -39,6 +39,8 @@ class StageType:
         The map that it reads from the stage it needs.
     keeps : tuple of str
         The maps that it can store.
+    takes_surface : bool
+        It describes the lower face, not the crack.
     whole_path : bool
         It follows the contact set along the load path, and reads the maps of all steps at once.
     """
@@ -49,6 +51,7 @@ class StageType:
     table: str = ""
     reads: str = ""
     keeps: tuple[str, ...] = ()
+    takes_surface: bool = False
     whole_path: bool = False
 
     @property
@@ -105,6 +108,9 @@ _ROWS = (
     _joint("closure", keeps=CONTACT_MAPS),
     _joint("elastic_dilatancy", function="dilatancy"),
     _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
+    _joint("direct_shear"),
+    _joint("shear_curve", _SURFACE, takes_surface=True),
+    _joint("strength_envelope", _SURFACE, takes_surface=True),
     _joint("decorrelation_length"),
     _joint("transmissivity", ("joints/closure",), reads="gap"),
     _domain("box_dimension"),

@@ -163,7 +163,10 @@ def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
                     reader.function, maps if reader.variable == "gap" else maps > 0, **reader.options
                 )
             elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
-                if scene.joint.register or (is_flat and name in PRESSING):
+                if not stage.row.takes_surface and (scene.joint.register or (is_flat and name in PRESSING)):
+                    continue
+                if stage.row.takes_surface:
+                    _validate_call(stage.row.function, surface, **joint_options(scene, name))
                     continue
                 if crack is None:
                     crack = public_function("joints.Crack")(surface, upper, **crack_options(scene))

@@ -1,0 +1,95 @@
+"""Stages of the strength of a joint: plan, checks, resume, figures and reproduction."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+SCENE = """
+[surface]
+generate = "fbm"
+shape = [40, 40]
+spacing = 2e-4
+hurst = 0.8
+rms_increment = 3e-5
+rng = 3
+[material]
+young = 3e10
+poisson = 0.2
+basic_friction_angle = 31.0
+hardness = 3e8
+[joint]
+block = 4.8e-3
+nominal_pressure = [2e6, 2e7]
+[joint.direct_shear]
+path = [6e-4, 0.0]
+[joint.shear_curve]
+displacement = { start = 0.0, stop = 1e-3, step = 2.5e-4 }
+wall_strength = 1e8
+[joint.strength_envelope]
+wall_strength = 1e8
+cohesion = 1e6
+[want]
+joints = ["direct_shear", "shear_curve", "strength_envelope"]
+figures = true
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def write(text=SCENE):
+        path = tmp_path / "joint.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_results_are_those_of_the_functions(scene, tmp_path):
+    path = scene()
+    names = [stage.name for stage in fc.scenes.plan(fc.scenes.load(path))]
+    assert names[-4:-1] == ["joints/direct_shear", "joints/shear_curve", "joints/strength_envelope"]
+    tree = fc.scenes.run(path, out=tmp_path / "out", progress=False)
+    face = tree["surfaces/height"]
+    crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=4.8e-3, basic_friction_angle=31)
+    direct = fc.joints.direct_shear(crack, [6e-4, 0], nominal_pressure=[2e6, 2e7], hardness=3e8)
+    stored = tree["joints/direct_shear"]
+    for name in ("shear_stress", "dilatancy", "peak_shear_strength", "nominal_pressure"):
+        np.testing.assert_array_equal(stored[name], direct[name])
+    curve = fc.joints.shear_curve(
+        face,
+        2.5e-4 * np.arange(5),
+        nominal_pressure=[2e6, 2e7],
+        wall_strength=1e8,
+        residual_friction_angle=31,
+    )
+    np.testing.assert_allclose(tree["joints/shear_curve/shear_stress"], curve.shear_stress)
+    assert tree["joints/strength_envelope"].criterion.values.tolist()[0] == "patton"
+    for name in ("strength_envelope.png", "shear_curve.png"):
+        assert (tmp_path / "out" / name).is_file()
+    summary = fc.scenes.summary(tree)
+    assert "residual strength" in summary
+    again = fc.scenes.reproduce(stored.to_dataset())
+    np.testing.assert_array_equal(again.shear_stress, stored.shear_stress)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("path = [6e-4, 0.0]", "", "joint.direct_shear.path: expected a value"),
+        ("path = [6e-4, 0.0]", "path = 5e-5", "multiples of 0.0002 m"),
+        ("hardness = 3e8", "", "joint.direct_shear.hardness: expected a value"),
+        (
+            "basic_friction_angle = 31.0",
+            "",
+            "material.basic_friction_angle: expected a value for shear_curve",
+        ),
+        ("cohesion = 1e6", "cohesion = -1.0", "cohesion"),
+        ("cohesion = 1e6", "direction = ['E', 'N']", "one direction for strength_envelope"),
+        ("wall_strength = 1e8\n[joint.s", "wall_strenght = 1e8\n[joint.s", "did you mean 'wall_strength'"),
+    ],
+)
+def test_mistakes_are_reported_before_anything_runs(scene, old, new, message):
+    assert old in SCENE
+    with pytest.raises(ValueError, match=message):
+        fc.scenes.validate(scene(SCENE.replace(old, new, 1)))
