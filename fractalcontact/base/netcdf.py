@@ -3,6 +3,9 @@
 A file is written under a temporary name in its folder and renamed when it is complete, so that an
 interrupted run leaves no incomplete file under the final name. The next save in the folder removes the
 temporary files of interrupted runs.
+
+xarray locks only the arrays of a file and not its header, which is too little for the NetCDF library. Here
+one lock of the process is held for the whole file, and xarray gets a file that is already open.
 """
 
 from __future__ import annotations
@@ -11,15 +14,21 @@ import contextlib
 import os
 import platform
 import shutil
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.schema import CONVENTIONS, encoded
+from fractalcontact.base.validation import Problems
 
 PARTIAL = ".partial"
+LONGEST_NAME = 255  # bytes, of a variable, a dim or an attribute
 FULL_DISK = 1 << 16  # bytes: a disk with less free space counts as full
 _TYPE = "fractalcontact_kind"
 _GLOBAL = ("Conventions", "title", "institution", "source", "history", "references", "comment", "provenance")
@@ -63,13 +72,16 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
         expected = "a DataArray, Dataset or DataTree"
         raise InvalidInput(where, [f"result: expected {expected}, got {type(result).__name__}"])
+    groups = _as_file(result)
+    with Problems(where) as problems:
+        _check_words(problems, groups)
     temporary = unfinished(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
-        _as_file(result).to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
+        _write(groups, temporary)
         temporary.replace(target)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, AttributeError) as error:  # the last of netCDF4, for attributes
         expected = "names, values and attributes that a NetCDF file can hold"
         raise InvalidInput(where, [f"result: expected {expected}, got: {error}"]) from error
     except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as a RuntimeError
@@ -112,8 +124,7 @@ def open(path: str | os.PathLike[str]) -> Any:
     if not source.is_file():
         raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
     try:
-        with xr.open_datatree(source, engine="netcdf4") as tree:
-            tree.load()
+        tree = xr.DataTree.from_dict(_read(source))
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
     for node in tree.subtree:
@@ -128,6 +139,82 @@ def open(path: str | os.PathLike[str]) -> Any:
     array = dataset[saved_type]
     array.attrs.update({key: dataset.attrs[key] for key in _GLOBAL if key in dataset.attrs})
     return array
+
+
+def _check_words(problems: Problems, groups: Mapping[str, xr.Dataset]) -> None:
+    """Note names and attributes that a NetCDF file cannot hold."""
+    for path, dataset in groups.items():
+        place = path.strip("/") + "/" if path != "/" else ""
+        owners = {"": dataset.attrs} | {f"{key}.": value.attrs for key, value in dataset.variables.items()}
+        for name in [*dataset.variables, *(dim for dim in dataset.dims if dim not in dataset.variables)]:
+            expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
+            problems.require(_is_name(name), f"{place}name of a variable or dim", expected, name)
+        for owner, attributes in owners.items():
+            for key, value in attributes.items():
+                expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
+                problems.require(_is_name(key), f"{place}{owner}name of an attribute", expected, key)
+                expected = "text, a number or a list of them"
+                problems.require(_is_attribute(value), f"{place}{owner}{key}", expected, value)
+
+
+def _is_name(name: object) -> bool:
+    return isinstance(name, str) and "/" not in name and 0 < len(name.encode()) <= LONGEST_NAME
+
+
+def _is_attribute(value: object) -> bool:
+    try:
+        array = np.asarray(value)
+    except ValueError:  # lists of different lengths
+        return False
+    return array.dtype.kind in "SUiuf" and array.ndim < 2
+
+
+def _write(data: Mapping[str, xr.Dataset], path: Path) -> None:
+    """Write the groups of a file.
+
+    Blocks of dask arrays are computed and written one by one, each under the lock.
+    """
+    import netCDF4
+    from xarray.backends import NetCDF4DataStore
+    from xarray.backends.common import ArrayWriter
+
+    for dataset in data.values():
+        for variable in dataset.variables.values():
+            if variable.chunks is None:
+                variable.load()  # a lazy array of another file needs the lock of xarray
+    writer = ArrayWriter()
+    with NETCDF_LOCK:
+        file = netCDF4.Dataset(path, "w", format="NETCDF4")
+    try:
+        with NETCDF_LOCK:
+            for name, dataset in data.items():
+                store = NetCDF4DataStore(file, group=name, mode="w", lock=NETCDF_LOCK)
+                dataset.dump_to_store(store, writer=writer)
+        writer.sync()
+    finally:
+        with NETCDF_LOCK:
+            file.close()
+
+
+def _read(path: Path) -> dict[str, xr.Dataset]:
+    """Return the groups of a file in memory."""
+    import netCDF4
+    from xarray.backends import NetCDF4DataStore
+
+    groups = {}
+    with NETCDF_LOCK, netCDF4.Dataset(path) as file:
+        for name in _group_names(file):
+            dataset = xr.open_dataset(NetCDF4DataStore(file, group=name, lock=False)).load()
+            dataset.set_close(None)
+            groups[name] = dataset
+    return groups
+
+
+def _group_names(group: Any) -> Iterator[str]:
+    """Yield the path of a group of a NetCDF file and of all groups in it."""
+    yield group.path
+    for child in group.groups.values():
+        yield from _group_names(child)
 
 
 def _failure_reason(folder: Path, error: Exception) -> str:
@@ -162,8 +249,9 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
 
 
 def unfinished(target: Path) -> Path:
-    """Return the temporary name under which this process writes a file."""
-    return target.with_name(f".{target.name}.{_machine()}.{os.getpid()}{PARTIAL}")
+    """Return the temporary name under which this thread of this process writes a file."""
+    place = f"{_machine()}.{threading.get_native_id()}.{os.getpid()}"
+    return target.with_name(f".{target.name}.{place}{PARTIAL}")
 
 
 def clear_partial(folder: Path) -> None:
@@ -189,11 +277,15 @@ def _alive(process: int) -> bool:
     return True
 
 
-def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> xr.Dataset | xr.DataTree:
-    """Return the data to write, with the attribute Conventions; a DataArray becomes a Dataset."""
-    data = _marked(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)
-    data.attrs = {"Conventions": CONVENTIONS} | data.attrs
-    return data
+def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
+    """Return the groups to write, the root with the attribute Conventions; a DataArray becomes a Dataset."""
+    if isinstance(result, xr.DataTree):
+        tree = result.copy(deep=False)  # a tree of its own, even of a part of a tree
+        groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    else:
+        groups = {"/": _marked(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)}
+    groups["/"].attrs = {"Conventions": CONVENTIONS} | groups["/"].attrs
+    return groups
 
 
 def _marked(array: xr.DataArray) -> xr.Dataset:

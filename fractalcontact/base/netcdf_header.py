@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
             walk(child, f"{name_of_group}/{name}")
 
     try:
-        with netCDF4.Dataset(source) as file:
+        with NETCDF_LOCK, netCDF4.Dataset(source) as file:
             walk(file, "")
     except (OSError, RuntimeError) as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error

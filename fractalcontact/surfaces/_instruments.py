@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import file_suffix, open_bytes
 from fractalcontact.surfaces._units import UNITS, in_metres
@@ -78,7 +79,8 @@ def read_instrument(
     """
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
-    with _quiet() as messages, open_bytes(path) as file:
+    # some of the readers open NetCDF files, and filters of warnings are shared by all threads
+    with NETCDF_LOCK, _quiet() as messages, open_bytes(path) as file:
         other_unit = _other_unit(file.read(4096))
         file.seek(0)
         reader = _open(file, path)

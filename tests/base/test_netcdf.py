@@ -74,9 +74,9 @@ def test_killed_write_leaves_no_incomplete_file(tmp_path, result):
     code = (
         "import sys, os, signal, xarray as xr, fractalcontact as fc\n"
         "import fractalcontact.base.netcdf as n\n"
-        "def die(self, path, **k):\n"
-        "    open(path, 'wb').write(b'half'); os.kill(os.getpid(), signal.SIGKILL)\n"
-        "xr.Dataset.to_netcdf = die\n"
+        "def die(self, store, **k):\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "xr.Dataset.dump_to_store = die\n"
         "fc.save(xr.Dataset({'gap': ('x', [1.0])}), sys.argv[1])\n"
     )
     target = tmp_path / "result.nc"
@@ -94,7 +94,7 @@ def test_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
     path = fc.save(result, tmp_path / "result.nc")
     before = path.read_bytes()
     monkeypatch.setattr(
-        xr.Dataset, "to_netcdf", lambda *a, **k: (_ for _ in ()).throw(OSError(28, "No space left"))
+        xr.Dataset, "dump_to_store", lambda *a, **k: (_ for _ in ()).throw(OSError(28, "No space left"))
     )
     with pytest.raises(InvalidInput, match="No space left"):
         fc.save(result, path)
@@ -106,6 +106,98 @@ def test_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
 def test_wrong_suffix_is_refused(tmp_path, result, name):
     with pytest.raises(InvalidInput, match=r"\.nc"):
         fc.save(result, tmp_path / name)
+
+
+def test_all_names_and_attributes_that_cannot_be_stored_are_listed(tmp_path, result):
+    gap = result[["gap"]].rename(gap="g" * 256).assign_attrs(settings={"a": 1}, lists=[[1], [2, 3]])
+    gap["g" * 256].attrs |= {"is_rough": True, "a/b": 1.0}
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(), "/joints": gap, "/domains": xr.Dataset({1: 2.0})})
+    with pytest.raises(InvalidInput) as caught:
+        fc.save(tree, tmp_path / "tree.nc")
+    for words in ("6 problems", "joints/settings: ", "joints/lists: ", "is_rough: ", "got 'a/b'", "got 1\n"):
+        assert words in f"{caught.value}\n"
+    assert not list(tmp_path.iterdir())
+
+
+THREADS = """
+import os, sys, threading
+import xarray as xr
+import fractalcontact as fc
+from fractalcontact.scenes import contents
+
+folder = sys.argv[1]
+surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=5e-6, rng=11)
+groups = {path: surface.to_dataset() for path in ("/joints/closure", "/domains", "/surfaces")}
+tree = xr.DataTree.from_dict({"/": xr.Dataset()} | groups)
+path = fc.save(tree, folder + "/tree.nc")
+lazy = xr.open_dataset(fc.save(surface, folder + "/surface.nc"), cache=False)
+failed = []
+
+def save(number):
+    fc.save(tree, f"{folder}/{number}.nc")
+    assert fc.open(f"{folder}/{number}.nc").identical(fc.open(path))
+    fc.save(tree, folder + "/common.nc")
+
+def read(number):
+    assert fc.surfaces.read(folder + "/surface.nc").equals(surface)
+    assert "joints/closure" in contents(path)
+
+def read_lazily(number):
+    for column in range(20):
+        assert lazy.height.isel(x=column).values.tobytes() == surface.values[:, column].tobytes()
+    fc.save(lazy.height, f"{folder}/{number}.nc")
+
+def work(number):
+    try:
+        for _ in range(10):
+            (save, read, read_lazily, save)[number](number)
+    except BaseException as error:
+        failed.append(error)
+
+threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+assert not failed, failed
+assert fc.open(folder + "/common.nc").identical(fc.open(path))
+print(sorted(name for name in os.listdir(folder) if name.startswith(".")))
+"""
+
+
+def test_threads_save_open_read_and_read_lazily_at_the_same_time(tmp_path):
+    """The NetCDF library ends a process in which two threads use it at the same time."""
+    words = [sys.executable, "-c", THREADS, str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
+
+
+def test_lazy_and_dask_arrays_are_saved(tmp_path, result):
+    path = fc.save(result, tmp_path / "result.nc")
+    for chunks in (None, {"step": 1}):
+        with xr.open_dataset(path, chunks=chunks) as lazy:
+            copy = fc.save(lazy[["gap", "state"]] + 0 if chunks else lazy, tmp_path / "copy.nc")
+        reopened = fc.open(copy)
+        np.testing.assert_array_equal(reopened["gap"], result["gap"])
+        np.testing.assert_array_equal(reopened["state"], result["state"])
+
+
+def test_process_forked_during_a_save_can_save(tmp_path, result):
+    code = (
+        "import os, sys, threading, time, numpy as np, xarray as xr, fractalcontact as fc\n"
+        "noise = np.random.default_rng(1).normal(size=(4, 400, 400))\n"
+        "large = xr.Dataset({'gap': (('step', 'y', 'x'), noise)})\n"
+        "large.gap.encoding = {'zlib': True, 'complevel': 9}\n"
+        "fc.save(xr.Dataset({'gap': 1.0}), sys.argv[1] + '/first.nc')\n"
+        "saving = threading.Thread(target=fc.save, args=(large, sys.argv[1] + '/large.nc'))\n"
+        "saving.start(); time.sleep(0.1)\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    fc.save(xr.Dataset({'gap': 2.0}), sys.argv[1] + '/child.nc'); os._exit(0)\n"
+        "saving.join()\n"
+        "assert os.waitpid(child, 0)[1] == 0\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=120, check=True)
+    assert float(fc.open(tmp_path / "child.nc").gap) == 2.0
+    assert fc.open(tmp_path / "large.nc").gap.shape == (4, 400, 400)
 
 
 def test_unreadable_files_are_refused(tmp_path, result):
