@@ -137,6 +137,8 @@ def estimate(
         for column, name in enumerate(names):
             start = time.perf_counter()
             record = _ESTIMATORS[DEFAULT if name == "default" else name](single, window, bool(noise))
+            if single.finest_scale:
+                record = record.gridded(single.finest_scale)
             estimates.append(record.limited())
             times[row, column] = time.perf_counter() - start
     return _with_reasons(_dataset(surface, surfaces, names, estimates, times), names, estimates)
@@ -236,12 +238,15 @@ class CurveMethod:
             return undefined(CONSTANT) if surface.is_constant else plane()
         if surface.is_constant and not self.unit_note:
             return undefined(CONSTANT)
-        longest = (scales[1],) if self.has_lags and scales is not None else ()
+        low, high, rule = self.window(surface) if scales is None else (*scales, "asked for")
+        if surface.finest_scale and scales is None:
+            low, high = max(low, surface.finest_scale), max(high, 4.0 * surface.finest_scale)
+            rule = f"{rule}; not below the shortest wavelength that the points resolve"
+        longest = (high,) if self.has_lags and (scales is not None or surface.finest_scale) else ()
         # slopes do not depend on the unit of height, except for methods with a natural scale
         overflows = not self.unit_note and surface.squares_overflow
         curve = self.measure(surface.in_own_unit() if overflows else surface, *longest)
         lengths = 2.0 * np.pi / curve.scale if self.as_wavelength else curve.scale
-        low, high, rule = self.window(surface) if scales is None else (*scales, "asked for")
         inside = (lengths >= low * (1 - 1e-9)) & (lengths <= high * (1 + 1e-9)) & (curve.value > 0)
         if np.count_nonzero(inside) < 2:
             return undefined(f"fewer than two points of the curve between {low:g} m and {high:g} m")

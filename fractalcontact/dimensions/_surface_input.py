@@ -96,6 +96,18 @@ class Surface:
         return (False, *self.grid.periodic)[-2:]  # type: ignore[return-value]
 
     @property
+    def finest_scale(self) -> float:
+        """Shortest wavelength in m that the points of a gridded surface resolve; 0 if all are measured."""
+        scale = float(self.source.coords["finest_scale"]) if "finest_scale" in self.source.coords else 0.0
+        return scale if scale > 2.0 * min(self.grid.spacing) else 0.0
+
+    def resolved(self, scales: Scales) -> Scales:
+        """Return the window of lengths: as asked for, or without those that gridding has made."""
+        if scales is not None or not self.finest_scale:
+            return scales
+        return self.finest_scale, 4.0 * max(self.grid.extent)
+
+    @property
     def relative_spacing(self) -> tuple[float, ...]:
         """Spacings divided by dx: (dy/dx, 1), or (1,) for a profile."""
         return tuple(spacing / self.grid.spacing[-1] for spacing in self.grid.spacing)

@@ -20,7 +20,7 @@ from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, W
 
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
 SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
-READING = ("read", "sample", "channel", "units", "spacing", "level", "despike", "fill")
+READING = ("read", "sample", "channel", "units", "spacing", "columns", "plane", "level", "despike", "fill")
 SETTINGS = ("title", "paper", "error", "budget")
 TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")

@@ -6,7 +6,10 @@ midpoint     random midpoint displacement, with its known errors
 weierstrass  sum of cosines at geometric wavelengths (Ausloos and Berman)
 SelfAffine   closed forms of the self-affine spectrum
 from_array   heights on a uniform grid as a surface
-read         surface from a file: NetCDF, npy, csv, or an instrument's format
+from_points  points of a cloud or mesh, gridded
+fit_plane    best-fit plane of points, and the rotation into it
+read         surface from a file: NetCDF, npy, table, point cloud, mesh, raster, or an instrument's format
+read_points  points of a cloud or mesh, to select a part before they are gridded
 sample       surfaces installed with the package
 level        remove the mean, a plane or a quadric
 despike      remove isolated outliers of a scan

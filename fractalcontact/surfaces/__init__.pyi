@@ -2,10 +2,13 @@ from ._describe import describe as describe
 from ._despike import despike as despike
 from ._fbm import fbm as fbm
 from ._fill import fill as fill
+from ._fit_plane import fit_plane as fit_plane
 from ._from_array import from_array as from_array
+from ._from_points import from_points as from_points
 from ._level import level as level
 from ._midpoint import midpoint as midpoint
 from ._read import read as read
+from ._read_points import read_points as read_points
 from ._sample import sample as sample
 from ._self_affine import SelfAffine as SelfAffine
 from ._spectral import spectral as spectral
@@ -17,10 +20,13 @@ __all__ = [
     "despike",
     "fbm",
     "fill",
+    "fit_plane",
     "from_array",
+    "from_points",
     "level",
     "midpoint",
     "read",
+    "read_points",
     "sample",
     "spectral",
     "weierstrass",

@@ -5,7 +5,9 @@ from __future__ import annotations
 import gzip
 import io
 import math
+import re
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -14,6 +16,11 @@ import numpy as np
 from fractalcontact.base.errors import UnreadableFile
 
 Array = np.ndarray[Any, np.dtype[Any]]
+LEAST_UNPACKED = 1 << 26  # bytes to which any gzip file may unpack
+MOST_RATIO = 200  # of the unpacked size over that of the gzip file; text and heights reach 10
+COMMENTS = ("//", "%")
+DECIMAL = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
+HEADED = re.compile(r"(?P<name>[^\s\[(][^\[(\s]*(?: [^\[(\s]+)*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?(?=\s|$)")
 MISSING = ("", "nan", "na", "n/a", "null", "none", "--", "-nan")
 
 
@@ -24,14 +31,20 @@ def file_suffix(path: Path) -> str:
 
 
 def open_bytes(path: Path) -> IO[bytes]:
-    """Open a file for reading bytes; a gzip file is decompressed in memory."""
+    """Open a file for reading bytes; a gzip file is decompressed in memory, up to a multiple of its size."""
     if path.suffix.lower() != ".gz":
         return path.open("rb")
+    most = max(LEAST_UNPACKED, MOST_RATIO * path.stat().st_size)
     try:
-        return io.BytesIO(gzip.decompress(path.read_bytes()))
+        with gzip.open(path) as file:
+            content = file.read(most + 1)
     except (OSError, EOFError, zlib.error) as error:
         message = f"path: {path.name!r} is corrupt ({error})"
         raise UnreadableFile("fractalcontact.surfaces.read", [message]) from error
+    if len(content) > most:
+        message = f"path: {path.name!r} unpacks to more than {MOST_RATIO} times its size: unpack it first"
+        raise UnreadableFile("fractalcontact.surfaces.read", [message])
+    return io.BytesIO(content)
 
 
 class NotATable(ValueError):
@@ -42,11 +55,35 @@ class EmptyTable(NotATable):
     """A text file has no numbers."""
 
 
-def read_table(path: Path) -> Array:
+@dataclass(frozen=True)
+class Table:
+    """Numbers of a text file, one row per line, and what its header states.
+
+    Attributes
+    ----------
+    values : ndarray, shape (rows, columns)
+    names, units : tuple of str
+        One for each column, as in the header; empty where there is none.
+    is_named : bool
+        The first line has names, not numbers.
+    decimal_comma : bool
+    """
+
+    values: Array
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    is_named: bool = False
+    decimal_comma: bool = False
+
+
+def read_table(path: Path) -> Table:
     """Return the numbers of a text file, one row per line.
 
-    Values are separated by semicolons, tabs, commas or blanks, with or without quotes; `#` starts a comment;
-    a separator at the end of every line is ignored. Cells that are empty or one of `MISSING` are NaN.
+    Values are separated by semicolons, tabs, commas or blanks, with or without quotes; `#`, `//` or `%` start
+    a comment; a separator at the end of every line is ignored. Cells that are empty or one of `MISSING` are
+    NaN. A first line without any number has the names of the columns; so may the last comment before the
+    numbers. Numbers between semicolons, tabs or blanks may have decimal commas. The number of rows on a line
+    of its own before them (PTS) is left out.
 
     Raises
     ------
@@ -58,19 +95,74 @@ def read_table(path: Path) -> Array:
             text = file.read().decode("utf-8-sig")
         except UnicodeDecodeError as error:
             raise NotATable(f"it is not text: byte {error.start} is not UTF-8") from error
-    lines = [
-        (number, content)
-        for number, line in enumerate(text.splitlines(), 1)
-        if (content := line.partition("#")[0].strip(" \r\n"))
-    ]
+    lines, comment = _content_lines(text)
     if not lines:
         raise EmptyTable("no numbers in it")
-    delimiter = next((mark for mark in ";\t," if mark in lines[0][1]), None)
+    if len(lines) > 1 and lines[0][1].isdigit() and int(lines[0][1]) == len(lines) - 1:
+        lines = lines[1:]
+    first = lines[0][1]
+    delimiter = next((mark for mark in ";\t," if mark in first), None)
+    is_named = len(lines) > 1 and _has_no_number(first.split(delimiter))
+    rows = lines[1:] if is_named else lines
+    comma = _has_decimal_comma(rows[0][1])
+    if comma:
+        delimiter = None if delimiter == "," else delimiter
+        rows = [(number, content.replace(",", ".")) for number, content in rows]
     try:
         # the fast path, for a table without missing cells
-        return np.loadtxt([content for _, content in lines], delimiter=delimiter, ndmin=2, comments=None)
+        contents = [content for _, content in rows]
+        values = np.loadtxt(contents, delimiter=delimiter, ndmin=2, comments=None)
     except ValueError:
-        return _parsed([(number, content.split(delimiter)) for number, content in lines], delimiter)
+        values = _parsed([(number, content.split(delimiter)) for number, content in rows], delimiter)
+    names, units = _header(first if is_named else comment, delimiter, values.shape[1])
+    return Table(values, names, units, is_named, comma)
+
+
+def _content_lines(text: str) -> tuple[list[tuple[int, str]], str]:
+    """Return number and content of the lines that are not empty, and the last comment before them."""
+    lines: list[tuple[int, str]] = []
+    comment = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        content = line.partition("#")[0].strip(" \r\n")
+        if not lines and (not content or content.startswith(COMMENTS)):
+            comment = line.strip(" \r\n#/%") or comment
+        elif content and not content.startswith(COMMENTS):
+            lines.append((number, content))
+    return lines, comment
+
+
+def _has_no_number(cells: list[str]) -> bool:
+    """Return whether every cell has letters, and none is a number or stands for a missing one."""
+    words = [cell.strip().strip("\"'").strip() for cell in cells]
+    filled = [word for word in words if word]
+    return (
+        bool(filled)
+        and all(word[0].isalpha() or word[0] == "_" for word in filled)
+        and not any(word.lower() in (*MISSING, "inf", "infinity") for word in filled)
+    )
+
+
+def _has_decimal_comma(line: str) -> bool:
+    """Return whether the commas of a line of numbers are decimal commas."""
+    if "," not in line or "." in line:
+        return False
+    mark = next((mark for mark in ";\t" if mark in line), None)
+    cells = [cell.strip() for cell in line.split(mark) if cell.strip()]
+    return (mark is not None or len(cells) > 1) and all(
+        DECIMAL.fullmatch(cell) or cell.lower() in MISSING for cell in cells
+    )
+
+
+def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units of the columns; none where their number is another than that of the columns."""
+    parts = line.split(delimiter) if delimiter else [match.group() for match in HEADED.finditer(line)]
+    while len(parts) > columns and not parts[-1].strip():
+        parts.pop()
+    matches = [HEADED.match(part.strip().strip("\"'").strip()) for part in parts]
+    if len(matches) != columns or any(match is None for match in matches):
+        return (), ()
+    found = [match for match in matches if match is not None]
+    return tuple(match["name"].strip() for match in found), tuple(match["unit"] or "" for match in found)
 
 
 def _parsed(rows: list[tuple[int, list[str]]], delimiter: str | None) -> Array:

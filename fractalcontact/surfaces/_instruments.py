@@ -1,4 +1,4 @@
-"""Instrument files read by SurfaceTopography, converted to (y, x), metres and NaN."""
+"""Files of instruments (SurfaceTopography) and rasters (rasterio), as (y, x), metres and NaN."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
+PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
 # formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map
 FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "xyz")
@@ -227,6 +228,73 @@ def _steps(
         return tuple(float(step) for step in np.broadcast_to(spacing, len(points)))
     edges = [in_metres(float(edge), str(lateral)) for edge in np.atleast_1d(size)][::-1]
     return tuple(edge / n for edge, n in zip(edges, points, strict=True))
+
+
+def read_raster(path: Path, channel: str | int | None, units: str | None, spacing: Any) -> Reading:
+    """Read one band of a raster in projected coordinates; the arguments are those of `read_instrument`."""
+    if importlib.util.find_spec("rasterio") is None:
+        raise MissingExtra(f"reading {path.name!r}", "rasterio", "geo")
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+    band = 1 if channel is None else int(channel) + 1 if isinstance(channel, (int, np.integer)) else 0
+    try:
+        with warnings.catch_warnings(), open_bytes(path) as stream:
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            content = stream.read()
+            with (
+                rasterio.MemoryFile(content, filename=path.name.removesuffix(".gz")) as file,
+                file.open() as raster,
+            ):
+                _check_raster(raster, band, channel, spacing)
+                heights = np.ma.filled(raster.read(band, masked=True).astype(np.float64), np.nan)
+                transform, system, stated = raster.transform, raster.crs, raster.units[band - 1]
+    except RasterioError as error:
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({str(error)[:200]})"]) from error
+    # without a reference system lengths are in the unit given, or metres
+    factor = float(system.linear_units_factor[1]) if system else in_metres(1.0, units or "m")
+    vertical = units or stated
+    heights = np.asarray(in_metres(heights, vertical) if vertical in UNITS else heights * factor)
+    steps = np.array([abs(transform.e), abs(transform.a)]) * factor
+    if spacing is not None:
+        steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
+    # the first row of most rasters is the northern one; an image without a position is no exception
+    if transform.e < 0 or transform.is_identity:
+        heights = heights[::-1]
+    if transform.a < 0:
+        heights = heights[:, ::-1]
+    entries = {
+        "format": "raster",
+        "stated_unit": stated or (str(system.linear_units) if system else None),
+        "projection": system.to_string() if system else None,
+        "origin": [transform.c * factor, transform.f * factor],
+        "reader": f"rasterio {rasterio.__version__}",
+    }
+    heights = np.where(np.isfinite(heights), heights, np.nan)
+    return Reading(heights, (float(steps[0]), float(steps[1])), False, False, entries, "bottom")
+
+
+def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:
+    """Check for one band of real heights in projected coordinates, with rows along x."""
+    transform = raster.transform
+    with Problems(WHERE, UnreadableFile) as problems:
+        problems.require(
+            1 <= band <= raster.count, "channel", f"a band from 0 to {raster.count - 1}", channel
+        )
+        if 1 <= band <= raster.count:
+            dtype = raster.dtypes[band - 1]
+            problems.require(np.dtype(dtype).kind in "fiu", "path", "real heights", dtype)
+        is_degree = bool(raster.crs) and raster.crs.is_geographic
+        problems.require(
+            not is_degree, "path", f"projected coordinates; {PROJECT}", "longitudes and latitudes"
+        )
+        is_turned = transform.b != 0 or transform.d != 0
+        problems.require(not is_turned, "path", "rows along x; resample it first", "a rotated raster")
+        is_plain = transform.is_identity and not raster.crs
+        expected = (
+            "a raster with a position; give `spacing`, or read a mask with fractalcontact.domains.read_mask"
+        )
+        problems.require(not is_plain or spacing is not None, "path", expected, "an image without one")
 
 
 def _plain_unit(unit: Any) -> Any:

@@ -20,16 +20,53 @@ from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._files import EmptyTable, NotATable, file_suffix, read_npy, read_table
+from fractalcontact.surfaces._files import (
+    EmptyTable,
+    NotATable,
+    Table,
+    file_suffix,
+    open_bytes,
+    read_npy,
+    read_table,
+)
+from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
 from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
+from fractalcontact.surfaces._instruments import Reading, read_instrument, read_raster
+from fractalcontact.surfaces._read_points import (
+    ALWAYS_POINTS,
+    CLOUDS,
+    LEAST_POINTS,
+    MESHES,
+    Points,
+    check_columns,
+    is_list,
+    listed_points,
+    point_content,
+)
 from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
-TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *ALWAYS_POINTS)
+RASTERS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"ncols", b"NCOLS", b"DSAA", b"DSBB", b"DSRB")
+IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
+WIDE_CLOUD = 20.0  # m: points of a file without a unit that are wider may be in millimetres
 RELIEF = (1e-6, 10.0)  # plausible range of heights over lateral extent
+TALL, MOST_COLUMNS = 20, 12  # rows over columns, and columns, of a table that may be a list of points
+GRIDDING = (
+    "plane",
+    "rotation_matrix",
+    "centre",
+    "gridding",
+    "points",
+    "missing_points",
+    "repeated_nodes",
+    "point_distance",
+    "largest_gap",
+    "overhang_share",
+)  # entries of the provenance of `from_points`
 WIDEST = 1.0  # m: wider than the field of any microscope
 
 
@@ -42,7 +79,19 @@ class FileContent:
     is_microscope: bool = False
 
 
-def _check(problems: Problems, *, path: Any, channel: Any, units: Any, spacing: Any, first_row: Any) -> None:
+def _check(
+    problems: Problems,
+    *,
+    path: Any,
+    channel: Any,
+    units: Any,
+    spacing: Any,
+    first_row: Any,
+    columns: Any,
+    plane: Any,
+) -> None:
+    check_columns(problems, columns)
+    check_frame(problems, plane)
     if spacing is not None:
         check_spacing(problems, spacing)
     problems.choice("units", units, UNITS, optional=True)
@@ -72,26 +121,33 @@ def read(
     units: str | None = None,
     spacing: float | Sequence[float] | None = None,
     first_row: str | None = None,
+    columns: Sequence[str | int] | None = None,
+    plane: str | xr.Dataset | xr.DataArray | None = None,
 ) -> xr.DataArray:
     """Read a measured surface from a file.
 
     Parameters
     ----------
     path : path-like
-        NetCDF (`.nc`), numpy (`.npy`), a table of numbers in text (`.csv`, `.txt` ...; rows are y), or an
-        instrument's file (extra `io`); a gzip file (`.gz`) of these is decompressed. `.npy` and tables need
-        `spacing`.
+        NetCDF (`.nc`), numpy (`.npy`), text (`.csv`, `.txt` ...) with a table of heights, whose rows are y,
+        or with points (two or three columns, `.xyz`, `.pts`), a mesh or cloud (`.ply`, `.stl`, `.obj`,
+        `.las`; extra `mesh`), a raster (GeoTIFF, ESRI ASCII, Surfer; extra `geo`), an instrument's file
+        (extra `io`), or one of these with `.gz`. `.npy` and tables of heights need `spacing`; points are
+        gridded by `from_points`.
     channel : str or int, optional
-        Channel of an instrument's file, or variable of a NetCDF file. Default: the first height channel.
+        Channel of an instrument's file, variable of a NetCDF file, or band of a raster (from 0). Default:
+        the first height channel.
     units : str, optional
-        Unit of the heights: "m", "mm", "um", "nm" ... Default: that of the file, or metres for `.npy` and
-        tables. A unit other than that of the file replaces it, with a warning.
+        Unit of the heights, and of all coordinates of points: "m", "mm", "um", "nm" ... Default: that of the
+        file, or metres where it states none. A unit other than that of the file replaces it, with a warning.
     spacing : float, or (y, x), optional
-        Distance between points in metres; replaces that of the file.
+        Distance between points in metres; replaces that of the file. Of points: that of the cells.
     first_row : {"bottom", "top"}, optional
         Whether the first row of the file has the smallest y, or is the top of the map, which is flipped.
-        Default: "top" for an instrument's file (its reader orders the rows as an image), "bottom" for `.npy`,
-        tables and points. NetCDF files have their own y.
+        Default: "top" for an instrument's file (its reader orders the rows as an image), "bottom" for `.npy`
+        and tables. NetCDF files and rasters have their own y.
+    columns, plane : optional
+        Of points: see `read_points` and `from_points`.
 
     Returns
     -------
@@ -104,13 +160,13 @@ def read(
     UnreadableFile
         The file is corrupt, of an unknown format, states no unit or size, or is not a uniform grid.
     MissingExtra
-        An instrument's file, and SurfaceTopography is not installed.
+        The library that reads the format is not installed.
 
     Warns
     -----
     ScaleWarning
-        The range of the heights over the extent is outside 1e-6 ... 10, or a microscope's field is wider than
-        1 m: some files, and some readers, are wrong by factors of 1000.
+        The range of the heights over the extent is outside 1e-6 ... 10, a microscope's field is wider than
+        1 m, or points without a unit extend over more than 20 m: factors of 1000 are common.
 
     Notes
     -----
@@ -128,7 +184,15 @@ def read(
     (3, 1.5e-06, 1)
     """
     source = Path(path)
-    content = file_content(source, channel=channel, units=units, spacing=spacing, first_row=first_row)
+    content = file_content(
+        source,
+        channel=channel,
+        units=units,
+        spacing=spacing,
+        first_row=first_row,
+        columns=columns,
+        plane=plane,
+    )
     stated = content.entries["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
@@ -151,47 +215,114 @@ def file_content(
     units: str | None = None,
     spacing: Any = None,
     first_row: str | None = None,
+    columns: Sequence[str | int] | None = None,
+    plane: Any = None,
 ) -> FileContent:
     """Read a file with the reader of its format."""
     suffix = file_suffix(path)
     if suffix in NETCDF:
         return _netcdf_content(path, channel, units, spacing)
-    if suffix == ".npy" or (suffix in TABLES and spacing is not None):
-        return _table_content(path, channel, units, spacing, first_row)
+    if suffix in (*MESHES, *CLOUDS):
+        return _gridded_points(point_content(path, columns), path, units, spacing, plane)
+    if suffix == ".npy":
+        return _table_content(path, None, units, spacing, first_row)
+    with open_bytes(path) as file:
+        head = file.read(8)
+    if head.startswith(RASTERS):
+        return _reading_content(read_raster(path, channel, units, spacing), "bottom")
+    if head.startswith(IMAGES):
+        expected = "heights; fractalcontact.domains.read_mask reads the mask of an image"
+        raise UnreadableFile(WHERE, [f"path: expected {expected}, got {path.name!r}"])
+    if suffix in TABLES:
+        return _text_content(path, channel, units, spacing, first_row, columns, plane)
     return _instrument_content(path, channel, units, spacing, first_row)
 
 
-def _table_content(
-    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
+def _text_content(
+    path: Path,
+    channel: str | int | None,
+    units: str | None,
+    spacing: Any,
+    first_row: str | None,
+    columns: Sequence[str | int] | None,
+    plane: Any,
 ) -> FileContent:
-    """Read an array of numbers.
-
-    Text that is not a table may be the file of an instrument that states its size.
-    """
-    is_text = file_suffix(path) != ".npy"
+    """Read text: a list of points, a table of heights, or the file of an instrument."""
     try:
-        values = read_table(path) if is_text else read_npy(path)
-    except ValueError as error:
-        if isinstance(error, NotATable) and not isinstance(error, EmptyTable):
+        table = read_table(path)
+    except NotATable as error:
+        if columns is None and spacing is None and file_suffix(path) not in ALWAYS_POINTS:
+            return _instrument_content(path, channel, units, spacing, first_row)
+        if not isinstance(error, EmptyTable):
             with contextlib.suppress(UnreadableFile, MissingExtra):
                 content = _instrument_content(path, channel, units, spacing, first_row)
                 # a list of points has a size too, whatever its lines are
                 if content.entries["stated_size"] is not None and content.entries["format"] != "xyz":
                     return content
-        fault = "is not a table of numbers" if is_text else "is corrupt"
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault} ({error})"]) from error
+        fault = f"is not a table of numbers ({error})"
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault}"]) from error
+    if is_list(table, path, columns):
+        return _gridded_points(listed_points(table, path, columns), path, units, spacing, plane)
+    rows, number = table.values.shape
+    with Problems(WHERE, UnreadableFile) as problems:
+        if table.is_named:
+            expected = "line 1, column 1: expected a number"
+            first = table.names[0] if table.names else "words"
+            message = f"path: {path.name!r} is not a table of numbers ({expected}, got {first!r})"
+            problems.messages.append(message)
+        expected = "a grid of heights, or `columns`, the names or numbers of those of x, y, z"
+        is_tall = number < MOST_COLUMNS and rows > TALL * number
+        problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
+    if spacing is None:
+        return _instrument_content(path, channel, units, spacing, first_row)
+    return _table_content(path, table, units, spacing, first_row)
+
+
+def _gridded_points(points: Points, path: Path, units: str | None, spacing: Any, plane: Any) -> FileContent:
+    """Grid the points of a file."""
+    from fractalcontact.surfaces._from_points import from_points  # loads numba
+
+    unit = units or points.unit or "m"
+    step = None if spacing is None else float(np.atleast_1d(spacing)[0])
+    with Problems(WHERE, UnreadableFile) as problems:
+        problems.require(
+            np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing
+        )
+    with Problems(WHERE, UnreadableFile):  # its problems are those of the file
+        surface = from_points(points.position, step, triangles=points.triangles, units=unit, plane=plane)
+    gridding = {key: value for key, value in provenance_of(surface).items() if key in GRIDDING}
+    widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
+    if units is None and points.unit is None and widest > WIDE_CLOUD:
+        message = (
+            f"{path.name}: the points extend over {widest:.3g} m and the file states no unit: if they are "
+        )
+        warnings.warn(message + "in millimetres, give units='mm'; else units='m'", ScaleWarning, stacklevel=6)
+    return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
+
+
+def _table_content(
+    path: Path,
+    table: Table | None,
+    units: str | None,
+    spacing: Any,
+    first_row: str | None,
+) -> FileContent:
+    """Return an array of numbers: a text table, or that of an npy file."""
+    try:
+        values = read_npy(path) if table is None else table.values
+    except ValueError as error:
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
+    if table is None and values.ndim == 2 and values.shape[1] in (2, 3) and len(values) >= LEAST_POINTS:
+        return _gridded_points(Points(values.astype(np.float64)), path, units, spacing, None)
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"the spacing in metres, which {path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
-        if is_text:
+        if table is not None:
             expected = "a grid of heights, one row to a line"
             problems.require(min(values.shape) > 1, "path", expected, f"shape {values.shape}")
-            is_list = values.shape[1] == 3 and values.shape[0] > 9
-            points = "three columns, which look like x, y, z points"
-            problems.require(not is_list, "path", expected, points)
         if not problems.messages:
             check_spacing(problems, spacing, check_heights(problems, values))
     heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")
@@ -206,9 +337,6 @@ def _from_bottom(values: Array, first_row: str | None) -> Array:
 def _instrument_content(
     path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
 ) -> FileContent:
-    # SurfaceTopography is optional and slow to import
-    from fractalcontact.surfaces._instruments import read_instrument
-
     try:
         reading = read_instrument(path, channel, units, spacing)
     except MissingExtra:
@@ -216,6 +344,11 @@ def _instrument_content(
             expected = f"the spacing in metres, for {path.name!r} as a table of heights"
             raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
         raise
+    return _reading_content(reading, first_row)
+
+
+def _reading_content(reading: Reading, first_row: str | None) -> FileContent:
+    """Return what an optional library has read as a surface."""
     periodic = (reading.periodic,) * len(reading.spacing)
     row = first_row or reading.first_row
     heights = surface_array(_from_bottom(reading.heights, row), reading.spacing, periodic)

@@ -57,7 +57,7 @@ def test_empty_cells_are_missing(tmp_path):
         ("1,2,3\n4,abc,6\n7,8,9\n", "line 2, column 2: expected a number, got 'abc'"),
         ("left,right\n1,2\n3,4\n", "line 1, column 1: expected a number, got 'left'"),
         ("# made by hand\n1 2 3\n4 5\n6 7 8\n", "line 3 has 2 values, line 2 has 3"),
-        ("1;2,5;3\n4;5;6\n", "line 1, column 2: .* a decimal comma"),
+        ("1;2,5,1;3\n4;5;6\n", "line 1, column 2: .* a decimal comma"),
         ("1,2\n3,4 um\n", "line 2, column 2: expected a number, got '4 um'"),
         ("1,2\n3,1_0\n", "line 2, column 2"),
         ("1,2\n3,-\n", "line 2, column 2"),
@@ -82,10 +82,39 @@ def test_missing_marks_quotes_and_trailing_separators(tmp_path):
     np.testing.assert_array_equal(surface.values, [[1, np.nan, np.nan], [np.nan, np.nan, 6]])
 
 
-def test_list_of_points_is_refused(tmp_path):
-    np.savetxt(tmp_path / "points.csv", np.random.default_rng(0).random((50, 3)), delimiter=",")
-    with pytest.raises(UnreadableFile, match="x, y, z"):
-        fc.surfaces.read(tmp_path / "points.csv", spacing=1.0)
+@pytest.mark.parametrize(("mark", "text"), [(";", "1,5;2,5\n3;4,25\n"), (" ", "1,5 2,5\n3 4,25\n")])
+def test_decimal_commas(tmp_path, mark, text):
+    (tmp_path / "a.csv").write_text(text)
+    surface = fc.surfaces.read(tmp_path / "a.csv", spacing=1.0)
+    np.testing.assert_array_equal(surface.values, [[1.5, 2.5], [3.0, 4.25]])
+
+
+@pytest.mark.parametrize("columns", [2, 3])
+@pytest.mark.parametrize("suffix", ["csv", "npy", "dat.gz"])
+def test_list_of_points_is_never_a_grid(tmp_path, columns, suffix):
+    """Two or three columns are points, with `spacing` or without, in text and in arrays."""
+    points = np.random.default_rng(0).random((500, columns)) * (
+        [1.0, 0.1] if columns == 2 else [1.0, 1.0, 0.1]
+    )
+    path = tmp_path / f"points.{suffix}"
+    if suffix == "npy":
+        np.save(path, points)
+    else:
+        np.savetxt(path, points, delimiter=",")  # also packs
+    for spacing in (None, 0.05):
+        surface = fc.surfaces.read(path, spacing=spacing, plane=None if suffix == "npy" else "xy")
+        assert surface.ndim == columns - 1
+        assert max(surface.shape) < (100 if columns == 3 else 700)
+        assert float(surface.finest_scale) > 0
+
+
+def test_wide_table_that_may_be_points_is_refused(tmp_path):
+    rows = np.random.default_rng(0).random((400, 6))
+    np.savetxt(tmp_path / "cloud.txt", rows)
+    with pytest.raises(UnreadableFile, match="columns"):
+        fc.surfaces.read(tmp_path / "cloud.txt", spacing=1.0)
+    surface = fc.surfaces.read(tmp_path / "cloud.txt", spacing=0.1, columns=[0, 1, 2], plane="xy")
+    assert surface.shape == (10, 10)
 
 
 def test_netcdf_round_trip(tmp_path):

@@ -1,0 +1,445 @@
+"""Points of a cloud or mesh, gridded as a surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.grid import DECADES
+from fractalcontact.base.jit import kernel
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._fit_plane import (
+    check_frame,
+    check_points,
+    finite_points,
+    fit_plane,
+    frame_of,
+    point_array,
+)
+from fractalcontact.surfaces._grid_input import check_length
+from fractalcontact.surfaces._units import UNITS
+
+Array = np.ndarray[Any, np.dtype[Any]]
+WHERE = "fractalcontact.surfaces.from_points"
+
+RESOLVED = 8.0  # point distances in the shortest wave that gridding leaves unchanged
+ALIASED = 4.0  # spacings, the same for a coarse grid, whose shortest waves hold parts of still shorter ones
+BRIDGED = 3.0  # default largest gap, in median longest edges of a triangle
+FINEST = 0.1  # least spacing over the point distance
+OFF_NODE = 0.05  # largest distance of a point from its node on a uniform grid, in spacings
+EXACT = 1e-6  # of the extent: smaller differences of positions are rounding
+SCATTER = 0.2  # of the largest jump between positions: smaller ones are scatter about a node
+OCCUPIED = 0.5  # least share of the nodes of a uniform grid that have a point
+MOST_CELLS = 1 << 28
+
+
+def _check(
+    problems: Problems,
+    *,
+    points: Any,
+    spacing: Any,
+    triangles: Any,
+    units: Any,
+    plane: Any,
+    largest_gap: Any,
+) -> None:
+    is_valid = check_points(problems, points)
+    check_length(problems, "spacing", spacing, optional=True)
+    check_length(problems, "largest_gap", largest_gap, optional=True)
+    problems.choice("units", units, UNITS)
+    values = point_array(points) if is_valid else None
+    shape = (0, 3) if values is None else values.shape
+    check_frame(problems, plane, None if values is None else shape[1])
+    triangles = _triangles(points, triangles)
+    if triangles is not None:
+        faces = np.asarray(triangles)
+        valid = faces.dtype.kind in "iu" and faces.ndim == 2 and faces.shape[1] == 3 and len(faces) > 0
+        problems.require(valid, "triangles", "numbers of points, shape (m, 3)", triangles)
+        if valid and values is not None:
+            problems.require(shape[1] == 3, "points", "x, y, z for a mesh", f"shape {shape}")
+            inside = int(faces.min()) >= 0 and int(faces.max()) < shape[0]
+            expected = f"numbers of points from 0 to {shape[0] - 1}"
+            problems.require(inside, "triangles", expected, f"{faces.min()} ... {faces.max()}")
+
+
+def _triangles(points: Any, triangles: Any) -> Any:
+    """Return the triangles that are given, or those of a mesh that was read."""
+    if triangles is None and isinstance(points, xr.Dataset) and "triangles" in points:
+        return points["triangles"].values
+    return triangles
+
+
+@public_result(
+    title="Surface gridded from points",
+    references="Delaunay triangulation: Barber, Dobkin and Huhdanpaa, The Quickhull algorithm for convex "
+    "hulls, ACM Transactions on Mathematical Software 22 (1996) 469-483",
+    achieved_error="between the points nothing was measured: see finest_scale",
+    check=_check,
+)
+def from_points(
+    points: Any,
+    spacing: float | None = None,
+    *,
+    triangles: Any = None,
+    units: str = "m",
+    plane: str | xr.Dataset | xr.DataArray | None = None,
+    largest_gap: float | None = None,
+) -> xr.DataArray:
+    """Grid scattered points as heights above a plane.
+
+    Parameters
+    ----------
+    points : array-like, shape (n, 3), or (n, 2) for a profile; or Dataset
+        x, y, z, or x, z, in any order, or a result of `read_points`. Rows with a missing coordinate (NaN,
+        masked) are left out.
+    spacing : float, optional
+        Distance between the cells, in metres. Default: the mean distance of the points.
+    triangles : array-like of int, shape (m, 3), optional
+        Rows of `points` that the triangles of a mesh join. Default: the Delaunay triangulation of the points
+        in the plane.
+    units : str
+        Unit of the points: "m", "mm", "um" ...
+    plane : {"fit", "xy"}, Dataset or DataArray, optional
+        "fit": rotate into the best-fit plane (see `fit_plane`); "xy": heights are z, as in a table that was
+        levelled before. A result of `fit_plane`, or a surface gridded before, puts two faces into one plane.
+        Default: "xy" for points on a uniform grid, "fit" for others.
+    largest_gap : float, optional
+        Longest edge of a triangle, in metres, that is bridged. Default: three times the median of the
+        longest edges; of a mesh, all triangles.
+
+    Returns
+    -------
+    DataArray
+        `height` in metres with dims (y, x), or (x,) for a profile; NaN where no triangle is. The coordinate
+        `finest_scale` (m) is the shortest wavelength that gridding leaves unchanged; the estimators of
+        `fractalcontact.dimensions` use no shorter ones unless asked to. The provenance has the rotation, the
+        centre, and the numbers of points, missing cells and overhangs.
+
+    Raises
+    ------
+    InvalidInput
+        Too few points, all on one line, too thick a cloud for a plane, or a spacing that does not fit it.
+
+    Notes
+    -----
+    Heights are linear in each triangle. Points on a uniform grid, of which at least half are there, are not
+    interpolated, and have no `finest_scale`. Otherwise it is eight point distances, from the mean square of
+    the longest edges over the area, where the power is about 8 % too low, or four spacings of a coarse grid.
+    See page `theory_surfaces`.
+
+    References
+    ----------
+    Barber, Dobkin and Huhdanpaa (1996), ACM Transactions on Mathematical Software 22.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> x, y = np.random.default_rng(1).uniform(0.0, 50.0, (2, 2000))
+    >>> points = np.stack([x, y, 0.1 * x + 3.0], axis=1)
+    >>> surface = fc.surfaces.from_points(points, units="mm")
+    >>> bool(abs(surface).max() < 1e-12), round(float(surface.finest_scale), 3)
+    (True, 0.012)
+    """
+    values, triangles = finite_points(points, units), _triangles(points, triangles)
+    frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
+    if values.shape[1] == 2:
+        gridded = _profile(values, spacing, largest_gap)
+    elif (lattice := _lattice(values, spacing) if triangles is None else None) is not None:
+        gridded = lattice
+    else:
+        given = None if triangles is None else _finite_triangles(point_array(points), triangles)
+        gridded = _triangulated(values, spacing, given, largest_gap)
+    facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
+    core = ("y", "x")[2 - gridded.heights.ndim :]
+    surface = xr.DataArray(
+        gridded.heights, dict(zip(core, gridded.centres, strict=True)), core, name="height"
+    )
+    if gridded.finest is not None:
+        surface = surface.assign_coords(finest_scale=gridded.finest)
+    parameters: dict[str, Any] = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
+    surface.attrs = {"parameters": parameters, "gridding": gridded.method, **facts, **gridded.facts}
+    return surface
+
+
+@dataclass(frozen=True)
+class Gridded:
+    """Heights on a grid, centres of the cells (y, x), finest scale, and facts for the provenance."""
+
+    heights: Array
+    centres: tuple[Array, ...]
+    finest: float | None
+    method: str
+    facts: dict[str, Any]
+
+
+def _in_plane(points: Array, plane: Any, spacing: float | None) -> tuple[dict[str, Any], Array]:
+    """Return provenance entries of the plane, and the points in it."""
+    if plane is None:
+        plane = "fit" if _regular_axes(points, spacing) is None else "xy"
+    if isinstance(plane, str) and plane == "xy":
+        return {"plane": "xy"}, points
+    frame = frame_of(fit_plane(points) if isinstance(plane, str) else plane)
+    assert frame is not None  # checked before
+    rotation, centre = frame
+    entries = {"plane": "best fit", "rotation_matrix": rotation.tolist(), "centre": centre.tolist()}
+    return entries, (points - centre) @ rotation.T
+
+
+def _lattice(points: Array, spacing: float | None) -> Gridded | None:
+    """Return heights of points that are on a uniform grid; None if they are not."""
+    axes = _regular_axes(points, spacing)
+    if axes is None:
+        return None
+    shape = tuple(axis.count for axis in axes)
+    index = np.ravel_multi_index(
+        tuple(axis.index(points[:, column]) for axis, column in zip(axes, (1, 0), strict=True)), shape
+    )
+    # heights at one node are averaged
+    count = np.bincount(index, minlength=math.prod(shape))
+    total = np.bincount(index, weights=points[:, 2], minlength=math.prod(shape))
+    with np.errstate(invalid="ignore"):
+        heights = (total / np.where(count > 0, count, np.nan)).reshape(shape)
+    repeated = int(np.count_nonzero(count > 1))
+    facts = {"repeated_nodes": repeated}
+    centres = tuple(axis.centres for axis in axes)
+    return Gridded(heights, centres, None, "none: the points are on a grid", facts)
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """A uniform axis: first centre, spacing, number of centres."""
+
+    first: float
+    spacing: float
+    count: int
+
+    @property
+    def centres(self) -> Array:
+        return self.first + self.spacing * np.arange(self.count)
+
+    def index(self, positions: Array) -> Array:
+        return np.rint((positions - self.first) / self.spacing).astype(np.int64)
+
+
+def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | None:
+    """Return the axes (y, x), or (x,), of a uniform grid on which the points are; None if there is none."""
+    columns = (0,) if points.shape[1] == 2 else (1, 0)
+    found = [_regular_axis(points[:, column], len(points)) for column in columns]
+    axes = tuple(axis for axis in found if axis is not None)
+    if len(axes) < len(columns):
+        return None
+    if math.prod(axis.count for axis in axes) * OCCUPIED > len(points):
+        return None
+    matches = spacing is None or all(abs(axis.spacing - spacing) <= 1e-3 * spacing for axis in axes)
+    return axes if matches else None
+
+
+def _regular_axis(positions: Array, most: int) -> _Axis | None:
+    """Return the uniform axis of positions that repeat, or are rounded; None if they are not uniform."""
+    extent = float(np.ptp(positions))
+    if extent == 0.0:
+        return None
+    ordered = np.sort(positions)
+    jumps = np.diff(ordered)
+    # exact positions with gaps of any length; or centres with some scatter about each
+    for least in (EXACT * extent, SCATTER * float(jumps.max())):
+        count = round(extent / float(np.median(jumps[jumps > least]))) + 1
+        if not 2 <= count <= 2 * most:
+            continue
+        # the mean step over the extent is more accurate than that of rounded positions
+        axis = _Axis(float(ordered[0]), extent / (count - 1), count)
+        place = (ordered - axis.first) / axis.spacing
+        if float(np.abs(place - np.rint(place)).max()) <= OFF_NODE:
+            return axis
+    return None
+
+
+def _profile(points: Array, spacing: float | None, largest_gap: float | None) -> Gridded:
+    """Return heights of a profile: as measured if the points are uniform, else interpolated linearly."""
+    axes = _regular_axes(points, spacing)
+    x, inverse, repeats = np.unique(points[:, 0], return_inverse=True, return_counts=True)
+    if axes is not None:
+        index, (axis,) = axes[0].index(points[:, 0]), axes
+        count = np.bincount(index, minlength=axis.count)
+        total = np.bincount(index, weights=points[:, 1], minlength=axis.count)
+        with np.errstate(invalid="ignore"):
+            heights = total / np.where(count > 0, count, np.nan)
+        return Gridded(heights, (axis.centres,), None, "none: the points are uniform", {})
+    z = np.bincount(inverse, weights=points[:, 1]) / repeats
+    if x.size < 3:
+        raise InvalidInput(WHERE, ["points: expected at least 3 positions along the profile"])
+    distances = np.diff(x)
+    longest = BRIDGED * _weighted_median(distances, distances) if largest_gap is None else float(largest_gap)
+    bridged = distances <= longest
+    if not bridged.any():
+        raise InvalidInput(WHERE, [_gap_problem(longest, float(distances.min()))])
+    near = distances[bridged]
+    # of a uniform profile the distance itself; long distances count by their length
+    distance = float(np.sqrt(np.average(near**2, weights=near)))
+    step = _step(spacing, float(near.mean()), distance)
+    (centres,) = _centres(x[[0]], x[[-1]], step)
+    heights = np.interp(centres, x, z)
+    left = np.clip(np.searchsorted(x, centres, side="right") - 1, 0, x.size - 2)
+    heights[~bridged[left]] = np.nan
+    facts = {"point_distance": distance, "largest_gap": longest}
+    finest = max(RESOLVED * distance, ALIASED * step)
+    return Gridded(heights, (centres,), finest, "linear between the points", facts)
+
+
+def _finite_triangles(points: Any, triangles: Any) -> Array:
+    """Return the triangles whose points are finite, with the numbers of the finite points."""
+    finite = np.isfinite(points).all(axis=1)
+    faces = np.asarray(triangles, dtype=np.int64)
+    numbers = np.cumsum(finite) - 1
+    return np.asarray(numbers[faces[finite[faces].all(axis=1)]])
+
+
+def _triangulated(
+    points: Array, spacing: float | None, given: Array | None, largest_gap: float | None
+) -> Gridded:
+    """Return heights that are linear in triangles, NaN outside them."""
+    origin = points[:, :2].min(axis=0)
+    flat = points[:, :2] - origin
+    triangles = _delaunay(flat) if given is None else given
+    corners = flat[triangles]
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.sqrt((sides**2).sum(axis=-1).max(axis=1))
+    doubled = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+    areas = np.abs(doubled)
+    if not areas.sum() > 0:
+        raise InvalidInput(WHERE, ["points: expected points that span an area in the plane"])
+    gap = math.inf if given is not None else BRIDGED * _weighted_median(longest, areas)
+    gap = gap if largest_gap is None else float(largest_gap)
+    kept = (longest <= gap) & (areas > 0)
+    if not kept.any():
+        raise InvalidInput(WHERE, [_gap_problem(gap, float(longest.min()))])
+    # of a square grid the distance itself: its triangles have longest edges of sqrt(2) distances
+    distance = math.sqrt(0.5 * float(np.average(longest[kept] ** 2, weights=areas[kept])))
+    # there are twice as many triangles as points, but for those at the border; the areas are doubled
+    mean_distance = math.sqrt(float(areas[kept].sum()) / np.count_nonzero(kept))
+    # between the corners of a triangle of a mesh any number of cells may be asked for
+    step = _step(spacing, mean_distance, distance if given is None else 0.0)
+    y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step)
+    heights = triangle_heights(flat, points[:, 2], triangles[kept], y - origin[1], x - origin[0])
+    facts: dict[str, Any] = {"point_distance": distance}
+    if given is not None:
+        facing = float(np.maximum(doubled, 0.0).sum() / areas.sum())
+        facts["overhang_share"] = min(facing, 1.0 - facing)
+    if math.isfinite(gap):
+        facts["largest_gap"] = gap
+    method = "linear in the triangles of the " + ("Delaunay triangulation" if given is None else "mesh")
+    return Gridded(heights, (y, x), max(RESOLVED * distance, ALIASED * step), method, facts)
+
+
+def _delaunay(flat: Array) -> Array:
+    """Return the Delaunay triangulation of points in the plane."""
+    from scipy.spatial import Delaunay, QhullError  # loads slowly
+
+    try:
+        triangulation = Delaunay(flat / float(np.abs(flat).max()))
+    except (QhullError, ValueError) as error:
+        message = "points: expected points that span an area in the plane, got points on one line"
+        raise InvalidInput(WHERE, [message]) from error
+    return np.asarray(triangulation.simplices, dtype=np.int64)
+
+
+def _weighted_median(values: Array, weights: Array) -> float:
+    """Return the value up to which half of the weight is."""
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(share, 0.5 * share[-1])])
+
+
+def _gap_problem(largest: float, smallest: float) -> str:
+    return (
+        f"largest_gap: expected more than the smallest distance of points, {smallest:.3g} m, got {largest:g}"
+    )
+
+
+def _step(spacing: float | None, mean_distance: float, distance: float) -> float:
+    """Return the spacing of the cells: as asked for, or the mean distance of points with two digits."""
+    if spacing is None:
+        return float(f"{mean_distance:.1e}")
+    least = FINEST * distance
+    if spacing < least:
+        expected = f"at least {least:.2g} m, a tenth of the distance of the points"
+        raise InvalidInput(WHERE, [f"spacing: expected {expected}, got {float(spacing):g}"])
+    return float(spacing)
+
+
+def _centres(low: Array, high: Array, step: float) -> tuple[Array, ...]:
+    """Return the centres of cells between the outermost points, at (k + 1/2) steps."""
+    first = np.ceil(low / step - 0.5)
+    counts = np.floor(high / step - 0.5) - first + 1
+    problem = ""
+    if counts.min() < 2:
+        problem = f"less than half of the extent of the points, {float((high - low).min()):.3g} m"
+    elif np.prod(counts) > MOST_CELLS:
+        problem = f"a spacing of at most {MOST_CELLS} cells"
+    elif not step >= 10.0**-DECADES:
+        problem = f"at least 1e-{DECADES} m"
+    if problem:
+        raise InvalidInput(WHERE, [f"spacing: expected {problem}, got {step:g}"])
+    return tuple((start + 0.5 + np.arange(int(n))) * step for start, n in zip(first, counts, strict=True))
+
+
+def triangle_heights(flat: Array, z: Array, triangles: Array, y: Array, x: Array) -> Array:
+    """Return heights at the cells, linear in each triangle; the highest where triangles overlap.
+
+    Parameters
+    ----------
+    flat : ndarray, shape (points, 2)
+        x and y of the points.
+    z : ndarray, shape (points,)
+    triangles : ndarray of int64, shape (triangles, 3)
+    y, x : ndarray
+        Centres of the cells, uniform.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+        NaN outside all triangles.
+    """
+    heights = np.full((y.size, x.size), np.nan)
+    _fill_triangles(
+        np.ascontiguousarray(flat), np.ascontiguousarray(z), np.ascontiguousarray(triangles), y, x, heights
+    )
+    return heights
+
+
+@kernel
+def _fill_triangles(flat: Array, z: Array, triangles: Array, y: Array, x: Array, heights: Array) -> None:
+    dx, dy = x[1] - x[0], y[1] - y[0]
+    nx, ny = x.size, y.size
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, ay = flat[a, 0], flat[a, 1]
+        bx, by = flat[b, 0] - ax, flat[b, 1] - ay
+        cx, cy = flat[c, 0] - ax, flat[c, 1] - ay
+        area = bx * cy - by * cx
+        if area == 0.0:
+            continue
+        rounding = 1e-9  # cells on an edge belong to both triangles
+        left, right = ax + min(0.0, bx, cx), ax + max(0.0, bx, cx)
+        low, high = ay + min(0.0, by, cy), ay + max(0.0, by, cy)
+        first_i = max(0, int(np.ceil((left - x[0]) / dx - rounding)))
+        last_i = min(nx - 1, int(np.floor((right - x[0]) / dx + rounding)))
+        first_j = max(0, int(np.ceil((low - y[0]) / dy - rounding)))
+        last_j = min(ny - 1, int(np.floor((high - y[0]) / dy + rounding)))
+        for j in range(first_j, last_j + 1):
+            qy = y[j] - ay
+            for i in range(first_i, last_i + 1):
+                qx = x[i] - ax
+                u = (qx * cy - qy * cx) / area
+                v = (bx * qy - by * qx) / area
+                if u >= -rounding and v >= -rounding and u + v <= 1.0 + rounding:
+                    height = z[a] + u * (z[b] - z[a]) + v * (z[c] - z[a])
+                    if not heights[j, i] >= height:
+                        heights[j, i] = height

@@ -1,0 +1,294 @@
+"""Points of clouds and meshes, read from files."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.provenance import file_checksum
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._files import NotATable, Table, file_suffix, open_bytes, read_table
+from fractalcontact.surfaces._instruments import PROJECT
+from fractalcontact.surfaces._units import UNITS, in_metres
+
+Array = np.ndarray[Any, np.dtype[Any]]
+WHERE = "fractalcontact.surfaces.read_points"
+
+MESHES = (".ply", ".stl", ".obj", ".off")
+CLOUDS = (".las", ".laz")
+LISTS = (".xyz", ".pts", ".csv", ".txt", ".tsv", ".dat", ".asc")
+ALWAYS_POINTS = (".xyz", ".pts")  # suffixes of lists whose further columns are colours and the like
+LEAST_POINTS = 4  # rows of a table of two or three columns that is a list of points
+X = ("x", "points:0", "easting", "east", "e")
+Y = ("y", "points:1", "northing", "north", "n")
+Z = ("z", "points:2", "height", "elevation", "altitude", "h")
+DEGREES = ("lon", "long", "longitude", "lat", "latitude")
+GEOGRAPHIC_MODEL = (1024, 2)  # key and value of a GeoTIFF directory: latitude and longitude
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points of a file.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n, 2) or (n, 3)
+        In the units of the file.
+    unit : str or None
+        As stated in the file.
+    triangles : ndarray of int, shape (m, 3), or None
+    entries : dict
+        For the provenance.
+    """
+
+    position: Array
+    unit: str | None = None
+    triangles: Array | None = None
+    entries: dict[str, Any] = field(default_factory=dict)
+
+
+def check_columns(problems: Problems, columns: Any) -> None:
+    """Check for the names or numbers of the columns of x, y, z or x, z."""
+    if columns is None:
+        return
+    is_list = (
+        isinstance(columns, Sequence) and not isinstance(columns, (str, bytes)) and len(columns) in (2, 3)
+    )
+    valid = is_list and all(
+        isinstance(name, str)
+        or (isinstance(name, (int, np.integer)) and not isinstance(name, bool) and name >= 0)
+        for name in columns
+    )
+    problems.require(valid, "columns", "names or numbers (from 0) of x, y, z or of x, z", columns)
+
+
+def _check(problems: Problems, *, path: Any, units: Any, columns: Any) -> None:
+    problems.choice("units", units, UNITS, optional=True)
+    check_columns(problems, columns)
+    if not problems.path("path", path):
+        return
+    source = Path(path)
+    problems.require(source.is_file(), "path", "an existing file", source.name)
+    suffixes = (*MESHES, *CLOUDS, *LISTS)
+    known = file_suffix(source) in suffixes
+    problems.require(known, "path", f"a file of points: {', '.join(suffixes)}", source.name)
+
+
+@public_result(
+    title="Points read from a file",
+    achieved_error="exact: positions as the file states them",
+    check=_check,
+    error=UnreadableFile,
+)
+def read_points(
+    path: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    columns: Sequence[str | int] | None = None,
+) -> xr.Dataset:
+    """Read the points of a cloud or mesh, to select a part of them or to fit a plane.
+
+    Parameters
+    ----------
+    path : path-like
+        A list of points in text (`.xyz`, `.pts`, `.csv`, `.txt`, `.tsv`, `.dat`, `.asc`), a mesh or cloud
+        (`.ply`, `.stl`, `.obj`, `.off`, `.las`, `.laz`; extra `mesh`), or one of them with `.gz`.
+    units : str, optional
+        Unit of the coordinates: "m", "mm", "um" ... Default: that of the header, or metres.
+    columns : sequence of str or int, optional
+        Names or numbers (from 0) of the columns of x, y, z, or of x, z of a profile. Default: those called
+        so, or the first ones.
+
+    Returns
+    -------
+    Dataset
+        `position` (m) with dims (point, point_axis); of a mesh also `triangles` with dims (triangle, corner),
+        the numbers of the points that each triangle joins. `from_points` grids it.
+
+    Raises
+    ------
+    UnreadableFile
+        The file is corrupt, its columns cannot be told apart, or it has longitudes and latitudes.
+    MissingExtra
+        A mesh or a LAS file, and the library that reads it is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import fractalcontact as fc
+    >>> path = Path(tempfile.mkdtemp()) / "scan.csv"
+    >>> size = path.write_text("x [mm],y [mm],z [mm]" + chr(10) + "0,1,2" + chr(10) + "3,4,5" + chr(10))
+    >>> points = fc.surfaces.read_points(path)
+    >>> points.position.sel(point_axis="z").values.tolist()
+    [0.002, 0.005]
+    """
+    source = Path(path)
+    content = point_content(source, columns)
+    unit = units or content.unit or "m"
+    axes = ["x", "y", "z"] if content.position.shape[1] == 3 else ["x", "z"]
+    variables: dict[str, Any] = {"position": (("point", "point_axis"), in_metres(content.position, unit))}
+    if content.triangles is not None:
+        variables["triangles"] = (("triangle", "corner"), content.triangles)
+    facts = {"parameters": {"path": source.name}, "file_sha256": file_checksum(source), **content.entries}
+    return xr.Dataset(variables, {"point_axis": axes}, facts | {"stated_unit": content.unit})
+
+
+def point_content(path: Path, columns: Sequence[str | int] | None) -> Points:
+    """Read a file of points with the reader of its format."""
+    suffix = file_suffix(path)
+    if suffix in MESHES:
+        return _mesh(path, suffix)
+    if suffix in CLOUDS:
+        return _las(path)
+    try:
+        table = read_table(path)
+    except NotATable as error:
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is not a table of numbers ({error})"]) from error
+    return listed_points(table, path, columns)
+
+
+def is_list(table: Table, path: Path, columns: Sequence[str | int] | None) -> bool:
+    """Return whether a table is a list of points and not a grid of heights."""
+    rows, number = table.values.shape
+    names = [name.lower() for name in table.names]
+    return (
+        columns is not None
+        or file_suffix(path) in ALWAYS_POINTS
+        or (number in (2, 3) and rows >= LEAST_POINTS)
+        or (bool(names) and _place(names, X) is not None and _place(names, Z) is not None)
+    )
+
+
+def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None) -> Points:
+    """Return the points of a table."""
+    chosen = _columns(table, path, columns)
+    stated = {table.units[k] for k in chosen if table.units and table.units[k]}
+    with Problems(WHERE, UnreadableFile) as problems:
+        names = [name for name in table.names if name.lower() in DEGREES]
+        expected = f"coordinates in a unit of length; {PROJECT}"
+        problems.require(
+            not names and not stated & {"deg", "degree", "degrees", "°"}, "columns", expected, names
+        )
+        expected = "one unit for all coordinates"
+        problems.require(len(stated) <= 1, "columns", expected, sorted(stated))
+        unknown = [unit for unit in stated if unit not in UNITS]
+        if len(stated) == 1:
+            problems.require(not unknown, "columns", "coordinates in a unit of length", unknown)
+        infinite = int(np.count_nonzero(np.isinf(table.values[:, chosen])))
+        problems.require(
+            infinite == 0, "path", "finite coordinates, or NaN where missing", f"{infinite} infinite"
+        )
+    entries: dict[str, Any] = {"format": "list of points", "columns": chosen}
+    if table.names:
+        entries["columns"] = [table.names[k] for k in chosen]
+    if table.decimal_comma:
+        entries["decimal_mark"] = ","
+    return Points(table.values[:, chosen], next(iter(stated), None), None, entries)
+
+
+def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> list[int]:
+    """Return the numbers of the columns of x, y, z or x, z."""
+    number, names = table.values.shape[1], [name.lower() for name in table.names]
+    problem = ""
+    if columns is not None:
+        wanted = [names.index(c.lower()) if isinstance(c, str) and c.lower() in names else c for c in columns]
+        if all(not isinstance(k, str) and k < number for k in wanted):
+            return [int(k) for k in wanted]
+        given = ", ".join(map(repr, table.names)) or f"numbers from 0 to {number - 1}"
+        problem = f"columns: expected some of {given}, got {list(columns)!r}"
+    elif number < 2:
+        problem = f"path: expected two or three columns in {path.name!r}, got {number}"
+    elif names and _place(names, X) is not None and _place(names, Z) is not None:
+        places = [_place(names, group) for group in (X, Y, Z)]
+        return [place for place in places if place is not None]
+    elif number == 2:
+        return [0, 1]
+    elif not (names and table.is_named) and (number == 3 or file_suffix(path) in ALWAYS_POINTS):
+        return [0, 1, 2]
+    else:
+        known = f"called {', '.join(map(repr, table.names))}" if names else f"without names, {number} of them"
+        problem = (
+            f"columns: expected the names or numbers of those of x, y, z; {path.name!r} has columns {known}"
+        )
+    raise UnreadableFile(WHERE, [problem])
+
+
+def _place(names: list[str], group: Sequence[str]) -> int | None:
+    """Return the number of the column that is called as one of a group."""
+    return next((names.index(name) for name in group if name in names), None)
+
+
+def _mesh(path: Path, suffix: str) -> Points:
+    """Read a mesh, or a cloud of points in the format of a mesh."""
+    if importlib.util.find_spec("trimesh") is None:
+        raise MissingExtra(f"reading {path.name!r}", "trimesh", "mesh")
+    import trimesh
+
+    try:
+        with open_bytes(path) as file:
+            mesh = trimesh.load(file, file_type=suffix.lstrip("."), process=False)
+        if isinstance(mesh, trimesh.Scene):
+            mesh = mesh.to_mesh() if mesh.geometry else trimesh.Trimesh()
+        position = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+        triangles = np.array(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64).reshape(-1, 3)
+    except UnreadableFile:
+        raise
+    except Exception as error:  # the library raises exceptions of many kinds
+        reason = f"{type(error).__name__}: {str(error)[:200]}"
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({reason})"]) from error
+    if len(position) == 0:
+        raise UnreadableFile(WHERE, [f"path: expected points in {path.name!r}, got none"])
+    entries = {"format": suffix.lstrip("."), "reader": f"trimesh {trimesh.__version__}"}
+    return Points(position, None, triangles if len(triangles) else None, entries)
+
+
+def _las(path: Path) -> Points:
+    """Read a LAS or LAZ file; longitudes and latitudes are refused."""
+    if importlib.util.find_spec("laspy") is None:
+        raise MissingExtra(f"reading {path.name!r}", "laspy", "mesh")
+    import laspy
+
+    try:
+        with open_bytes(path) as file:
+            cloud = laspy.read(file)
+        position = np.array(cloud.xyz, dtype=np.float64)
+    except UnreadableFile:
+        raise
+    except Exception as error:  # the library raises exceptions of many kinds
+        if "backend" in str(error).lower():
+            raise MissingExtra(f"reading {path.name!r}", "lazrs", "mesh") from error
+        reason = f"{type(error).__name__}: {str(error)[:200]}"
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({reason})"]) from error
+    system = _reference_system(cloud.header.vlrs)
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = f"projected coordinates; {PROJECT}"
+        problems.require(system != "degree", "path", expected, "longitudes and latitudes")
+        problems.require(system != "foot", "path", "coordinates in metres; convert it first", "feet")
+        problems.require(len(position) > 0, "path", f"points in {path.name!r}", "none")
+    entries = {"format": path.suffix.lstrip("."), "reader": f"laspy {laspy.__version__}"}
+    return Points(position, "m" if system == "metre" else None, None, entries)
+
+
+def _reference_system(records: Any) -> str:
+    """Return the unit of the coordinates that the records of a LAS file state: "" if none does."""
+    for record in records:
+        text = str(getattr(record, "string", "")).upper()
+        if "GEOG" in text and "PROJ" not in text:
+            return "degree"
+        if units := re.findall(r'UNIT\s*\[\s*"([^"]*)"', text):
+            return "foot" if any("FOOT" in unit or "FEET" in unit for unit in units) else "metre"
+        keys = [(key.id, key.value_offset) for key in getattr(record, "geo_keys", ())]
+        if GEOGRAPHIC_MODEL in keys:
+            return "degree"
+    return ""
