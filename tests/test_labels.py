@@ -35,6 +35,10 @@ def rough(n=40):
     return fc.surfaces.fbm((n, n), 1e-4, hurst=0.7, rms_increment=5e-6, rng=11)
 
 
+def cloud():
+    return np.random.default_rng(13).random((200, 3)) * [1.0, 1.0, 0.1]
+
+
 def periodic(n=40):
     return fc.surfaces.spectral((n, n), 1e-4, hurst=0.8, rms_height=1e-5, rng=12)
 
@@ -69,6 +73,8 @@ CALLS = {
         (20, 20), 1e-4, hurst=0.7, rms_height=1e-6, rng=1
     ),
     "surfaces.from_array": lambda: fc.surfaces.from_array(np.eye(5), 1e-3),
+    "surfaces.fit_plane": lambda: fc.surfaces.fit_plane(cloud()),
+    "surfaces.from_points": lambda: fc.surfaces.from_points(cloud()),
     "surfaces.sample": lambda: fc.surfaces.sample("concrete_crack"),
     "surfaces.level": lambda: fc.surfaces.level(rough()),
     "surfaces.fill": lambda: fc.surfaces.fill(rough().where(rough().x > 2e-4)),
@@ -141,6 +147,9 @@ def result_of(name, tmp_path):
         return CALLS[name]()
     if name == "surfaces.read":
         return fc.surfaces.read(fc.save(rough(), tmp_path / "surface.nc"))
+    if name == "surfaces.read_points":
+        np.savetxt(tmp_path / "points.xyz", cloud())
+        return fc.surfaces.read_points(tmp_path / "points.xyz")
     subpackage, function = name.split(".")
     make_input = {"dimensions": rough, "domains": state}.get(subpackage)
     assert make_input is not None, f"add a call of {name} to CALLS"

@@ -18,6 +18,7 @@ WRONG = (
 
 NOISE = 1e-6 * np.random.default_rng(3).normal(size=(24, 24))
 SURFACE = fc.surfaces.from_array(NOISE, 1e-4)
+CLOUD = np.random.default_rng(2).random((50, 3)) * [1.0, 1.0, 0.1]
 MASK = (SURFACE > 0).drop_attrs()
 CRACK = fc.joints.Crack(SURFACE, young=1e10, poisson=0.2, block=1.6e-3)
 SHEARED = fc.joints.dilatancy(CRACK, shear=[0.0, 1e-4, 2e-4], direction="E")
@@ -30,6 +31,9 @@ CALLS = {
     "surfaces.weierstrass": GENERATOR | {"rms_height": 1e-6},
     "surfaces.from_array": {"heights": NOISE, "spacing": 1e-4},
     "surfaces.read": {"path": "nowhere.npy"},
+    "surfaces.read_points": {"path": "nowhere.xyz"},
+    "surfaces.fit_plane": {"points": CLOUD},
+    "surfaces.from_points": {"points": CLOUD},
     "surfaces.sample": {"name": "nothing"},
     "surfaces.level": {"surface": SURFACE},
     "surfaces.fill": {"surface": SURFACE},

@@ -136,7 +136,8 @@ def directions(
     ... )
     ratio 2.0 along 30 degrees
     """
-    surfaces, window = read_surfaces(surface), read_scales(scales)
+    surfaces = read_surfaces(surface)
+    window = surfaces[0].resolved(read_scales(scales))
     chosen = None if azimuth is None else np.unique(np.mod(float_array(azimuth), 180.0))
     is_periodic = all(surfaces[0].grid.periodic) and all(single.is_complete for single in surfaces)
     if is_periodic:

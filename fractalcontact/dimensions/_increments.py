@@ -45,6 +45,7 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     """Estimate H of one surface by the closed form, with its interval and notes."""
     coarse = max(surface.grid.spacing)
     stride, lags = 1, len(LAGS)
+    scales, asked = surface.resolved(scales), scales
     if scales is not None:
         stride = max(1, int(np.ceil(scales[0] / coarse * (1 - 1e-9))))
         lags = sum(lag * stride * coarse <= scales[1] * (1 + 1e-9) for lag in LAGS)
@@ -60,7 +61,7 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
         "scale_min": stride * min(surface.grid.spacing),
         "scale_max": stride * LAGS[lags - 1] * coarse,
         "window": "the shortest lags, which carry nearly all information on H"
-        if scales is None
+        if asked is None
         else "asked for",
     }
     rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0]))) / unit

@@ -230,6 +230,14 @@ def test_without_the_finest_scale_the_dimension_is_wrong():
     np.testing.assert_array_less(0.99 * float(surface.finest_scale), resolved.scale_min)
 
 
+def test_directions_use_resolved_lags():
+    """An isotropic cloud gridded finely has no direction of smooth waves: H is not that of the gridding."""
+    surface = fc.surfaces.from_points(measured_points("random", 0.5, 3), 2e-4, plane="xy")
+    hurst = fc.dimensions.directions(surface).hurst
+    smooth = fc.dimensions.directions(surface.drop_vars("finest_scale")).hurst
+    assert float(hurst.mean()) < 0.75 < 0.85 < float(smooth.mean())
+
+
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
 def test_interval_of_a_gridded_profile(hurst):
     for seed in range(4):

@@ -274,4 +274,4 @@ def test_scene_reads_a_mesh(tmp_path):
     expected = fc.surfaces.describe(
         fc.surfaces.read(tmp_path / "scan.ply", units="mm", spacing=2.5e-4, plane="xy")
     )
-    assert float(result["surfaces/describe"].rms_height) == float(expected.rms_height)
+    assert float(result["surfaces"]["rms_height"]) == float(expected.rms_height)
