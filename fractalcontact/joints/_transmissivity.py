@@ -38,6 +38,7 @@ FLOW_ERROR = 1e-9  # relative error of the flow, in the norm of the precondition
 RESIDUAL = 1e-6  # relative residual that must be reached as well
 MAX_ITERATIONS = 200
 COARSEST = 400  # unknowns of the coarsest grid, solved directly
+LEAF = 9  # cells of a part that nested dissection leaves as it is
 
 
 def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic: Any) -> None:
@@ -146,13 +147,16 @@ def transmissivity(
 
 def _flows(planes: Array, axes: Sequence[str], spacing: Any, periodic: Any) -> list[Flow]:
     """Solve every plane along every axis; planes are transposed so that the flow runs along the last axis."""
-    flows = []
+    flows, orders = [], {}
     for plane in planes:
         for axis in axes:
             along = ("y", "x").index(axis)
             oriented = np.ascontiguousarray(plane if axis == "x" else plane.T)
             ratio = float(spacing[1 - along] / spacing[along])
-            flows.append(plane_flow(oriented, ratio, (bool(periodic[1 - along]), bool(periodic[along]))))
+            wraps = bool(periodic[1 - along]), bool(periodic[along])
+            if axis not in orders:  # the same for every plane
+                orders[axis] = nested_dissection(oriented.shape, wraps)
+            flows.append(plane_flow(oriented, ratio, wraps, orders[axis]))
     return flows
 
 
@@ -182,7 +186,7 @@ class Network:
     shape: tuple[int, int]
 
 
-def plane_flow(gap: Array, ratio: float, wraps: tuple[bool, bool]) -> Flow:
+def plane_flow(gap: Array, ratio: float, wraps: tuple[bool, bool], order: Array) -> Flow:
     """Return the conductivity (gap cubed) of a plane along its last axis.
 
     Parameters
@@ -194,6 +198,8 @@ def plane_flow(gap: Array, ratio: float, wraps: tuple[bool, bool]) -> Flow:
     wraps : pair of bool
         Whether the plane repeats across and along the flow. Nothing flows through free sides. Free ends have
         prescribed pressures; a plane that repeats along the flow is under a mean pressure gradient.
+    order : ndarray
+        All cells (flat indices) in the order in which elimination takes them.
     """
     largest = float(gap.max())
     if not largest > 0:
@@ -203,10 +209,34 @@ def plane_flow(gap: Array, ratio: float, wraps: tuple[bool, bool]) -> Flow:
     percolating = winding_cells(network) if wraps[1] else spanning_cells(network)
     if not percolating.any():
         return Flow(0.0, False, 0.0)
-    pressure, residual = _pressures(network, percolating)
+    pressure, residual = _pressures(network, percolating, order)
     ny, nx = network.shape
     conductivity = _dissipation(network, pressure, percolating) * (nx / ny) / ratio
     return Flow(conductivity * unit**3, True, residual)
+
+
+def nested_dissection(shape: tuple[int, ...], wraps: tuple[bool, bool]) -> Array:
+    """Return the cells of a plane in the order of nested dissection (George 1973).
+
+    Both halves come before the line of cells between them, so that elimination fills in little. Along an axis
+    that wraps, the first line is taken last: it separates the two ends.
+    """
+    cells, last = np.arange(np.prod(shape)).reshape(shape), []
+    if wraps[0]:
+        cells, last = cells[1:], [cells[0]]
+    if wraps[1]:
+        cells, last = cells[:, 1:], [cells[:, 0], *last]
+    return np.concatenate([*_dissected(cells), *last])
+
+
+def _dissected(cells: Array) -> list[Array]:
+    """Return the cells of a part: those of its halves, then those of the line between them."""
+    if cells.size <= LEAF:
+        return [cells.ravel()]
+    if cells.shape[0] > cells.shape[1]:
+        cells = cells.T
+    middle = cells.shape[1] // 2
+    return [*_dissected(cells[:, :middle]), *_dissected(cells[:, middle + 1 :]), cells[:, middle]]
 
 
 def _network(cells: Array, ratio: float, wraps: tuple[bool, bool]) -> Network:
@@ -302,7 +332,7 @@ def winding_cells(network: Network) -> Array:
     return np.isin(group[labels], winding)
 
 
-def _pressures(network: Network, percolating: Array) -> tuple[Array, float]:
+def _pressures(network: Network, percolating: Array, order: Array) -> tuple[Array, float]:
     """Return the pressure in every cell for a drop of 1 along the plane, and the relative residual."""
     from scipy.sparse import coo_array, diags_array
 
@@ -327,7 +357,9 @@ def _pressures(network: Network, percolating: Array) -> tuple[Array, float]:
     if np.linalg.norm(residual) > 1e-14 * scale:
         free = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
         power = _dissipation(network, _on_plane(p, percolating, network.shape), percolating)
-        p[free] += _solve(matrix[free][:, free], residual[free], power, RESIDUAL * scale)
+        sequence = number[order[percolating[order]]]
+        sequence = (np.cumsum(free) - 1)[sequence[free[sequence]]]
+        p[free] += _solve(matrix[free][:, free], residual[free], sequence, power, RESIDUAL * scale)
         residual = source - matrix @ p
     return _on_plane(p, percolating, network.shape), float(np.linalg.norm(residual)) / scale
 
@@ -348,10 +380,10 @@ def _without_reference_cells(matrix: Any) -> Array:
     return free
 
 
-def _solve(matrix: Any, b: Array, power: float, residual: float) -> Array:
+def _solve(matrix: Any, b: Array, order: Array, power: float, residual: float) -> Array:
     """Solve a large system by multigrid where it is installed, a small one by elimination.
 
-    `power` is the dissipation before the correction by the solution.
+    `order` is that of the elimination, `power` the dissipation before the correction by the solution.
     """
     from scipy.sparse.linalg import splu
 
@@ -366,10 +398,13 @@ def _solve(matrix: Any, b: Array, power: float, residual: float) -> Array:
                 return p
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     try:
-        factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options=options)
+        ordered = matrix[order][:, order].tocsc()
+        factors = splu(ordered, permc_spec="NATURAL", relax=1, panel_size=8, options=options)
     except MemoryError as error:
         raise MissingExtra(f"the flow through {b.size} open cells", "pyamg", "flow") from error
-    return np.asarray(factors.solve(b))
+    x = np.empty_like(b)
+    x[order] = factors.solve(b[order])
+    return x
 
 
 def _multigrid(matrix: Any) -> Any:

@@ -6,6 +6,8 @@ from collections import deque
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 import fractalcontact as fc
 from fractalcontact.joints import _transmissivity
@@ -357,3 +359,25 @@ def test_transmissivity_over_load_and_shear(make_face, rough):
     assert (flow.hydraulic_aperture <= most * (1 + 1e-9)).all()
     assert not flow.percolates.isel(step=-1).all()
     assert (flow.hydraulic_aperture.where(~flow.percolates, 0.0) == 0).all()
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (2, 40), (33, 7), (40, 40)])
+def test_order_of_elimination_takes_every_cell_once(shape, wraps):
+    order = _transmissivity.nested_dissection(shape, wraps)
+    assert sorted(order.tolist()) == list(range(shape[0] * shape[1]))
+
+
+@pytest.mark.parametrize("wraps", [(False, False), (True, True)])
+def test_order_of_elimination_fills_in_little(wraps):
+    """The bound of George (1973), 31/4 n^2 log2(n) for n x n cells; row by row it would be n^3."""
+    n = 48
+    order = _transmissivity.nested_dissection((n, n), wraps)
+    line = sparse.diags_array([1.0, 1.0], offsets=[-1, 1], shape=(n, n)).tolil()
+    line[0, -1] = line[-1, 0] = float(wraps[0])
+    links = sparse.kron(line, sparse.eye_array(n)) + sparse.kron(sparse.eye_array(n), line)
+    matrix = (5.0 * sparse.eye_array(n * n) - links).tocsc()[order][:, order]
+    filled = splu(
+        matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    ).L.nnz
+    assert filled < 31 / 4 * n**2 * np.log2(n) / (1 if wraps[0] else 2)
