@@ -93,6 +93,12 @@ CALLS = {
         keep=("slip_state", "traction_x", "traction_y", "slip_x", "slip_y"),
     ),
     "joints.delta_surface": lambda: fc.joints.delta_surface(crack(), [1e-4, 2e-4], "W"),
+    "joints.area_dimension": lambda: fc.joints.area_dimension(
+        crack(), shear=[1e-4], factors=[1, 2], normal_force=[1.0, 10.0]
+    ),
+    "joints.self_weight": lambda: fc.joints.self_weight(
+        crack(), structure_size=[1.0, 10.0], unit_weight=24e3, shear=[1e-4, 2e-4]
+    ),
     "joints.closure": lambda: fc.joints.closure(
         crack(), shear=[1e-4], normal_force=[1.0, 10.0], keep=("state",)
     ),

@@ -60,6 +60,8 @@ CALLS = {
         "crack": CRACK, "path": 1e-4, "nominal_pressure": 1e6, "hardness": 1e9, "normal_stiffness": 1e9,
         "shear_stiffness": 1e12, "distance": 1e-4,
     },
+    "joints.area_dimension": {"crack": CRACK, "shear": 1e-4, "normal_force": 1.0},
+    "joints.self_weight": {"crack": CRACK, "shear": 1e-4, "structure_size": 1.0, "unit_weight": 1e4},
     "joints.directional_roughness": {"surface": SURFACE},
     "joints.dilatancy": {"crack": CRACK, "shear": [0.0, 1e-4]},
     "joints.friction": {"dilatancy": SHEARED},

@@ -223,6 +223,8 @@ QUANTITIES: dict[str, Quantity] = {
     "frictionless_angle": Quantity("degree", "angle of the force between the faces without friction"),
     "friction_angle": Quantity("degree", "friction angle"),
     "shear_strength": Quantity("Pa", "shear strength"),
+    "structure_size": Quantity("m", "size of the structure: height of material above the joint"),
+    "strength_exponent": Quantity("1", "exponent of the shear strength over the size of the structure"),
     "distance": Quantity("m", "shear over which a peak is taken"),
     "secant_friction_angle": Quantity("degree", "greatest friction angle over a distance of shear"),
     "secant_shear_strength": Quantity("Pa", "greatest shear strength over a distance of shear"),

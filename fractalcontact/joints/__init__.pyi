@@ -1,3 +1,4 @@
+from ._area_dimension import area_dimension as area_dimension
 from ._closure import closure as closure
 from ._closure_laws import closure_laws as closure_laws
 from ._crack import Crack as Crack
@@ -11,6 +12,7 @@ from ._directional_roughness import directional_roughness as directional_roughne
 from ._friction import friction as friction
 from ._registration import register as register
 from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
+from ._self_weight import self_weight as self_weight
 from ._shear_curve import shear_curve as shear_curve
 from ._strength_criteria import PARK_PAULAY as PARK_PAULAY
 from ._strength_criteria import bandis_closure as bandis_closure
@@ -25,6 +27,7 @@ from ._transmissivity import transmissivity as transmissivity
 __all__ = [
     "Crack",
     "PARK_PAULAY",
+    "area_dimension",
     "bandis_closure",
     "bandis_constants",
     "barton_bandis_scaled",
@@ -41,6 +44,7 @@ __all__ = [
     "friction",
     "register",
     "roughness_coefficient",
+    "self_weight",
     "self_weight_strength",
     "shear_curve",
     "size_effect",

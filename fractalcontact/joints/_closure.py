@@ -271,20 +271,26 @@ def _boundary(crack: Crack) -> str:
 
 
 class ShearedContact:
-    """The delta-surface of one shear between its two bodies, to be pressed along paths of load."""
+    """The delta-surface of one shear between its two bodies, to be pressed along paths of load.
 
-    def __init__(self, crack: Crack, shear: float, towards: Direction, pressing: Pressing) -> None:
+    With a `factor` only every so many of its heights are kept along both axes.
+    """
+
+    def __init__(
+        self, crack: Crack, shear: float, towards: Direction, pressing: Pressing, factor: int = 1
+    ) -> None:
         self.keep, self.where = pressing.keep, pressing.where
         self.modulus = crack.contact_modulus
         self.place = f"at a shear of {shear:g} m towards {towards.name}"
         self.options = replace(pressing.options, boundary=_boundary(crack))
         heights = delta_heights(crack, shear, towards, self.where)
-        self.surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack))
+        surface = xr.DataArray(heights, dims=("y", "x"), coords=block_coords(crack))
+        self.surface = surface.isel(y=slice(None, None, factor), x=slice(None, None, factor))
         # the spacing as the solver reads it, so that a flat block is the same to the last bit
-        dy, dx = read_grid(self.surface).spacing
+        grid = read_grid(self.surface)
         self.stiffness = fc.contact.flat_stiffness(
-            crack.layout.cells,
-            (dy, dx),
+            (grid.shape[0], grid.shape[1]),
+            (grid.spacing[0], grid.spacing[1]),
             contact_modulus=self.modulus,
             boundary=_boundary(crack),
             influence=self.options.influence,
@@ -328,9 +334,9 @@ class ShearedContact:
 
 
 def press_sheared(
-    crack: Crack, shears: Array, towards: Direction, pressing: Pressing, progress: bool
+    crack: Crack, shears: Array, towards: Direction, pressing: Pressing, progress: bool, *, factor: int = 1
 ) -> dict[str, Array]:
-    """Press the crack together at every shear along the same path of load.
+    """Press the crack together at every shear along the same path of load, with every `factor`-th height.
 
     Returns
     -------
@@ -338,7 +344,7 @@ def press_sheared(
         As `ShearedContact.press`, with the shear as first axis.
     """
     results = [
-        ShearedContact(crack, float(shear), towards, pressing).press(pressing.load, pressing.keep)
+        ShearedContact(crack, float(shear), towards, pressing, factor).press(pressing.load, pressing.keep)
         for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear")
     ]
     return {name: np.stack([result[name] for result in results]) for name in results[0]}

@@ -1,5 +1,6 @@
 from ._accuracy import error_against_time as error_against_time
 from ._accuracy import estimator_errors as estimator_errors
+from ._area_dimension import area_dimension as area_dimension
 from ._box_dimension import box_dimension as box_dimension
 from ._box_dimension import local_slopes as local_slopes
 from ._closure import closure_laws as closure_laws
@@ -19,6 +20,7 @@ from ._islands import islands as islands
 from ._lacunarity import lacunarity as lacunarity
 from ._paper import paper_figure as paper_figure
 from ._partial_slip import slip_domains as slip_domains
+from ._self_weight import self_weight as self_weight
 from ._shear_curve import shear_curve as shear_curve
 from ._shear_scheme import sliding_scheme as sliding_scheme
 from ._strength_envelope import strength_envelope as strength_envelope
@@ -27,6 +29,7 @@ from ._surface import surface as surface
 from ._transmissivity import hydraulic_aperture as hydraulic_aperture
 
 __all__ = [
+    "area_dimension",
     "box_dimension",
     "closure_laws",
     "contact_area",
@@ -49,6 +52,7 @@ __all__ = [
     "local_slopes",
     "paper_figure",
     "rigid_dilatancy",
+    "self_weight",
     "shear_curve",
     "sliding_scheme",
     "slip_domains",

@@ -11,10 +11,11 @@ import xarray as xr
 
 from fractalcontact.base.netcdf import unfinished
 from fractalcontact.base.progress import track
+from fractalcontact.plotting._area_dimension import area_dimension
 from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
 from fractalcontact.plotting._closure import closure_laws, contact_area
 from fractalcontact.plotting._contact_maps import contact_domains
-from fractalcontact.plotting._decorrelation import correlation
+from fractalcontact.plotting._decorrelation import correlation, delta_dimension
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directions import evenly_sampled_reach
 from fractalcontact.plotting._ensemble import (
@@ -31,6 +32,7 @@ from fractalcontact.plotting._lacunarity import lacunarity
 from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
+from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
 
 if TYPE_CHECKING:
@@ -121,6 +123,9 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
         ("domains/correlation_dimension", "correlation_dimension", box_dimension),
         ("domains/lacunarity", "lacunarity", _lacunarity),
         ("domains/islands", "islands", islands),
+        ("joints/delta_dimension", "delta_dimension", delta_dimension),
+        ("joints/area_dimension", "area_dimension", area_dimension),
+        ("joints/self_weight", "self_weight", self_weight),
         ("joints/decorrelation_length", "correlation", correlation),
         ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
         ("contact", "closure_law", closure_laws),

@@ -1,0 +1,177 @@
+"""Contact area of a sheared crack against the spacing of its heights, and the dimension from that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import fractalcontact as fc  # loads `contact` and `domains` on first use
+from fractalcontact.base.references import joined_references
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._closure import (
+    Pressing,
+    check_pressing,
+    press_sheared,
+    pressing_references,
+    warn_steep,
+    warn_unconverged,
+)
+from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints._crack import Crack, block_coords, check_sliding
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.joints.area_dimension"
+LOADS = ("normal_force", "nominal_pressure")
+FEWEST_CELLS = 8  # along an edge of the block, at the coarsest of the default spacings
+DEFAULT_FACTORS = 3  # of them, the finest ones
+
+
+def _check(
+    problems: Problems,
+    *,
+    crack: Any,
+    shear: Any,
+    direction: Any,
+    factors: Any,
+    normal_force: Any,
+    nominal_pressure: Any,
+    **solver: Any,
+) -> None:
+    if not check_direction(problems, direction):
+        direction = "E"  # any direction, to check the crack and the shear as well
+    check_sliding(problems, crack, shear, direction)
+    load = problems.construct(
+        fc.contact.LoadPath.from_keywords, normal_force=normal_force, nominal_pressure=nominal_pressure
+    )
+    check_pressing(problems, crack, load, "flat_block", (), solver)
+    if isinstance(crack, Crack):
+        _check_factors(problems, crack.layout.cells, factors)
+
+
+def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> None:
+    if factors is None:
+        expected = f"a block of cells with common divisors (got {cells[0]} x {cells[1]})"
+        problems.require(len(default_factors(cells)) > 1, "factors", expected, None)
+    elif problems.numbers("factors", factors, at_least=1):
+        values = float_array(factors)
+        largest = min(cells) // 3
+        valid = (values == np.round(values)) & (values <= largest)
+        divides = [all(n % int(value) == 0 for n in cells) for value in np.where(valid, values, 1)]
+        several = values.size > 1 and np.unique(values).size == values.size
+        expected = (
+            f"at least two different divisors of the {cells[0]} x {cells[1]} cells of the block, "
+            f"1 to {largest}"
+        )
+        problems.require(several and bool(valid.all()) and all(divides), "factors", expected, factors)
+
+
+@public_result(title="contact area of a crack by spacing", check=_check)
+def area_dimension(
+    crack: Crack,
+    *,
+    shear: float | Sequence[float] | Array,
+    direction: str | float = "E",
+    factors: Sequence[int] | None = None,
+    normal_force: float | Sequence[float] | None = None,
+    nominal_pressure: float | Sequence[float] | None = None,
+    influence: str | None = None,
+    hardness: float | None = None,
+    tolerance: float = 1e-8,
+) -> xr.Dataset:
+    """Return the contact area of a sheared crack at several spacings of its heights, and its dimension.
+
+    The delta-surface of every shear is pressed as it is and with every second, third ... of its heights, as
+    if the faces had been scanned so. The area of true contact depends on the spacing s, A ~ s^(2 - D), the
+    closure far less.
+
+    Parameters
+    ----------
+    crack : Crack
+    shear : float or sequence of float
+        Shear displacements v >= 0, m, each once.
+    direction : str or float
+        Direction in which the block slides.
+    factors : sequence of int, optional
+        Every so many heights are kept along both axes; divisors of the cells of the block, so that its area
+        stays the same. None: the three smallest common divisors, 1 among them, that leave 8 cells an edge.
+    normal_force, nominal_pressure : float or sequence of float
+        One of them: the forces on the block (N), or those over its area (Pa).
+    influence, hardness, tolerance
+        As for `fractalcontact.contact.press`.
+
+    Returns
+    -------
+    Dataset over (shear, step)
+        area_dimension with ci_low and ci_high, see `fractalcontact.domains.area_dimension`. Over (shear,
+        step, resolution) contact_fraction, corrected_contact_fraction, local_slope, interface_closure (m),
+        residual and converged; the resolution is the spacing (m). nominal_area (m2), run_time (s).
+
+    Raises
+    ------
+    InvalidInput
+        The block would leave its face, `factors` do not divide it, or an argument is wrong.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 4 and figure 3b.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> face = fc.surfaces.fbm((96, 96), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=6.4e-3)
+    >>> result = fc.joints.area_dimension(crack, shear=4e-4, factors=[1, 2, 4], normal_force=1e3)
+    >>> (100 * result.contact_fraction).round(1).values.tolist()  # %, 0.1, 0.2 and 0.4 mm apart
+    [[[5.0, 6.3, 9.8]]]
+    """
+    towards, shears = read_direction(direction), float_array(shear)
+    load = fc.contact.LoadPath.from_keywords(normal_force=normal_force, nominal_pressure=nominal_pressure)
+    options = fc.contact.ContactOptions(influence=influence, hardness=hardness, tolerance=tolerance)
+    pressing = Pressing(load, options, "flat_block", ("state",), WHERE)
+    used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
+    pressed = [
+        press_sheared(crack, shears, towards, pressing, False, factor=int(factor)) for factor in np.sort(used)
+    ]
+    for columns in pressed:
+        warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
+    warn_steep(pressed, WHERE, stacklevel=4)
+    coords = block_coords(crack)
+    masks = [
+        xr.DataArray(
+            columns["state"] > 0,
+            dims=("shear", "step", "y", "x"),
+            coords={dim: values[:: int(factor)] for dim, values in coords.items()},
+        )
+        for factor, columns in zip(np.sort(used), pressed, strict=True)
+    ]
+    areas = fc.domains.area_dimension(masks)
+    result = areas.drop_vars("run_time").drop_attrs(deep=False)
+    for name in ("interface_closure", "residual", "converged"):
+        values = np.stack([columns[name] for columns in pressed], axis=-1)
+        result[name] = ("shear", "step", "resolution"), values
+    for name in LOADS:
+        result = result.assign_coords({name: ("step", pressed[0][name][0])})
+    result = result.assign_coords(
+        shear=("shear", shears),
+        step=np.arange(result.sizes["step"]),
+        direction=towards.name,
+        azimuth=towards.azimuth,
+    )
+    result["nominal_area"] = crack.nominal_area
+    references = joined_references(pressing_references(crack, options), areas.attrs["references"])
+    residual = float(np.max([columns["residual"].max() for columns in pressed]))
+    return result.assign_attrs(achieved_residual=residual, references=references)
+
+
+def default_factors(cells: tuple[int, int]) -> Array:
+    """Return the smallest common divisors of the cells of the block that leave enough of them."""
+    common = math.gcd(*cells)
+    largest = max(1, min(cells) // FEWEST_CELLS)
+    divisors = [factor for factor in range(1, largest + 1) if common % factor == 0]
+    return np.array(divisors[:DEFAULT_FACTORS])

@@ -1,0 +1,153 @@
+"""Size effect of friction: shear strength of a joint under the weight of the structure above it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._compass import COMPASS
+from fractalcontact.joints._crack import Crack
+from fractalcontact.joints._dilatancy import dilatancy
+from fractalcontact.joints._friction import LOCKED_ANGLE, mark_locked
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
+LARGEST = 1e100  # products of such numbers do not overflow
+MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
+NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
+
+
+def _check(
+    problems: Problems,
+    *,
+    crack: Any,
+    structure_size: Any,
+    unit_weight: Any,
+    shear: Any,
+    direction: Any,
+    **solver: Any,
+) -> None:
+    weight = problems.number("unit_weight", unit_weight, above=0, at_most=LARGEST)
+    # any shear and force, to check the other arguments as well
+    shear = shear if problems.numbers("shear", shear, above=0) else 0.0
+    force: Any = 1.0
+    if problems.numbers("structure_size", structure_size, above=0, at_most=LARGEST):
+        sizes = float_array(structure_size)
+        ascending = bool((np.diff(sizes) > 0).all())
+        problems.require(ascending, "structure_size", "ascending sizes, each once", structure_size)
+        if weight and isinstance(crack, Crack):
+            force = (float(unit_weight) * sizes * crack.nominal_area).tolist()
+    with problems.collect():
+        dilatancy.validate(crack, shear=shear, direction=direction, normal_force=force, **solver)
+
+
+@public_result(title="shear strength of a joint under self-weight", check=_check)
+def self_weight(
+    crack: Crack,
+    *,
+    structure_size: float | Sequence[float] | Array,
+    unit_weight: float,
+    shear: float | Sequence[float] | Array,
+    direction: str | float | Sequence[str | float] = COMPASS,
+    influence: str | None = None,
+    hardness: float | None = None,
+    tolerance: float = 1e-8,
+) -> xr.Dataset:
+    """Return the shear strength of a joint under the weight of structures of several sizes.
+
+    Similar structures of size L load their joint with the pressure gamma L. With a constant coefficient of
+    friction the strength grows as L. Here the friction angle follows from the dilatancy under that pressure,
+    which is less the larger the structure, so that the strength grows more slowly.
+
+    Parameters
+    ----------
+    crack : Crack
+    structure_size : float or sequence of float
+        Sizes L, ascending: the height of material above the joint, m.
+    unit_weight : float
+        Weight per volume gamma, N/m3; 24e3 for concrete.
+    shear : float or sequence of float
+        Shears v > 0 from mated position (m) over which the dilatancy angle is the mean; see Notes.
+    direction : str, float, or a sequence of them
+        Directions of sliding: compass words, or azimuths in degrees (E = 0, anticlockwise).
+    influence, hardness, tolerance
+        As for `fractalcontact.contact.press`.
+
+    Returns
+    -------
+    Dataset
+        Over (direction, shear, structure_size): dilatancy (m), friction_angle (degree), shear_strength (Pa),
+        NaN with the `reason` where the faces lock; residual and converged. strength_exponent over (direction,
+        shear): slope of a straight line through ln(shear_strength) over ln(structure_size). nominal_pressure
+        (Pa) over structure_size; rms_slope, basic_friction_angle, nominal_area, run_time (s).
+
+    Raises
+    ------
+    InvalidInput
+        The block would leave its face, heights are missing in its path, or an argument is wrong.
+
+    Notes
+    -----
+    tau = gamma L tan(phi_basic + atan(delta(gamma L, v)/v)): the mean angle over the whole shear. Over a
+    shorter shear the angle of fractal faces is larger: compare only strengths over equal shears.
+
+    References
+    ----------
+    Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> slope = np.tan(np.radians(15)) * np.arange(40.0) * np.ones((6, 1))
+    >>> surface = fc.surfaces.from_array(slope, 1.0)
+    >>> crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(6, 20), basic_friction_angle=30)
+    >>> result = fc.joints.self_weight(
+    ...     crack, structure_size=[10, 100], unit_weight=24e3, shear=4, direction="E"
+    ... )
+    >>> (
+    ...     (result.shear_strength / 1e6).values.round(3).tolist(),
+    ...     result.strength_exponent.values.round(3).tolist(),
+    ... )
+    ([[[0.24, 2.4]]], [[1.0]])
+    """
+    sizes, shears = float_array(structure_size), float_array(shear)
+    pressures = float(unit_weight) * sizes
+    slid = dilatancy(
+        crack,
+        shear=shears,
+        direction=direction,
+        normal_force=(pressures * crack.nominal_area).tolist(),
+        influence=influence,
+        hardness=hardness,
+        tolerance=tolerance,
+    )
+    result = slid[list(FROM_DILATANCY)].drop_vars(("step", "normal_force", "nominal_pressure"))
+    result = result.drop_attrs().rename(step="structure_size").assign_coords(structure_size=sizes)
+    result = result.assign_coords(nominal_pressure=("structure_size", pressures))
+    opening = result["dilatancy"]
+    angle = crack.basic_friction_angle + np.degrees(np.arctan(opening.values / shears[:, None]))
+    strength = pressures * np.tan(np.radians(np.where(angle < LOCKED_ANGLE, angle, math.nan)))
+    result["friction_angle"], result["shear_strength"] = (opening.dims, angle), (opening.dims, strength)
+    exponents = [_exponent(sizes, row) for row in strength.reshape(-1, sizes.size)]
+    result["strength_exponent"] = opening.dims[:-1], np.reshape(exponents, opening.shape[:-1])
+    result["friction_angle"].attrs["comment"] = MEAN_ANGLE
+    mark_locked(result, ("shear_strength",))
+    if np.isnan(exponents).any():
+        result["strength_exponent"].attrs["reason"] = NO_EXPONENT
+    residual = float(result["residual"].max())
+    return result.assign_attrs(achieved_residual=residual, references=slid.attrs["references"])
+
+
+def _exponent(sizes: Array, strengths: Array) -> float:
+    if sizes.size < 2 or not (strengths > 0).all():  # False for NaN
+        return math.nan
+    return float(fit_line(sizes, strengths).slope)
