@@ -51,6 +51,8 @@ FUNCTIONS = {
         "friction",
         "decorrelation_length",
         "transmissivity",
+        "area_dimension",
+        "self_weight",
     ),
     "domains": ("box_dimension", "lacunarity", "islands", "evolution"),
 }

@@ -13,6 +13,7 @@ from fractalcontact.base.schema import STEEP
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+MEMBER = "member"
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
 PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
@@ -49,6 +50,18 @@ def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
             return None
         node = node.children[name]
     return node.to_dataset() if node.has_data else None
+
+
+def member_count(tree: xr.DataTree) -> int:
+    """Return the number of members of an ensemble; 0 for a single study."""
+    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
+
+
+def of_member(tree: xr.DataTree, number: int) -> xr.DataTree:
+    """Return the results of one member of an ensemble."""
+    one: xr.DataTree = tree.map_over_datasets(lambda data: data.isel({MEMBER: number}, missing_dims="ignore"))
+    one.attrs = dict(tree.attrs)
+    return one
 
 
 def cells_per_island(pressed: xr.Dataset) -> xr.DataArray:

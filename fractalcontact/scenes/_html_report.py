@@ -25,7 +25,8 @@ from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.tables import fixed_width
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._report import compares_with_paper, first_member, member_count, summary
+from fractalcontact.scenes._caveats import member_count, of_member
+from fractalcontact.scenes._report import compares_with_paper, summary
 from fractalcontact.scenes._tables import tables
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -134,13 +135,13 @@ def _write(text: str, target: Path) -> Path:
 
 def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]]) -> str:
     """Return the text of the page."""
-    single = first_member(tree)
+    single = of_member(tree, 0)
     surface, maps = _surface(single), list(_maps(single))
-    of_member = " Member 0 of the ensemble." if member_count(tree) else ""
+    which = " Member 0 of the ensemble." if member_count(tree) else ""
     sections = {
         "Summary": _summary(tree),
-        "Surface": _surface_section(surface, of_member) if surface else "",
-        "Maps": "".join(_map_section(each, number, of_member) for number, each in enumerate(maps)),
+        "Surface": _surface_section(surface, which) if surface else "",
+        "Maps": "".join(_map_section(each, number, which) for number, each in enumerate(maps)),
         "Figures": "".join(_figure(name, content) for name, content in figures),
         "Tables": _table_section(tree),
         "Scene and provenance": _provenance_section(tree),

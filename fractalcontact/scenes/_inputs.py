@@ -13,13 +13,14 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.references import joined_references
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import STAGES, public_function
+from fractalcontact.scenes._stages import ONE_LOAD, STAGES, public_function
 
 if TYPE_CHECKING:
     import xarray as xr
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
-PRESSING = ("closure", "elastic_dilatancy", "direct_shear")  # stages of a joint that solve a contact
+# stages of a joint that solve a contact
+PRESSING = ("closure", "elimination", "area_dimension", "elastic_dilatancy", "self_weight", "direct_shear")
 # what a criterion calls the basic friction angle of the material; there is no residual one in a scene
 FRICTION_ANGLE = {"strength_envelope": "basic_friction_angle", "shear_curve": "residual_friction_angle"}
 
@@ -104,28 +105,33 @@ def contact_options(scene: Scene) -> dict[str, Any]:
     return options
 
 
-def crack_options(scene: Scene) -> dict[str, Any]:
-    """Return the arguments of `Crack` but for the surfaces."""
+def crack_options(scene: Scene, name: str = "") -> dict[str, Any]:
+    """Return the arguments of `Crack` but for the surfaces; a stage may have a block of its own."""
     material = scene.material
     options = {
         "young": material.young,
         "poisson": material.poisson,
         "basic_friction_angle": material.basic_friction_angle,
-        "block": scene.joint.block,
+        "block": scene.joint.stages.get(name, {}).get("block", scene.joint.block),
     }
     return {key: value for key, value in options.items() if value is not None}
 
 
 def joint_options(scene: Scene, name: str) -> dict[str, Any]:
     """Return the arguments of a stage of the joint but for its crack."""
-    options = scene.stage_options(STAGES[f"joints/{name}"])
-    if name == "closure":  # it has one load
-        load = scene.joint.loads[0]
+    stage = STAGES[f"joints/{name}"]
+    options = scene.stage_options(stage)
+    options.pop("block", None)  # an argument of the crack
+    if name in ONE_LOAD:
+        load = scene.joint.loads(name, [key for key in LOADS if key in stage.arguments()])[0]
         options = {key: value for key, value in options.items() if key not in LOADS or key == load}
+    if name == "elimination":
+        options["method"] = name
     if name == "friction" and "nominal_pressure" not in scene.joint.stages.get(name, {}):
         options.pop("nominal_pressure", None)  # in [joint] it is the load of the closure
     if name in FRICTION_ANGLE and scene.material.basic_friction_angle is not None:
         options.setdefault(FRICTION_ANGLE[name], scene.material.basic_friction_angle)
-    if name in PRESSING and scene.material.hardness is not None:
+    has_hardness = name in PRESSING and "hardness" in stage.arguments()
+    if has_hardness and scene.material.hardness is not None:
         options.setdefault("hardness", scene.material.hardness)
     return options

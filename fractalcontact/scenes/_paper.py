@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import xarray as xr
 
 from fractalcontact.base.tables import table
 from fractalcontact.scenes import _paper_findings as findings
+from fractalcontact.scenes._caveats import member_count, of_member
 from fractalcontact.scenes._contents import note
-from fractalcontact.scenes._paper_findings import NOT_TESTED, Finding
+from fractalcontact.scenes._paper_study import NO, NOT_TESTED, YES, Finding
 
 
 class Claim(NamedTuple):
@@ -35,7 +36,8 @@ def paper_table(tree: xr.DataTree) -> str:
     str
         A row for every claim: section of the paper, claim, result of the study, and verdict: "yes", "no",
         "not tested" where the study lacks the results or the shears and loads that the paper compares, or "by
-        construction" where the claim follows from the model. Empty where there is no joint.
+        construction" where the claim follows from the model. Of an ensemble the result is that of member 0,
+        and the verdict the number of members that say "yes". Empty where there is no joint.
 
     Notes
     -----
@@ -58,14 +60,26 @@ def paper_table(tree: xr.DataTree) -> str:
     """
     if "joints" not in tree.children:
         return ""
-    rows = [("section", "claim of the paper", "this study", "verdict")]
+    members = member_count(tree)
+    studies = [of_member(tree, number) for number in range(members)] if members else [tree]
+    column = f"member 0 of {members}" if members else "this study"
+    rows = [("section", "claim of the paper", column, "verdict")]
     for claim in CLAIMS:
-        finding = claim.test(tree) or Finding("", NOT_TESTED)
-        rows.append((claim.section, claim.claim, *finding))
+        found = [claim.test(study) or Finding("", NOT_TESTED) for study in studies]
+        rows.append((claim.section, claim.claim, found[0].result, _verdict(found)))
     remark = (
         "The paper states orders of magnitude and trends; neither its surface nor its modulus is published."
     )
     return "\n".join([table(rows), note(remark)])
+
+
+def _verdict(findings_of_members: Sequence[Finding]) -> str:
+    """Return the verdict of a study; of an ensemble the number of members that say "yes"."""
+    verdicts = [finding.verdict for finding in findings_of_members]
+    tested = [verdict for verdict in verdicts if verdict in (YES, NO)]
+    if len(verdicts) == 1 or not tested:
+        return verdicts[0]
+    return f"{YES} in {tested.count(YES)} of {len(tested)}"
 
 
 def paper_criteria() -> str:
@@ -105,9 +119,18 @@ CLAIMS = (
         findings.leakage,
     ),
     Claim(
-        "1", "frictional strength grows with size", "by construction: weight over area", findings.self_weight
+        "1",
+        "frictional strength grows as the size",
+        "exponent 1 under self-weight, tolerance .1, at every shear and direction",
+        findings.self_weight,
     ),
     Claim("2", "face: dimension 2.15 to 2.29", "every method, tolerance .05", findings.face_dimension),
+    Claim(
+        "2",
+        "a finer spacing hardly alters the contact",
+        "w_int within 10 % of that at the next spacing, at 2.5, 25 and 75 MPa and every shear",
+        findings.refinement,
+    ),
     Claim(
         "3",
         "delta-surface: dimension above 2",
@@ -115,7 +138,12 @@ CLAIMS = (
         findings.delta_above_two,
     ),
     Claim("3", "... that grows with v", "by its area, from each shear to the next", findings.delta_grows),
-    Claim("3", "elimination converges in a few steps", "not tested here", findings.elimination),
+    Claim(
+        "3",
+        "elimination converges in a few steps",
+        "at most 6 at every load, on a part of the block",
+        findings.elimination,
+    ),
     Claim(
         "4",
         "closing stage lengthens with v",
@@ -149,7 +177,7 @@ CLAIMS = (
     Claim(
         "4",
         "contact area depends on the spacing",
-        "not tested here: domains.area_dimension",
+        "10 % less at the finest than at the coarsest, at 2.5, 25 and 75 MPa and every shear",
         findings.resolution,
     ),
     Claim("4", "domain: dimension below 2", "below 1.95 at every shear and force", findings.domain_lacunar),
@@ -196,7 +224,12 @@ CLAIMS = (
         "dimension at 75 MPa outside the range up to .8 mm by .1 or more",
         findings.far_domain,
     ),
-    Claim("4", "no correlation left at 8 mm", "decorrelation length below 8 mm", findings.decorrelation),
+    Claim(
+        "4",
+        "no correlation left at 8 mm",
+        "decorrelation length below 8 mm, and correlation below 1/e at 8 mm",
+        findings.decorrelation,
+    ),
     Claim("4", "delta_r about 2 mm at .8 mm (W, N)", "tolerance 25 %", findings.steep_rise),
     Claim(
         "4",

@@ -208,7 +208,7 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
     if stage.row.takes_surface:
         return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))
-    crack = _crack(scene, results)
+    crack = _crack(scene, results, name)
     if name == "direct_shear":  # every pressure has a joint of its own
         pressures = _as_list(options.pop("nominal_pressure"))
         test = partial(call, stage.row.function, crack, **options)
@@ -216,8 +216,12 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
         return StageWork(tests, ("nominal_pressure",), (len(pressures),))
     if name == "delta_surface" and name not in scene.want.joints:
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
-    if name == "closure":
+    if name in ("closure", "elimination"):
         return _closure_work(crack, options, stage)
+    if name == "area_dimension":
+        shears = _as_list(options.pop("shear"))
+        call_at = partial(partial, call, stage.row.function, crack, **options)
+        return StageWork(tuple(call_at(shear=[shear]) for shear in shears), ("shear",), (len(shears),))
     if name == "elastic_dilatancy":
         directions = _as_list(options.pop("direction", ("E", "N", "W", "S")))
         shears = _as_list(options.pop("shear"))
@@ -257,11 +261,11 @@ def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
     return as_dataset(upper.rename("height"))
 
 
-def _crack(scene: Scene, results: Results) -> Crack:
+def _crack(scene: Scene, results: Results, name: str) -> Crack:
     from fractalcontact import joints
 
     upper = _heights(results, "joints/faces") if "joints/faces" in results else None
-    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene))
+    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene, name))
 
 
 def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:

@@ -15,6 +15,8 @@ from fractalcontact.scenes._stages import (
     CURVES,
     FIGURES,
     ISLAND_MAP,
+    ONE_DIRECTION,
+    ONE_LOAD,
     STAGES,
     StageType,
     arguments_of,
@@ -226,18 +228,17 @@ def check_loads(scene: Scene, problems: Problems) -> None:
         name = stage.name.partition("/")[2]
         if not stage.name.startswith("joints/") or name == "faces":
             continue
-        options = scene.stage_options(stage.row, ("shear", "direction", *LOADS))
-        if name in ("closure", "rigid_dilatancy", "elastic_dilatancy") and "shear" not in options:
-            problems.add("joint.shear", f"a value for {name} ({stage.reason})", NONE)
+        options = scene.stage_options(stage.row)
+        for key in () if name in STRENGTH else stage.row.required():
+            problems.require(key in options, f"joint.{key}", f"a value for {name} ({stage.reason})", NONE)
         if name == "elastic_dilatancy" and "normal_force" not in options:
             problems.add("joint.normal_force", f"a value for {name}", NONE)
         if name in STRENGTH:
             _check_strength(scene, stage, problems)
         direction = options.get("direction", "E")
-        if name in ("closure", "delta_surface", "decorrelation_length", *STRENGTH) and isinstance(
-            direction, list
-        ):
+        if name in (*ONE_DIRECTION, *STRENGTH) and isinstance(direction, list):
             problems.add("joint.direction", f"one direction for {name}", direction)
-        if name == "closure" and len(loads := scene.joint.loads) != 1:
-            expected = f"one of a closure, normal_force or nominal_pressure ({stage.reason})"
-            problems.add("joint.closure", expected, Words(", ".join(loads)) or NONE)
+        allowed = [key for key in LOADS if key in stage.row.arguments()]
+        if name in ONE_LOAD and len(loads := scene.joint.loads(name, allowed)) != 1:
+            expected = f"one of a {', '.join(allowed[:-1])} or {allowed[-1]} ({stage.reason})"
+            problems.add(f"joint.{name}", expected, Words(", ".join(loads)) or NONE)

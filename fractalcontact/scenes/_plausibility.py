@@ -45,7 +45,7 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
         modulus = 0.5 * young / (1.0 - poisson**2)  # of two bodies of the same material
         block = edges if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
-        for name in ("closure", "elastic_dilatancy"):
+        for name in ("closure", "area_dimension", "elastic_dilatancy"):
             loads = scene.stage_options(STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
             yield from _high_pressures(f"joint.{name}", loads, area, modulus)
 

@@ -12,13 +12,12 @@ import xarray as xr
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import table
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
-from fractalcontact.scenes._caveats import caveats, group_of
+from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count
 from fractalcontact.scenes._contents import note, reasons, stage_table
 from fractalcontact.scenes._paper import paper_table
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MEMBER = "member"
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 FRACTIONS = frozenset({"contact_fraction", "corrected_contact_fraction"})
 
@@ -27,7 +26,7 @@ def summary(tree: xr.DataTree) -> str:
     r"""Return the main results of a study with the achieved errors and the run time of every stage.
 
     Of an ensemble, every number is the mean over the members with its standard deviation. A study whose scene
-    says ``paper = true`` is compared with the paper of 1998, an ensemble by its member 0.
+    says ``paper = true`` is compared with the paper of 1998, an ensemble member by member.
 
     Parameters
     ----------
@@ -56,27 +55,21 @@ def summary(tree: xr.DataTree) -> str:
         _contact(tree),
         _mated_position(tree),
         _closure(tree),
+        _elimination(tree),
+        _area_by_spacing(tree),
+        _delta_dimension(tree),
+        _decorrelation(tree),
         _dilatancy(tree),
         _friction(tree),
         _direct_shear(tree),
+        _self_weight(tree),
+        _leakage(tree),
         _contact_set(tree),
         "\n".join(note(caveat) for caveat in caveats(tree)),
-        _paper(tree, members) if compares_with_paper(tree) else "",
+        paper_table(tree) if compares_with_paper(tree) else "",
         stage_table(tree),
     ]
     return "\n\n".join(section for section in sections if section)
-
-
-def _paper(tree: xr.DataTree, members: int) -> str:
-    compared = paper_table(first_member(tree))
-    return f"member 0 of {members}:\n{compared}" if members and compared else compared
-
-
-def first_member(tree: xr.DataTree) -> xr.DataTree:
-    """Return the results of the first member of an ensemble; of a single study all."""
-    first: xr.DataTree = tree.map_over_datasets(lambda dataset: dataset.isel(member=0, missing_dims="ignore"))
-    first.attrs = dict(tree.attrs)
-    return first
 
 
 def compares_with_paper(tree: xr.DataTree) -> bool:
@@ -86,11 +79,6 @@ def compares_with_paper(tree: xr.DataTree) -> bool:
     except (KeyError, TypeError, ValueError):
         return False
     return isinstance(scene, dict) and scene.get("paper") is True
-
-
-def member_count(tree: xr.DataTree) -> int:
-    """Return the number of members of an ensemble; 0 for a single study."""
-    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
 
 
 def _ensemble(members: int) -> str:
@@ -227,6 +215,84 @@ def _closure(tree: xr.DataTree) -> str:
     rows: list[tuple[str, ...]] = [(*head, "area, perimeter-corrected")]
     for shear, state in _at_shears(closure.isel(step=-1)):
         rows.append((shear, *(amount(state[name]) for name in names)))
+    return table(rows)
+
+
+def _elimination(tree: xr.DataTree) -> str:
+    part = group_of(tree, "joints/elimination")
+    if part is None:
+        return ""
+    rows = [("elimination at shear", "part of the block", "contact area, last step", "rounds")]
+    for shear, state in _at_shears(part):
+        rounds = _finite(state["iterations"])
+        ends = dict.fromkeys(f"{end:.0f}" for end in (rounds.min(), rounds.max()))
+        last = state.isel(step=-1)
+        rows.append(
+            (shear, amount(last["nominal_area"]), amount(last["contact_fraction"]), " to ".join(ends))
+        )
+    return table(rows)
+
+
+def _area_by_spacing(tree: xr.DataTree) -> str:
+    areas = group_of(tree, "joints/area_dimension")
+    if areas is None:
+        return ""
+    spacings = [f"area at {length(spacing)}" for spacing in areas["resolution"].values]
+    rows: list[tuple[str, ...]] = [("spacing, at shear", "normal force", *spacings, "area dimension")]
+    for shear, state in _at_shears(areas.isel(step=-1)):
+        fractions = state["contact_fraction"]
+        every = (amount(fractions.isel(resolution=i)) for i in range(len(spacings)))
+        rows.append((shear, amount(state["normal_force"]), *every, plain(state["area_dimension"], 2)))
+    return table(rows)
+
+
+def _delta_dimension(tree: xr.DataTree) -> str:
+    delta = group_of(tree, "joints/delta_dimension")
+    if delta is None:
+        return ""
+    names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
+    rows: list[tuple[str, ...]] = [("delta-surface at shear", "D by area", "by variogram", "by spectrum")]
+    rows += [(shear, *(plain(state[name], 3) for name in names)) for shear, state in _at_shears(delta)]
+    return table(rows)
+
+
+def _decorrelation(tree: xr.DataTree) -> str:
+    lengths = group_of(tree, "joints/decorrelation_length")
+    if lengths is None:
+        return ""
+    names = ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high")
+    rows = [("decorrelation", "length", "95 % interval")]
+    for direction in np.atleast_1d(lengths["direction"].values):
+        state = lengths.sel(direction=direction) if "direction" in lengths.dims else lengths
+        value, low, high = (amount(state[name]) for name in names)
+        rows.append((str(direction), value, "none" if low == "-" else f"{low} ... {high}"))
+    return table(rows)
+
+
+def _self_weight(tree: xr.DataTree) -> str:
+    strengths = group_of(tree, "joints/self_weight")
+    if strengths is None:
+        return ""
+    sizes = [f"at {length(size)}" for size in strengths["structure_size"].values]
+    rows: list[tuple[str, ...]] = [("strength under self-weight", "over shear", *sizes, "exponent of size")]
+    for direction in np.atleast_1d(strengths["direction"].values):
+        for shear, state in _at_shears(strengths.sel(direction=direction)):
+            every = [amount(state["shear_strength"].isel(structure_size=i)) for i in range(len(sizes))]
+            exponent = plain(state["strength_exponent"], 3)
+            rows.append((str(direction), shear, *every, "the faces lock" if "-" in every else exponent))
+    return table(rows)
+
+
+def _leakage(tree: xr.DataTree) -> str:
+    flow = group_of(tree, "joints/transmissivity")
+    if flow is None:
+        return ""
+    axes = [str(axis) for axis in flow["axis"].values]
+    heads = [f"hydraulic, along {axis}" for axis in axes]
+    rows: list[tuple[str, ...]] = [("aperture at shear", "normal force", "mean", *heads)]
+    for shear, state in _at_shears(flow.isel(step=-1)):
+        every = (amount(state["hydraulic_aperture"].sel(axis=axis)) for axis in axes)
+        rows.append((shear, amount(state["normal_force"]), amount(state["aperture"]), *every))
     return table(rows)
 
 

@@ -81,11 +81,10 @@ class JointTable:
     options: Table = field(default_factory=dict)
     stages: Mapping[str, Table] = field(default_factory=dict)
 
-    @property
-    def loads(self) -> list[str]:
-        """The loads of the closure laws: those of `[joint.closure]`, else those of `[joint]`."""
-        own = [key for key in LOADS if key in self.stages.get("closure", {})]
-        return own or [key for key in LOADS if key in self.options]
+    def loads(self, stage: str, allowed: Sequence[str] = LOADS) -> list[str]:
+        """Return the loads of a stage: those of its own table, else those of `[joint]`."""
+        own = [key for key in allowed if key in self.stages.get(stage, {})]
+        return own or [key for key in allowed if key in self.options]
 
 
 @dataclass(frozen=True)
@@ -183,8 +182,9 @@ class Scene:
         """
         name, _, word = stage.table.partition(".")
         table = self.table(name)
-        # a stage may have the name of an argument ([joint.closure]), so sub-tables are not values
-        options = {key: value for key, value in table.items() if not isinstance(value, dict)}
+        # a stage may have the name of an argument ([joint.closure]), so sub-tables are not values; the block
+        # of a joint is that of its crack, and only one in the table of a stage is an argument
+        options = {k: value for k, value in table.items() if not isinstance(value, dict) and k != "block"}
         own = table.get(word)
         options |= own if isinstance(own, dict) else {}
         allowed = stage.arguments() if keys is None else tuple(keys)

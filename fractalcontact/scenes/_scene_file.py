@@ -35,11 +35,13 @@ ONE_NUMBER: dict[str, dict[str, Any]] = {
     "distance": {"above": 0.0},
     "viscosity": {"above": 0.0},
     "hardness": {"above": 0.0},
+    "unit_weight": {"above": 0.0},
 }
 NUMBERS: dict[str, dict[str, Any]] = {
     "block": {"above": 0.0},
     "spacing": {"above": 0.0},
     "shear": {"at_least": 0.0},
+    "structure_size": {"above": 0.0},
     **{load: {"at_least": 0.0} for load in LOADS},
 }
 

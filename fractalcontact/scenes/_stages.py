@@ -15,6 +15,10 @@ from typing import Any
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 FIGURES = "figures"
 
+# stages of a joint with one path of load, and with one direction
+ONE_LOAD = ("closure", "elimination", "area_dimension")
+ONE_DIRECTION = (*ONE_LOAD, "delta_surface", "delta_dimension", "decorrelation_length")
+
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
 _FROM_SCENE = frozenset(
     ("surface", "crack", "mask", "valid", "gap", "dilatancy", "keep", "progress", "basic_friction_angle")
@@ -68,7 +72,15 @@ class StageType:
         """Return the arguments of the function that a scene may give."""
         if self.name == "joints/rigid_dilatancy":
             return ("shear", "direction")
-        return arguments_of(self.function)[0]
+        allowed = arguments_of(self.function)[0]
+        if self.name == "joints/elimination":  # of a part of the block, and elastic
+            return ("block", *(key for key in allowed if key not in ("method", "hardness")))
+        return allowed
+
+    def required(self) -> tuple[str, ...]:
+        """Return the arguments that a scene must give."""
+        own = ("block",) if self.name == "joints/elimination" else ()
+        return (*own, *(key for key in self.arguments() if key in arguments_of(self.function)[1]))
 
 
 _SURFACE = ("surfaces",)
@@ -106,11 +118,14 @@ _ROWS = (
     _joint("delta_dimension"),
     _joint("rigid_dilatancy", function="dilatancy"),
     _joint("closure", keeps=CONTACT_MAPS),
+    _joint("elimination", function="closure"),
+    _joint("area_dimension"),
     _joint("elastic_dilatancy", function="dilatancy"),
     _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
     _joint("direct_shear"),
     _joint("shear_curve", _SURFACE, takes_surface=True),
     _joint("strength_envelope", _SURFACE, takes_surface=True),
+    _joint("self_weight"),
     _joint("decorrelation_length"),
     _joint("transmissivity", ("joints/closure",), reads="gap"),
     _domain("box_dimension"),

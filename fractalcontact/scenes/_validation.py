@@ -122,16 +122,22 @@ def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
         return
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
         return
-    from fractalcontact import joints  # only here: other scenes do not load it
-
     with problems.collect("joint: "):
-        crack = joints.Crack(surfaces["surface"], surfaces.get("upper"), **crack_options(scene))
+        crack = _crack(scene, surfaces)
         for stage in stages_of(scene) if _is_valid(problems, "joint") else ():
             name = stage.name.partition("/")[2]
             if stage.name.startswith("joints/") and name in JOINT_STAGES:
                 options = scene.stage_options(stage.row, ("shear", "direction"))
                 if "shear" in options:
-                    _validate_travel(crack, options, stage, problems)
+                    sliding = _crack(scene, surfaces, name) if name == "elimination" else crack
+                    _validate_travel(sliding, options, stage, problems)
+
+
+def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], name: str = "") -> Crack:
+    """Return the crack of the scene, or that of a stage with a block of its own."""
+    faces = surfaces["surface"], surfaces.get("upper")
+    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, name))
+    return crack
 
 
 def _validate_travel(crack: Crack, options: dict[str, Any], stage: Stage, problems: Problems) -> None:
@@ -146,7 +152,7 @@ def _validate_travel(crack: Crack, options: dict[str, Any], stage: Stage, proble
 
 def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
     """Validate every call of the study; zeros replace the result of an earlier stage."""
-    surface, upper = surfaces["surface"], surfaces.get("upper")
+    surface = surfaces["surface"]
     is_flat = _flat_surface(scene.surface) is not None  # which loads are possible depends on the heights
     crack = None
     for stage in stages_of(scene):
@@ -169,9 +175,10 @@ def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
                     _validate_call(stage.row.function, surface, **joint_options(scene, name))
                     continue
                 if crack is None:
-                    crack = public_function("joints.Crack")(surface, upper, **crack_options(scene))
+                    crack = _crack(scene, surfaces)
+                pressed = _crack(scene, surfaces, name) if name == "elimination" else crack
                 options = joint_options(scene, name) | ({"keep": stage.keep} if stage.row.keeps else {})
-                _validate_call(stage.row.function, crack, **options)
+                _validate_call(stage.row.function, pressed, **options)
 
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:

@@ -80,6 +80,7 @@ WITH_KERNELS = ("numba", "scipy.linalg")
 KERNELS = {
     "contact solver": ("contact", 12),
     "increment sums": ("dimensions", 1),
+    "covering area": ("dimensions", 1),
     "minimum cover": ("domains", 1),
     "mean cover": ("domains", 1),
     "distances": ("domains", 2),
@@ -124,7 +125,11 @@ REQUIREMENTS = {
     "contact": _SOLVER,
     # the registration of scikit-image has scipy's transforms of its own
     "joints/register": Requirement((FFT, "skimage.registration", "scipy.ndimage", "scipy.fft")),
+    "joints/delta_dimension": Requirement((FFT,), (*_SUMS.kernels, "covering area")),
     "joints/closure": _SOLVER,
+    "joints/elimination": _SOLVER,
+    "joints/area_dimension": _SOLVER,
+    "joints/self_weight": _SOLVER,
     "joints/elastic_dilatancy": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover")),

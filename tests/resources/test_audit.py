@@ -18,6 +18,12 @@ TEMPLATE = (
     + """
 [contact]
 nominal_pressure = [1e5, 1e6]
+[joint.elimination]
+block = 1.2e-3
+[joint.self_weight]
+shear = [1e-4]
+structure_size = [1.0, 10.0]
+unit_weight = 24e3
 [domains.generalised_dimensions]
 q = [0.0, 2.0]
 [want]
@@ -36,6 +42,10 @@ WANTED = {
         "friction",
         "decorrelation_length",
         "transmissivity",
+        "delta_dimension",
+        "elimination",
+        "area_dimension",
+        "self_weight",
     ),
     "domains": tuple(name for name in fc.domains.__all__ if name not in ("area_dimension", "read_mask")),
 }

@@ -9,11 +9,25 @@ from study import SOUND
 
 import fractalcontact as fc
 
-ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 3").replace(
-    'joints = ["closure", "rigid_dilatancy"]',
-    'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
-    'joints = ["closure", "elastic_dilatancy", "friction"]\ndomains = ["box_dimension", "islands"]\n'
-    "figures = true\n",
+PARTS_OF_THE_PAPER = """[joint.decorrelation_length]
+shear = [0.0, 1e-4, 4e-4]
+[joint.elimination]
+block = 1.2e-3
+[joint.self_weight]
+structure_size = [1.0, 10.0]
+unit_weight = 24e3
+[want]
+"""
+ENSEMBLE = (
+    SOUND.replace("rng = 5", "rng = 5\nmembers = 3")
+    .replace("[want]\n", PARTS_OF_THE_PAPER)
+    .replace(
+        'joints = ["closure", "rigid_dilatancy"]',
+        'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
+        'joints = ["closure", "elastic_dilatancy", "friction", "elimination", "area_dimension", "self_weight",\n'
+        '"delta_dimension", "decorrelation_length", "transmissivity"]\ndomains = ["box_dimension", "islands"]\n'
+        "figures = true\n",
+    )
 )
 
 

@@ -32,13 +32,21 @@ shear = [0.0, 1e-4, 3e-4]
 normal_force = [1.0, 10.0]
 [joint.elastic_dilatancy]
 direction = ["E", "W"]
+[joint.elimination]
+block = 1.2e-3
+[joint.area_dimension]
+factors = [1, 2]
+[joint.self_weight]
+shear = [1e-4, 3e-4]
+structure_size = [1.0, 10.0]
+unit_weight = 24e3
 [want]
 surfaces = ["height", "describe"]
 dimensions = ["likelihood", "variogram"]
 contact = ["press"]
 joints = [
     "delta_surface", "closure", "rigid_dilatancy", "elastic_dilatancy", "friction", "decorrelation_length",
-    "transmissivity",
+    "transmissivity", "elimination", "area_dimension", "self_weight",
 ]
 domains = [
     "box_dimension", "box_counts", "boundary_dimension", "lacunarity", "islands", "percolation", "evolution",
@@ -87,7 +95,7 @@ def study(request, tmp_path_factory):
 
 def test_every_group_is_made_again(study):
     groups = stored_groups(study)
-    assert len(groups) > 14
+    assert len(groups) > 17
     for group in groups:
         check_equal(group, fc.scenes.reproduce(group))
 
