@@ -30,9 +30,9 @@ from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import islands
 from fractalcontact.plotting._lacunarity import lacunarity
 from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
+from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
-from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
 
 if TYPE_CHECKING:

@@ -24,9 +24,9 @@ ENSEMBLE = (
     .replace(
         'joints = ["closure", "rigid_dilatancy"]',
         'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
-        'joints = ["closure", "elastic_dilatancy", "friction", "elimination", "area_dimension", "self_weight",\n'
-        '"delta_dimension", "decorrelation_length", "transmissivity"]\ndomains = ["box_dimension", "islands"]\n'
-        "figures = true\n",
+        'joints = ["closure", "elastic_dilatancy", "friction", "elimination", "area_dimension",\n'
+        '"self_weight", "delta_dimension", "decorrelation_length", "transmissivity"]\n'
+        'domains = ["box_dimension", "islands"]\nfigures = true\n',
     )
 )
 
