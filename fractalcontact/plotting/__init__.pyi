@@ -6,6 +6,7 @@ from ._box_dimension import local_slopes as local_slopes
 from ._closure import closure_laws as closure_laws
 from ._closure import contact_area as contact_area
 from ._contact_maps import contact_domains as contact_domains
+from ._datasheet import datasheet as datasheet
 from ._decorrelation import correlation as correlation
 from ._decorrelation import delta_dimension as delta_dimension
 from ._dilatancy import elastic_dilatancy as elastic_dilatancy
@@ -35,6 +36,7 @@ __all__ = [
     "contact_area",
     "contact_domains",
     "correlation",
+    "datasheet",
     "delta_dimension",
     "dimension_curves",
     "dimensions",

@@ -17,6 +17,7 @@ from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, ou
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
+from fractalcontact.scenes._caveats import MEMBER, caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
@@ -25,8 +26,10 @@ from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
+from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validate
 
+DATASHEET, TABLES = "datasheet.pdf", "tables"
 OWN_REFERENCES = "see the references of each group"
 
 
@@ -44,8 +47,9 @@ def run(
     ----------
     scene : Scene or path-like
     out : path-like, optional
-        Folder for `result.nc`, `report.html` and the figures; nothing is written without it. Finished parts
-        are kept in `out/.stages` until the study is complete: a run that was stopped resumes there.
+        Folder for `result.nc`, `report.html`, the figures and a datasheet; nothing is written without it.
+        Finished parts are kept in `out/.stages` until the study is complete: a run that was stopped resumes
+        there.
     progress : bool, default True
         Show a bar for stages of several parts.
     workers : int, default 0
@@ -117,6 +121,9 @@ def _run(
             _note_run_time(tree, start)
         netcdf.save(tree, folder / RESULT)
         report(tree, folder / REPORT, figures=figures)
+        if scene.want.datasheet:
+            tables(tree, folder / TABLES)
+            _draw_datasheet(tree, folder / DATASHEET)
         (folder / PARTIAL_RESULT).unlink(missing_ok=True)
         store.clear()
     return tree
@@ -202,6 +209,18 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
         facts["interpolation error (m)"] = float(result["interpolation_error"].max())
     words = json.loads(result.attrs.get("provenance", "{}")).get("achieved_error")
     return facts if facts or words is None else {"error": words}
+
+
+def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
+    """Write the page about the joint as PDF; of an ensemble that of its first member."""
+    from fractalcontact import plotting
+
+    first = tree.map_over_datasets(lambda dataset: dataset.isel({MEMBER: 0}, missing_dims="ignore"))
+    first.attrs = dict(tree.attrs)
+    page = plotting.datasheet(first, notes=caveats(first))
+    temporary = netcdf.unfinished(target)
+    page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+    temporary.replace(target)
 
 
 def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> list[Path]:

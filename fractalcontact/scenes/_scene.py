@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.scenes._stages import StageType
+from fractalcontact.scenes._stages import DATASHEET, StageType
 
 Table = Mapping[str, Any]
 LOADS = ("closure", "normal_force", "nominal_pressure")
@@ -89,7 +89,7 @@ class JointTable:
 
 @dataclass(frozen=True)
 class WantTable:
-    """`[want]`: the results to compute, the maps to store, and whether to draw figures."""
+    """`[want]`: the results to compute, the maps to store, whether to draw figures and a datasheet."""
 
     surfaces: tuple[str, ...] = ()
     dimensions: tuple[str, ...] = ()
@@ -98,6 +98,7 @@ class WantTable:
     domains: tuple[str, ...] = ()
     keep: tuple[str, ...] = ()
     figures: bool = False
+    datasheet: bool = False
 
 
 MATERIAL_KEYS = tuple(entry.name for entry in fields(MaterialTable))
@@ -162,8 +163,11 @@ class Scene:
     def want(self) -> WantTable:
         """The wanted results."""
         table = self.table("want")
-        words = {key: self.wanted(key) for key in table if key != "figures"}
-        return WantTable(**words, figures=bool(table.get("figures", False)))
+        figures, datasheet = (bool(table.get(key, False)) for key in ("figures", "datasheet"))
+        words = {key: self.wanted(key) for key in table if key not in ("figures", "datasheet")}
+        if datasheet:
+            words["joints"] = tuple(dict.fromkeys((*words.get("joints", ()), *DATASHEET)))
+        return WantTable(**words, figures=figures, datasheet=datasheet)
 
     @property
     def paper(self) -> bool:

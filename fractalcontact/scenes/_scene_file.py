@@ -243,7 +243,8 @@ def _check_want(scene: Scene, problems: Problems) -> None:
 
         names = ("default", *dimensions.methods())
         valid.append(problems.choices("want.dimensions", table["dimensions"], names))
-    problems.boolean("want.figures", table.get("figures", False))
+    for key in ("figures", "datasheet"):
+        problems.boolean(f"want.{key}", table.get(key, False))
     if all(valid):
         _check_needed_tables(scene, problems)
 
@@ -251,7 +252,7 @@ def _check_want(scene: Scene, problems: Problems) -> None:
 def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     contact, material = scene.table("contact"), scene.table("material")
-    if scene.wanted("joints") or (scene.wanted("domains") and not scene.wanted("contact")):
+    if scene.want.joints or (scene.wanted("domains") and not scene.wanted("contact")):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):

@@ -122,6 +122,8 @@ _ROWS = (
     _joint("area_dimension"),
     _joint("elastic_dilatancy", function="dilatancy"),
     _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
+    _joint("roughness_coefficient", _SURFACE, takes_surface=True),
+    _joint("directional_roughness", _SURFACE, takes_surface=True),
     _joint("direct_shear"),
     _joint("shear_curve", _SURFACE, takes_surface=True),
     _joint("strength_envelope", _SURFACE, takes_surface=True),
@@ -151,6 +153,10 @@ def _words(subpackage: str, leave_out: Iterable[str] = ()) -> tuple[str, ...]:
 
 CURVES = _words("dimensions")
 JOINT_STAGES = _words("joints", leave_out=("faces",))
+# what the datasheet of a joint shows at least
+DATASHEET = (
+    "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "transmissivity",
+)  # fmt: skip
 DOMAIN_STAGES = _words("domains")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {

@@ -88,7 +88,15 @@ def test_unreadable_scene_is_refused(write, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["concrete_crack", "concrete_crack_1998", "rigid_sliding", "jacksboro_fault", "freiberg_gneiss"]
+    "name",
+    [
+        "concrete_crack",
+        "concrete_crack_1998",
+        "rigid_sliding",
+        "jacksboro_fault",
+        "freiberg_gneiss",
+        "gneiss_datasheet",
+    ],
 )
 def test_shipped_scenes_are_found_by_name_and_valid(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

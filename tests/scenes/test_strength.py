@@ -1,5 +1,7 @@
 """Stages of the strength of a joint: plan, checks, resume, figures and reproduction."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,22 @@ def test_mistakes_are_reported_before_anything_runs(scene, old, new, message):
     assert old in SCENE
     with pytest.raises(ValueError, match=message):
         fc.scenes.validate(scene(SCENE.replace(old, new, 1)))
+
+
+def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
+    text = SCENE.replace(
+        'joints = ["direct_shear", "shear_curve", "strength_envelope"]\nfigures = true', "datasheet = true"
+    )
+    text = text.replace("[joint.direct_shear]", "shear = 2e-4\n[joint.direct_shear]")
+    path = scene(text)
+    names = {stage.name for stage in fc.scenes.plan(fc.scenes.load(path))}
+    assert {"joints/roughness_coefficient", "joints/closure", "joints/transmissivity"} <= names
+    assert "joints/direct_shear" not in names
+    tree = fc.scenes.run(path, out=tmp_path / "out", progress=False)
+    page = (tmp_path / "out" / "datasheet.pdf").read_bytes()
+    assert page.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", page)) == 1
+    curves = np.genfromtxt(
+        tmp_path / "out" / "tables" / "joints_closure_by_shear_step.csv", delimiter=",", names=True
+    )
+    assert curves.size == tree["joints/closure"].sizes["step"]

@@ -1,0 +1,216 @@
+"""One page that describes a joint: roughness, strength, stiffness, aperture, flow and limits of validity."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.units import Scale, quantity_text, scale_for
+from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import table, words
+from fractalcontact.plotting._paper import group
+from fractalcontact.plotting._paths import shear_words
+from fractalcontact.plotting._shear_curve import shear_curve
+from fractalcontact.plotting._strength_envelope import strength_envelope
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+A4 = (8.27, 11.69)  # inches
+ROWS = (0.7, 3.0, 2.7, 2.5, 2.3)  # relative heights: title, strength, shear, stiffness and flow, limits
+COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
+FLOW_LINES = ("-", (0, (4, 2)))
+STIFFNESS, FLOW = Scale(1e9, "MPa/mm"), Scale(1.0, "m³")
+ROUGHNESS = ("roughness_coefficient", "directional_roughness")
+GROUPS = ("strength_envelope", "direct_shear", "shear_curve", "closure", "transmissivity")
+
+
+@_style.styled
+def datasheet(tree: xr.DataTree, *, notes: Sequence[str] = ()) -> Figure:
+    """Draw one page about a joint: roughness, strength, stiffness, aperture and flow against normal stress.
+
+    Parameters
+    ----------
+    tree : DataTree
+        From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
+        joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
+        closure and transmissivity. Panels without data stay empty.
+    notes : sequence of str
+        Sentences to print with the limits of validity that the results state themselves.
+
+    Returns
+    -------
+    Figure
+        A4, upright.
+
+    Raises
+    ------
+    InvalidInput
+        The study has none of these groups.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> surface = fc.surfaces.fbm((64, 64), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> roughness = fc.joints.roughness_coefficient(surface)
+    >>> envelope = fc.joints.strength_envelope(
+    ...     surface, nominal_pressure=[1e6, 4e6], wall_strength=6e7, basic_friction_angle=30
+    ... )
+    >>> groups = {"/joints/roughness_coefficient": roughness, "/joints/strength_envelope": envelope}
+    >>> page = fc.plotting.datasheet(xr.DataTree.from_dict(groups))
+    >>> [round(float(inches), 2) for inches in page.get_size_inches()]
+    [8.27, 11.69]
+    """
+    found = {name: group(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS)}
+    with Problems("fractalcontact.plotting.datasheet") as problems:
+        expected = f"at least one of joints/{', joints/'.join(found)}"
+        problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
+    page = _style.figure_or_new(None, A4)
+    parts = page.subfigures(len(ROWS), 1, height_ratios=ROWS)
+    title = str(tree.attrs.get("title") or tree.name or "joint")
+    parts[0].text(0.03, 0.6, title, size=13, weight="bold", va="center")
+    parts[0].text(0.03, 0.2, _source(tree), size=8, color=_style.GREY, va="center")
+    left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
+    left.text(0.08, 0.93, "\n".join(_roughness_lines(found)), size=8, va="top", linespacing=1.5)
+    if found["strength_envelope"] is not None:
+        strength_envelope(found["strength_envelope"], tests=found["direct_shear"], ax=right.add_subplot())
+    tests, curve = found["direct_shear"], found["shear_curve"]
+    if tests is not None or curve is not None:
+        beside = curve if tests is not None else None
+        shear_curve(curve if tests is None else tests, beside=beside, figure=parts[2])
+    _flow_panels(parts[3], found["closure"], found["transmissivity"])
+    lines = list(_limits(found, notes))
+    parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
+    parts[4].text(0.03, 0.86, "\n".join(lines[:MOST_LINES]), size=6.5, va="top", linespacing=1.35)
+    return _style.root_figure(page)
+
+
+def _source(tree: xr.DataTree) -> str:
+    """Return where the faces come from: size and spacing of the heights, and the version."""
+    heights = group(tree, "surfaces")
+    version = str(tree.attrs.get("source", "fractalcontact"))
+    if heights is None or "height" not in heights:
+        return version
+    height = heights["height"]
+    spacing = quantity_text(float(height["x"][1] - height["x"][0]), "m")
+    sides = [float(height[dim][1] - height[dim][0]) * height.sizes[dim] for dim in ("y", "x")]
+    edges = " x ".join(quantity_text(side, "m") for side in sides)
+    return f"face of {edges}, {spacing} apart; {version}"
+
+
+def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
+    """Yield the lines of the roughness and of the strength in numbers."""
+    coefficient, facets, tests = (found[name] for name in (*ROUGHNESS, "direct_shear"))
+    if coefficient is not None:
+        yield "Roughness"
+        for direction in words(coefficient["direction"]):
+            row = coefficient.sel(direction=direction)
+            low, high = float(row["roughness_coefficient_low"]), float(row["roughness_coefficient_high"])
+            spread = f"  (profiles {low:.1f} to {high:.1f})" if np.isfinite(low + high) else ""
+            yield f"  JRC {direction}: {float(row['roughness_coefficient']):.1f}{spread}"
+    if facets is not None:
+        metric = facets["roughness_metric"]
+        places = (int(np.argmin(metric.values)), int(np.argmax(metric.values)))
+        extremes = [facets.isel(azimuth=place) for place in places]
+        values = [f"{float(one['roughness_metric']):.1f}° at {float(one['azimuth']):g}°" for one in extremes]
+        yield f"  θmax/(C+1): {values[0]}"
+        yield f"      to {values[1]}"
+    envelope = found["strength_envelope"]
+    if envelope is not None:
+        yield f"  asperity angle: {float(envelope['asperity_angle']):.1f}°"
+    if tests is not None:
+        yield ""
+        yield "Direct shear: peak, residual"
+        for i in range(tests.sizes["nominal_pressure"]):
+            row = tests.isel(nominal_pressure=i)
+            texts = [quantity_text(float(row[name]), "Pa") for name in
+                     ("nominal_pressure", "peak_shear_strength", "residual_shear_strength")]  # fmt: skip
+            yield f"  {texts[0]}: {texts[1]}, {texts[2]} ({float(row['peak_friction_angle']):.0f}°)"
+
+
+def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | None) -> None:
+    """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
+    axes = figure.subplots(1, 3)
+    for ax in axes:
+        _style.style_axes(ax)
+    if closure is not None:
+        pressure = table(_with_dims(closure), "nominal_pressure", ("shear", "step"))
+        closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
+        _draw(axes[0], pressure, stiffness(pressure, closed)[..., None], "normal stiffness", STIFFNESS)
+        gap = table(_with_dims(closure), "mean_gap", ("shear", "step"))
+        _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap))
+    if flow is not None and "nominal_pressure" in flow.variables:
+        data = _with_dims(flow, "axis")
+        pressure = table(data, "nominal_pressure", ("shear", "step"))
+        flows = table(data, "transmissivity", ("shear", "step", "axis"))
+        _draw(axes[2], pressure, flows, "transmissivity", FLOW)
+        axis_words = words(data["axis"]) if "axis" in data.coords else []
+        entries = [_style.legend_line(f"along {w}", ls=FLOW_LINES[i % 2]) for i, w in enumerate(axis_words)]
+        _style.side_legend(axes[2], entries, low=True)
+    shown = closure if closure is not None else flow
+    if shown is not None:
+        title, labels = shear_words(_with_dims(shown))
+        colours = _style.sequence_colours(len(labels))
+        entries = [_style.legend_line(text, color=c) for text, c in zip(labels, colours, strict=True)]
+        _style.side_legend(axes[2], entries[: _style.MAX_LEGEND_ENTRIES], title=title)
+
+
+def _with_dims(data: xr.Dataset, *more: str) -> xr.Dataset:
+    return data.expand_dims([dim for dim in ("shear", "step", *more) if dim not in data.dims])
+
+
+def stiffness(pressure: Any, closure: Any) -> Any:
+    """Return the slope of pressure over closure; NaN where the closure does not grow."""
+    result = np.full(pressure.shape, np.nan)
+    for row, p, w in zip(result, pressure, closure, strict=True):
+        if p.size > 1 and (np.diff(w) > 0).all():
+            row[:] = np.gradient(p, w)
+    return result
+
+
+def _draw(ax: Any, pressure: Any, values: Any, name: str, across: Scale) -> None:
+    along = scale_for("Pa", pressure)
+    for i, colour in enumerate(_style.sequence_colours(len(pressure))):
+        for j in range(values.shape[2]):
+            style = {"color": colour, "ls": FLOW_LINES[j % 2], "marker": "."}
+            ax.plot(along(pressure[i]), across(values[i, :, j]), **style)
+    _style.log_scale(ax, x=pressure, y=values)
+    _style.plain_ticks(ax)
+    ax.set_xlabel(along.label("normal stress"))
+    ax.set_title(across.label(name))
+
+
+def _limits(found: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:
+    """Yield lines: the notes, what the criteria assume and where, and what the results say of themselves."""
+    texts = dict.fromkeys(notes)
+    envelope = found["strength_envelope"]
+    if envelope is not None:
+        texts |= dict.fromkeys(_criteria(envelope))
+    for name, data in found.items():
+        for variable in () if data is None else data.data_vars.values():
+            comment = str(variable.attrs.get("comment", ""))
+            if comment and not comment.startswith(("NaN", "outside the range of the criterion")):
+                texts[f"{name.replace('_', ' ')}: {comment}"] = None
+    if found["direct_shear"] is not None:
+        texts["direct shear: one hardness, no gouge, no cohesion; no asperity smaller than the spacing"] = (
+            None
+        )
+    for text in texts:
+        yield from textwrap.wrap(f"- {text}", COLUMNS, subsequent_indent="  ")
+
+
+def _criteria(envelope: xr.Dataset) -> Iterator[str]:
+    """Yield what each criterion assumes, and the normal stresses of those drawn at which it is in range."""
+    pressure = envelope["nominal_pressure"].values
+    in_range = envelope["in_range"].transpose("criterion", "nominal_pressure").values
+    for i, name in enumerate(words(envelope["criterion"])):
+        inside = pressure[in_range[i]]
+        ends = [quantity_text(value, "Pa") for value in (inside.min(), inside.max())] if inside.size else []
+        where = f"drawn in range from {' to '.join(ends)}" if ends else "out of its range here"
+        yield f"{name.replace('_', ' ')}: {words(envelope['assumption'])[i]}; {where}"

@@ -1,0 +1,83 @@
+"""One page about a joint: the curves are the values, and what limits them is printed."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from plotting_figures import render
+
+import fractalcontact as fc
+from fractalcontact import plotting
+
+
+@pytest.fixture(scope="module")
+def tree():
+    face = fc.surfaces.fbm((48, 48), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
+    crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=16e-3, basic_friction_angle=30)
+    pressures = [1e6, 2e6, 4e6]
+    closed = fc.joints.closure(crack, shear=[5e-4, 2e-3], nominal_pressure=pressures, keep=("gap",))
+    groups = {
+        "roughness_coefficient": fc.joints.roughness_coefficient(face),
+        "directional_roughness": fc.joints.directional_roughness(face),
+        "strength_envelope": fc.joints.strength_envelope(
+            face, nominal_pressure=[*pressures, 5e7], wall_strength=6e7, basic_friction_angle=30
+        ),
+        "direct_shear": fc.joints.direct_shear(crack, 1e-3, nominal_pressure=pressures[:2], hardness=6e7),
+        "closure": closed.drop_vars("gap"),
+        "transmissivity": fc.joints.transmissivity(closed["gap"]),
+    }
+    tree = xr.DataTree.from_dict({f"/joints/{name}": data for name, data in groups.items()})
+    tree.attrs["title"] = "Joint under the spillway"
+    return tree
+
+
+def texts(figure):
+    return "\n".join(text.get_text() for text in figure.findobj(lambda artist: hasattr(artist, "get_text")))
+
+
+def test_panels_are_the_values(tree):
+    page = plotting.datasheet(tree, notes=["islands of few cells"])
+    axes = {ax.get_title(loc="left"): ax for ax in page.axes}
+    closed, flow = tree["joints/closure"], tree["joints/transmissivity"]
+    stiffness = axes["normal stiffness (MPa/mm)"].lines[1]
+    expected = np.gradient(closed.nominal_pressure[1], closed.interface_closure[1]) / 1e9
+    np.testing.assert_allclose(stiffness.get_ydata(), expected)
+    np.testing.assert_allclose(stiffness.get_xdata(), [1, 2, 4])
+    gap = axes["mean gap (mm)"].lines[0]
+    np.testing.assert_allclose(gap.get_ydata(), closed.mean_gap[0] * 1e3)
+    drawn = [line.get_ydata() for line in axes["transmissivity (m³)"].lines]
+    assert any(np.allclose(y, flow.transmissivity.isel(shear=1, axis=0)) for y in drawn)
+    render(page)
+
+
+def test_words_are_those_of_the_results(tree):
+    page = plotting.datasheet(tree, notes=["islands of few cells"])
+    shown = texts(page)
+    coefficient = tree["joints/roughness_coefficient"].roughness_coefficient.values[0]
+    for expected in (
+        "Joint under the spillway",
+        f"JRC E: {coefficient:.1f}",
+        "islands of few cells",
+        "hardness",
+    ):
+        assert expected in shown, expected
+    assert "xia: fresh mated fractures" in shown
+    assert "drawn in range from 1 MPa to 4 MPa" in shown  # not at 50 of 60 MPa
+
+
+def test_a_study_of_the_roughness_alone_has_a_page(tree):
+    page = plotting.datasheet(
+        xr.DataTree.from_dict(
+            {
+                "/joints/roughness_coefficient": fc.joints.roughness_coefficient(
+                    fc.surfaces.fbm((24, 24), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
+                )
+            }
+        )
+    )
+    assert "JRC E" in texts(page)
+    render(page)
+
+
+def test_a_study_without_a_joint_is_refused():
+    with pytest.raises(ValueError, match="joints/strength_envelope"):
+        plotting.datasheet(xr.DataTree())
