@@ -182,15 +182,15 @@ def _write(data: Mapping[str, xr.Dataset], path: Path) -> None:
         for variable in dataset.variables.values():
             if variable.chunks is None:
                 variable.load()  # a lazy array of another file needs the lock of xarray
-    writer = ArrayWriter()
+    writer = ArrayWriter()  # type: ignore[no-untyped-call]
     with NETCDF_LOCK:
         file = netCDF4.Dataset(path, "w", format="NETCDF4")
     try:
         with NETCDF_LOCK:
             for name, dataset in data.items():
-                store = NetCDF4DataStore(file, group=name, mode="w", lock=NETCDF_LOCK)
+                store = NetCDF4DataStore(file, group=name, mode="w", lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
                 dataset.dump_to_store(store, writer=writer)
-        writer.sync()
+        writer.sync()  # type: ignore[no-untyped-call]
     finally:
         with NETCDF_LOCK:
             file.close()
@@ -204,7 +204,8 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
     groups = {}
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
         for name in _group_names(file):
-            dataset = xr.open_dataset(NetCDF4DataStore(file, group=name, lock=False)).load()
+            store = NetCDF4DataStore(file, group=name, lock=False)  # type: ignore[no-untyped-call]
+            dataset = xr.open_dataset(store).load()
             dataset.set_close(None)
             groups[name] = dataset
     return groups
