@@ -199,6 +199,40 @@ def test_missing_heights_are_refused(make_face):
         sheared(crack, 1e-3)
 
 
+def test_strength_over_a_distance_hardly_depends_on_the_spacing():
+    fine = fc.surfaces.spectral((96, 96), 1e-4, hurst=0.8, rms_slope=0.35, long_cutoff=9.6e-3, rng=8)
+    coarse = fine.isel(x=slice(None, None, 2), y=slice(None, None, 2)).drop_attrs()
+    angles = []
+    for face in (fine.drop_attrs(), coarse):
+        for dim in ("x", "y"):
+            face = face.assign_coords({dim: face[dim].drop_attrs()})
+        crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=6e-3, basic_friction_angle=FRICTION)
+        test = sheared(crack, 8e-4, 3e6, hardness=1e8, distance=8e-4)
+        angles.append(float(test.peak_friction_angle[0]))
+    # twice the spacing halves the number of steps and quarters the cells
+    assert angles[1] == pytest.approx(angles[0], abs=2)
+    assert min(angles) > FRICTION + 8
+
+
 def test_a_result_of_one_pressure_is_that_of_several(rough_crack):
     several, one = sheared(rough_crack, 2e-4, [2e6, 1e7]), sheared(rough_crack, 2e-4, 1e7)
     xr.testing.assert_equal(several.shear_stress.isel(nominal_pressure=[1]), one.shear_stress)
+
+
+@pytest.mark.slow
+def test_measured_joint_is_near_the_criterion_of_barton_at_high_stress(measured):
+    faces = []
+    for side in "ab":
+        scan = fc.surfaces.read(measured / f"freiberg_gneiss_side_{side}.npy", spacing=3e-4)
+        faces.append(fc.surfaces.fill(fc.surfaces.despike(scan)))
+    upper = fc.joints.register(*faces)["height"]
+    crack = fc.joints.Crack(faces[0], upper, young=60e9, poisson=0.2, block=0.045, basic_friction_angle=30)
+    test = fc.joints.direct_shear(crack, 1.8e-3, nominal_pressure=16e6, hardness=150e6)
+    barton = fc.joints.strength_envelope(
+        faces[0],
+        nominal_pressure=16e6,
+        wall_strength=150e6,
+        basic_friction_angle=30,
+        criterion="barton_choubey",
+    )
+    assert float(test.peak_friction_angle[0]) == pytest.approx(float(barton.friction_angle[0, 0]), abs=2)
