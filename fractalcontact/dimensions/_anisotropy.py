@@ -153,19 +153,20 @@ def harmonics(logs: Array, angle: Array) -> Array:
 
 
 def directional_fit(
-    differences: SecondDifferences, pairs: MiddlePairs, hurst: float | None, metric: Array
+    differences: SecondDifferences, pairs: MiddlePairs, weights: Array, hurst: float | None, metric: Array
 ) -> tuple[float, float, float]:
     """Return exponent, standard error and the mean square second difference over one x spacing.
 
-    The lag vectors lie along one direction. The scatter is that of a surface of exponent `hurst`; None
-    uses the fitted one.
+    The lag vectors lie along one direction; `weights` (t, k) interpolate their logarithms. The scatter is
+    that of a surface of exponent `hurst`; None uses the fitted one.
     """
-    logs = np.log(np.hypot(*differences.lags.T))
+    logs = weights @ np.log(np.hypot(*differences.lags.T))
     design = np.stack([np.ones(logs.size), 2.0 * logs], axis=1)
     exponent = 0.5 if hurst is None else hurst
     for _ in range(1 if hurst is not None else 3):
         scatter = covariance(differences.vectors, pairs, _limited(exponent), metric, differences.spacing)
-        (level, exponent), errors = _least_squares(design, _unbiased_logs(differences, scatter), scatter)
+        values = weights @ _unbiased_logs(differences, scatter)
+        (level, exponent), errors = _least_squares(design, values, weights @ scatter @ weights.T)
     return float(exponent), float(np.sqrt(errors[1, 1])), float(np.exp(level))
 
 

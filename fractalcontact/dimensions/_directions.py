@@ -32,6 +32,7 @@ from fractalcontact.dimensions._records import (
 )
 from fractalcontact.dimensions._second_differences import (
     DIRECTIONS,
+    EqualLags,
     LatticeDirection,
     MiddlePairs,
     SecondDifferences,
@@ -97,7 +98,7 @@ def directions(
         Default: eight over the half-circle.
     scales : (low, high), optional
         Lengths in m: lags on free edges, wavelengths on periodic ones and for the tests. Default: the
-        shortest lags, or the band of the spectrum.
+        shortest lags that all directions have, or the band of the spectrum.
 
     Returns
     -------
@@ -116,8 +117,8 @@ def directions(
 
     Notes
     -----
-    Free edges: second differences along lattice directions. Periodic: sectors of the spectrum. Models,
-    tests, and their measured size, power and coverage: page `theory_dimensions`.
+    Free edges: second differences over equal lengths along lattice directions. Periodic: sectors of the
+    spectrum. Models, tests, and their measured size, power and coverage: page `theory_dimensions`.
 
     References
     ----------
@@ -208,33 +209,37 @@ def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scal
     if surface.is_constant or surface.is_plane:
         record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
         return _Directional([record] * len(directions), None, record.note)
-    differences, owner = SecondDifferences.of(surface, directions, scales)
+    equal = EqualLags.of(surface, directions, scales)
+    differences, owner = SecondDifferences.at(surface, directions, [equal.multiples(d) for d in directions])
     every = lattice_directions(None, surface.plane_spacing)
-    compared = _compared(
-        surface,
-        differences if list(directions) == every else SecondDifferences.of(surface, every, scales)[0],
-    )
+    compared = _compared(surface, SecondDifferences.of(surface, every, scales)[0])
     limit = _ROUNDING * max(differences.means.max(initial=0.0), compared.means.max(initial=0.0))
     varied = compared.part(compared.means > limit)
     has_constant_direction = bool((compared.means <= limit).any())
     anisotropy, is_beyond_model = None, False
     if np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > LEAST_LAGS:
         anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
-        is_beyond_model = anisotropy.anisotropy_p_value < _IMPROBABLE or anisotropy.reason in (RIDGES, SMOOTH)
+        # where the power law bends, the waves decide: the lags of the lattice differ in length
+        is_bent = abs(anisotropy.curvature_z) > SIGNIFICANT
+        by_lags = anisotropy.anisotropy_p_value
         if surface.is_complete:
             anisotropy = _tested_by_waves(surface, anisotropy, scales)
+        is_beyond_model = not is_bent and by_lags < _IMPROBABLE
+        is_beyond_model = is_beyond_model or anisotropy.reason in (RIDGES, SMOOTH)
         if has_constant_direction:
             anisotropy = replace(anisotropy, isotropy_p_value=0.0, anisotropy_p_value=0.0, reason=RIDGES)
         is_beyond_model = is_beyond_model or anisotropy.anisotropy_p_value < _IMPROBABLE
     estimates = []
-    for index in range(len(directions)):
+    for index, direction in enumerate(directions):
         part = differences.part(owner == index)
+        weights = equal.weights(part, direction)
         if (part.means <= limit).any():
             estimates.append(undefined(_NO_VARIATION))
-        elif len(part.means) < 2:
+        elif len(weights) < 2:
             estimates.append(undefined(_FEW_LAGS))
         else:
-            estimates.append(_along(surface, part, anisotropy, _NO_MODEL if is_beyond_model else ""))
+            reason = _NO_MODEL if is_beyond_model else ""
+            estimates.append(_along(surface, part, weights, anisotropy, reason))
     if anisotropy is None:
         return _Directional(estimates, None, "too few lags fit into the surface to compare directions")
     return _Directional.of(estimates, anisotropy)
@@ -275,22 +280,25 @@ def _tested_by_waves(surface: Surface, anisotropy: Anisotropy, scales: Scales) -
 
 
 def _along(
-    surface: Surface, differences: SecondDifferences, anisotropy: Anisotropy | None, reason: str
+    surface: Surface,
+    differences: SecondDifferences,
+    weights: Array,
+    anisotropy: Anisotropy | None,
+    reason: str,
 ) -> Estimate:
-    """Return the estimate of one direction.
+    """Return the estimate of one direction; `weights` interpolate its lags.
 
     Where the power law bends over the length more than chance allows, the interval also holds the exponents
     between the shorter and between the longer lags.
     """
     hurst, metric = (None, np.eye(2)) if anisotropy is None else (anisotropy.hurst, anisotropy.metric)
     pairs = _middle_pairs(surface, differences)
-    exponent, error, second = directional_fit(differences, pairs, hurst, metric)
+    exponent, error, second = directional_fit(differences, pairs, weights, hurst, metric)
     low, high = normal_interval(exponent, error)
     note = ""
     if anisotropy is not None and abs(anisotropy.curvature_z) > SIGNIFICANT:
-        for start in range(len(differences.means) - 1):
-            part = differences.part(np.arange(start, start + 2))
-            fit = directional_fit(part, _middle_pairs(surface, part), hurst, metric)
+        for start in range(len(weights) - 1):
+            fit = directional_fit(differences, pairs, weights[start : start + 2], hurst, metric)
             part_low, part_high = normal_interval(*fit[:2])
             low, high = min(low, part_low), max(high, part_high)
         note = (

@@ -30,6 +30,7 @@ _MOST = 3.0  # largest factor on it for an anisotropic surface
 _BEYOND = 1.4  # shifts beyond are about this many times as long
 LONG = 32  # lags beyond which shifts and lags are taken on a coarser lattice
 _TILE, _TILES = 64, 32  # edge of the tiles in which pairs are counted, and their largest number
+_NEARLY = 1.25  # times the longest lag measured: lengths to which its power law is continued
 _SMALLEST = 1e-6  # of the largest eigenvalue of a covariance: less is an artefact of counting
 
 
@@ -99,19 +100,27 @@ class SecondDifferences:
         Lags are 1, 2 and 4 times the step of the lattice, or of its smallest multiple inside `scales` (m),
         as far as two of them, one difference, fit into the surface.
         """
-        low, high = (0.0, np.inf) if scales is None else scales
-        lags, owners = [], []
-        for index, direction in enumerate(directions):
-            step = direction.length * surface.spacing[1]
-            least = max(1, int(np.ceil(low / step * (1 - 1e-9))))
-            for multiple in LAG_MULTIPLES:
-                lag = least * multiple
-                if lag * step <= high * (1 + 1e-9):
-                    lags.append((lag * direction.dy, lag * direction.dx))
-                    owners.append(index)
-        vectors = np.array(lags, dtype=np.int64).reshape(-1, 2)
+        low, high = _in_spacings(surface, scales)
+        multiples = []
+        for direction in directions:
+            lags = _least_multiple(direction, low) * np.array(LAG_MULTIPLES)
+            multiples.append(lags[lags * direction.length <= high * (1 + 1e-9)])
+        return cls.at(surface, directions, multiples)
+
+    @classmethod
+    def at(
+        cls, surface: Surface, directions: Sequence[LatticeDirection], multiples: Sequence[Array]
+    ) -> tuple[SecondDifferences, Array]:
+        """Measure multiples of the lattice step of each direction; return them with the index of it."""
+        vectors = np.concatenate(
+            [
+                multiple[:, None] * np.array([[direction.dy, direction.dx]])
+                for direction, multiple in zip(directions, multiples, strict=True)
+            ]
+        ).astype(np.int64)
+        owners = np.repeat(np.arange(len(directions)), [multiple.size for multiple in multiples])
         inside = (2 * np.abs(vectors) < np.array(surface.shape)).all(axis=1)
-        vectors, owner = vectors[inside], np.array(owners, dtype=np.int64)[inside]
+        vectors, owner = vectors[inside], owners[inside]
         slabs = iter([(np.ascontiguousarray(surface.heights), surface.shape[0])])
         means, counts = mean_increments(slabs, (0, surface.shape[1]), vectors, SECOND)
         observed = counts > 0
@@ -128,6 +137,72 @@ class SecondDifferences:
     def lags(self) -> Array:
         """Lag vectors in x spacings, shape (k, 2)."""
         return np.asarray(self.vectors * np.array(self.spacing))
+
+
+@dataclass(frozen=True)
+class EqualLags:
+    """Lags of the same lengths along several directions, between those of the lattice.
+
+    Over 1, 2 and 4 steps of the lattice a surface with noise or blur, whose power law bends, would have
+    another exponent in each direction. The logarithm of the mean square at a length is interpolated, linearly
+    in that of the lag, between the lattice lags on either side; a power law is reproduced exactly.
+
+    Attributes
+    ----------
+    lengths : ndarray, shape (t,)
+        In x spacings.
+    """
+
+    lengths: Array
+
+    @classmethod
+    def of(cls, surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> EqualLags:
+        """Return 1, 2 and 4 times the longest step of the directions, inside `scales` (m).
+
+        The eight default directions are always among them, so that a subset of them gives the same values.
+        """
+        low, high = _in_spacings(surface, scales)
+        every = [*directions, *lattice_directions(None, surface.plane_spacing)]
+        first = max(_least_multiple(direction, low) * direction.length for direction in every)
+        lengths = first * np.array(LAG_MULTIPLES, dtype=float)
+        return cls(lengths[lengths <= high * (1 + 1e-9)])
+
+    def multiples(self, direction: LatticeDirection) -> Array:
+        """Return the multiples of the lattice step that enclose the lengths."""
+        position = self.lengths / direction.length
+        enclosing = np.floor(position * (1 + 1e-9)), np.ceil(position * (1 - 1e-9))
+        return np.unique(np.concatenate(enclosing)).astype(np.int64)
+
+    def weights(self, differences: SecondDifferences, direction: LatticeDirection) -> Array:
+        """Return the weights of the measured multiples in the logarithm at each length, (t, k).
+
+        Lengths that no two multiples enclose are left out, unless the longest is nearly as long.
+        """
+        multiples = np.rint(np.hypot(*differences.lags.T) / direction.length)
+        rows = []
+        for position in self.lengths / direction.length:
+            above = int(np.searchsorted(multiples, position * (1 - 1e-9)))
+            row = np.zeros(multiples.size)
+            if above < multiples.size and abs(multiples[above] / position - 1.0) < 1e-9:
+                row[above] = 1.0
+            elif 0 < above < multiples.size or (above > 1 and position < _NEARLY * multiples[-1]):
+                above = min(above, multiples.size - 1)
+                low, high = np.log(multiples[above - 1 : above + 1])
+                row[above] = (np.log(position) - low) / (high - low)
+                row[above - 1] = 1.0 - row[above]
+            else:
+                continue
+            rows.append(row)
+        return np.array(rows).reshape(-1, multiples.size)
+
+
+def _in_spacings(surface: Surface, scales: Scales) -> tuple[float, float]:
+    low, high = (0.0, np.inf) if scales is None else scales
+    return low / surface.spacing[1], high / surface.spacing[1]
+
+
+def _least_multiple(direction: LatticeDirection, low: float) -> int:
+    return max(1, int(np.ceil(low / direction.length * (1 - 1e-9))))
 
 
 @dataclass(frozen=True)
