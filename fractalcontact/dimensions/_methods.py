@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fractalcontact.base.references import PAPER
-
 DEFAULT = "likelihood"
 _INCREMENTS = (
     "Chan and Wood, Annals of Statistics 28 (2000) 343-376; Zhu and Stein, Journal of Agricultural, "
@@ -71,7 +69,7 @@ METHODS = {
     "cube_counts": Method(
         "slope of the number of cubes that meet the surface, heights scaled to the extent; "
         "overestimates H by 0.05 to 0.4; no interval",
-        f"{PAPER}; {_CLARKE}",
+        f"Falconer, Fractal Geometry (1990), ch. 3; {_CLARKE}",
     ),
     "covering": Method(
         "slope of the triangulated area in natural scale; gives a dimension of 2 for flat surfaces, and that "

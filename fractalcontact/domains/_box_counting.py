@@ -40,10 +40,7 @@ from fractalcontact.domains._scaling_fit import (
     window_notes,
 )
 
-SOURCE = (
-    "Falconer, Fractal Geometry (1990), ch. 3 (box dimension); Borri-Brunetto, Carpinteri and Chiaia, "
-    "FRAMCOS-3 (1998) (of contact domains)"
-)
+SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
 COVER_DIFFERENCE = 0.02  # of the dimensions of two covers, up to which it widens the interval as it is
 BETWEEN_CLUSTERS = 0.06  # of the dimension in a chosen window, which no scatter within one cluster shows
 NO_POWER_LAW = 0.15  # range of the local slopes in a window from which on there is no power law

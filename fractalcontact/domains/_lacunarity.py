@@ -26,7 +26,7 @@ from fractalcontact.domains._scaling_fit import fit_line
 
 SOURCE = (
     "Allain and Cloitre, Phys. Rev. A 44:3552 (1991); Plotnick et al., Phys. Rev. E 53:5461 (1996) "
-    "(gliding box); Borri-Brunetto, Carpinteri and Chiaia, FRAMCOS-3 (1998) (of contact domains)"
+    "(gliding box)"
 )
 MANY_SIZES = 24  # above so many sizes one transform is cheaper than a sum for each
 LARGEST_INT64 = 2**63 - 1

@@ -215,6 +215,10 @@ def test_references_name_the_methods_and_no_paper_of_1998_for_heights(measured, 
     assert "FRAMCOS" not in heights
     assert "Rousseeuw" in heights
     assert "Briggs" in heights
+    for name in ("box_dimension", "lacunarity"):
+        if f"domains/{name}" in study.groups or name in study["domains"].children:
+            assert "FRAMCOS" not in study[f"domains/{name}"].attrs["references"]
+    assert "FRAMCOS" not in fc.dimensions.cube_counts(fc.surfaces.from_array(np.eye(32), 1.0)).references
     assert "FRAMCOS" in study["joints/closure"].attrs["references"]
     for name in ("joints/closure", "joints/elastic_dilatancy"):
         assert "Polonsky" in study[name].attrs["references"]
