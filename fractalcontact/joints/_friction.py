@@ -10,6 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.results import public_result
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems, float_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -303,12 +304,13 @@ def _dependence(secants: xr.DataArray) -> str:
     if not both.any():
         return NOT_KNOWN
     shortest, next_one = greatest[resolved[:2]][:, both]
-    change, at = float(np.abs(shortest - next_one).max()), float(secants["distance"][resolved[0]])
+    change = float(np.abs(shortest - next_one).max())
+    shortest_text = quantity_text(float(secants["distance"][resolved[0]]), "m")
     if change <= NEGLIGIBLE:
-        return f"changes by at most {change:.2g} degree when the distance is halved to {at:.3g} m"
+        return f"changes by at most {change:.2g} degree when the distance is halved to {shortest_text}"
     return (
-        f"changes by up to {change:.3g} degree when the distance is halved to {at:.3g} m, the shortest that "
-        "the shears resolve: no limit is reached; compare only peaks over equal distances"
+        f"changes by up to {change:.3g} degree when the distance is halved to {shortest_text}, the "
+        "shortest that the shears resolve: no limit is reached; compare only peaks over equal distances"
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import STEEP
+from fractalcontact.base.units import number, quantity_text
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -31,7 +32,8 @@ def caveats(tree: xr.DataTree) -> list[str]:
     -------
     list of str
         One sentence each: islands of too few cells, at which loads; slopes beyond small strains; the true
-        pressure where no hardness limits it. Empty where the results have no such limit.
+        pressure where no hardness limits it; strengths beyond that of the material. Empty where the results
+        have no such limit.
     """
     lines: list[str] = []
     for path, surface in PRESSED.items():
@@ -39,7 +41,7 @@ def caveats(tree: xr.DataTree) -> list[str]:
         if pressed is not None and "contact_fraction" in pressed:
             lines += [*_resolution(path, pressed), *_slopes(path, pressed, surface)]
             lines += _true_pressure(path, pressed, _material(tree))
-    return lines
+    return [*lines, *_strength(tree)]
 
 
 def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
@@ -96,7 +98,7 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
     if not unresolved.any():
         return
     greatest = int(np.flatnonzero(unresolved)[-1])
-    ends = dict.fromkeys(f"{end[greatest]:.2g}" for end in (low, high))
+    ends = dict.fromkeys(number(float(end[greatest]), 2) for end in (low, high))
     where = (
         "at every load"
         if unresolved.sum() == touching.sum()
@@ -132,6 +134,20 @@ def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> 
         yield (
             f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
             "elastic contact areas are too small; a hardness limits the pressure."
+        )
+
+
+def _strength(tree: xr.DataTree) -> Iterator[str]:
+    friction, limits = group_of(tree, "joints/friction"), _material(tree).get("yield_pressure")
+    if friction is None or limits is None or "peak_shear_strength" not in friction:
+        return
+    strengths = np.ravel(friction["peak_shear_strength"].values)
+    strengths = strengths[np.isfinite(strengths)]
+    if strengths.size and strengths.max() > np.min(limits):
+        strength, limit = (quantity_text(value, "Pa") for value in (strengths.max(), np.min(limits)))
+        yield (
+            f"joints/friction: the peak shear strength is up to {strength}, and the material yields at "
+            f"{limit}: asperities break before the faces climb over them."
         )
 
 

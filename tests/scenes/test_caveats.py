@@ -1,6 +1,7 @@
 """Caveats below the summary: each appears where it holds, and only there."""
 
 import json
+import re
 import warnings
 
 import numpy as np
@@ -100,3 +101,31 @@ def test_yield_pressure_of_a_scene_is_checked(tmp_path):
     (tmp_path / "study.toml").write_text(wrong, encoding="utf-8")
     with pytest.raises(InvalidInput, match=r"material\.yield_pressure"):
         fc.scenes.load(tmp_path / "study.toml")
+
+
+@pytest.mark.parametrize(("angle", "stated"), [(30.0, True), (5.0, False)])
+def test_strength_beyond_the_material_is_stated(angle, stated):
+    teeth = np.tan(np.radians(58.0)) * 1e-4 * np.arange(60.0) * np.ones((12, 1))
+    crack = fc.joints.Crack(
+        fc.surfaces.from_array(teeth, 1e-4), young=30e9, poisson=0.2, block=1.2e-3, basic_friction_angle=angle
+    )
+    climb = fc.joints.dilatancy(crack, shear=[0.0, 2e-4, 4e-4], direction="E")
+    friction = fc.joints.friction(climb, nominal_pressure=2e7)  # 20 MPa tan(88 degree) = 573 MPa
+    words = text(study(friction, "joints/friction", yield_pressure=[1e8, 1e9]))
+    assert ("peak shear strength is up to 0.573 GPa, and the material yields at 100 MPa" in words) == stated
+    assert "asperities" not in text(study(friction, "joints/friction"))
+
+
+def test_cells_per_island_are_plain_numbers():
+    single, disc = np.zeros((64, 64)), np.zeros((64, 64))
+    single[::16, ::16] = 1.0
+    x = np.arange(64) - 31.5
+    disc[np.hypot(x, x[:, None]) < 20] = 1.0
+    faces = [fc.surfaces.from_array(1e-6 * heights, 1e-5) for heights in (single, disc)]
+    pressed = [
+        fc.contact.press(face, contact_modulus=1e12, nominal_pressure=1e3, influence="square")
+        for face in faces
+    ]
+    both = xr.concat([each.reset_coords("closure") for each in pressed], "shear", data_vars="all")
+    words = text(study(both))
+    assert re.search(r"per island is 1 to 1[0-9]00;", words)
