@@ -71,7 +71,9 @@ def closure_laws(closure: xr.Dataset) -> xr.Dataset:
     Both laws are fitted by least squares of the closure to the first loading, up to the greatest force. The
     stiffness is that of a power law through three neighbouring steps on the same branch of the path,
     corrected for the change of its exponent: exact for straight lines, power laws and the exponential law,
-    and of third order at the ends of a branch.
+    and of third order at the ends of a branch. Rough faces touch at single cells, one after the other: on the
+    shipped cracks, with loads a factor of 2 apart, it was within 3 % where 90 cells or more touched, 11 % at
+    25 to 75, and 35 % off at 3; with loads a factor of 3 apart it was up to 75 % off at the ends.
 
     References
     ----------

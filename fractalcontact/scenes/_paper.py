@@ -153,7 +153,7 @@ CLAIMS = (
     Claim(
         "4",
         "interface compliance grows with v",
-        "dw_int/dF at 2.5, 25 and 75 MPa, from each shear to the next",
+        "secants of w_int(F) from 0 to 2.5, 25 and 75 MPa, from each shear to the next",
         findings.compliance,
     ),
     Claim(
