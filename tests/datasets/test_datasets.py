@@ -88,3 +88,35 @@ def test_land_surface_has_the_position_and_heights_of_the_map():
 def test_unknown_sample_is_refused():
     with pytest.raises(ValueError, match="concrete_crack"):
         fc.surfaces.sample("moon")
+
+
+# what the 1998 paper contains, and the stages of a scene that compute it
+PAPER = {
+    "dimensions": "the dimension of the scanned face",
+    "joints/delta_surface": "figure 1b",
+    "joints/delta_dimension": "its dimension over the shear",
+    "joints/elimination": "successive eliminations of tension points",
+    "joints/closure": "figures 3 and 4",
+    "joints/area_dimension": "the area depends on the discretization",
+    "domains/box_dimension": "lacunar contact domains",
+    "domains/lacunarity": "lacunar contact domains",
+    "joints/rigid_dilatancy": "figure 5a",
+    "joints/elastic_dilatancy": "figure 5b",
+    "joints/friction": "the friction angle",
+    "joints/decorrelation_length": "no more correlations at 8 mm",
+    "joints/transmissivity": "leakage",
+    "joints/self_weight": "stability due to friction increases with the size",
+}
+
+
+def test_scene_of_1998_has_every_part_of_the_paper():
+    stages = {stage.name for stage in fc.scenes.plan(fc.scenes.load("concrete_crack_1998"))}
+    assert set(PAPER) <= stages
+
+
+@pytest.mark.slow
+def test_scene_of_1998_tests_every_claim_of_the_paper():
+    tree = fc.scenes.run("concrete_crack_1998", progress=False)
+    table = fc.scenes.paper_table(tree)
+    assert "not tested" not in table
+    assert {"yes", "no"} <= {line.split()[-1] for line in table.splitlines() if line.strip()}
