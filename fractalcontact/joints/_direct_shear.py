@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -12,11 +13,18 @@ import numpy as np
 import xarray as xr
 
 import fractalcontact as fc  # loads `contact` on first use
+from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
-from fractalcontact.joints._closure import Pressing, ShearedContact, check_pressing, pressing_references
+from fractalcontact.joints._closure import (
+    Pressing,
+    ShearedContact,
+    check_pressing,
+    pressing_references,
+    warn_steep,
+)
 from fractalcontact.joints._compass import Direction, check_direction, read_direction
 from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
@@ -194,8 +202,18 @@ def direct_shear(
             result[name] = ("nominal_pressure", "y", "x"), planes
             result = result.assign_coords(coords)
     residual = max(test.joint.residual for test in tests)
+    _warn([test.joint for test in tests])
     references = joined_references(PATTON, pressing_references(crack, options))
     return result.assign_attrs(references=references, achieved_residual=residual)
+
+
+def _warn(joints: Sequence[WornJoint]) -> None:
+    """Warn of presses that did not converge, and of slopes beyond small strains."""
+    warn_steep([{"rms_slope": np.array([joint.steepest])} for joint in joints], WHERE, stacklevel=5)
+    failed = sum(joint.unconverged for joint in joints)
+    if failed:
+        message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"
+        warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
 
 def _turning_points(path: Any) -> Array:
@@ -261,7 +279,8 @@ class WornJoint:
         )
         self.elastic = replace(self.pressing, options=replace(options, hardness=None))
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
-        self.residual, self.plastic_work = 0.0, 0.0
+        self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
+        self.unconverged = 0
 
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
@@ -274,6 +293,8 @@ class WornJoint:
         columns = contact.press(fc.contact.LoadPath("normal_force", (load,)), ("residual_height",))
         heights = np.asarray(contact.surface.values)
         self.residual = max(self.residual, float(columns["residual"][0]))
+        self.steepest = max(self.steepest, float(columns["rms_slope"][0]))
+        self.unconverged += int(not columns["converged"][0])
         closure, energy, share = (
             float(columns[name][0]) for name in ("interface_closure", "elastic_energy", "contact_fraction")
         )

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.base.errors import SmallStrainWarning
 
 FRICTION = 30.0
 MU = np.tan(np.radians(FRICTION))
@@ -165,6 +166,12 @@ def test_elastic_stiffness_of_the_shear_is_that_of_mindlin(rough_crack):
     assert float(test.shear_stiffness) == pytest.approx(8 / 9 * normal, rel=0.4)
     given = sheared(rough_crack, 1e-4, 5e6, shear_stiffness=1e12)
     np.testing.assert_allclose(given.shear_displacement - given.shear, given.shear_stress / 1e12)
+
+
+def test_slopes_beyond_small_strains_are_reported(make_face, rough):
+    steep = fc.joints.Crack(make_face(1e-3 * rough((24, 24), 2), 1e-4), young=3e10, poisson=0.2, block=12e-4)
+    with pytest.warns(SmallStrainWarning, match="direct_shear: the delta-surface"):
+        sheared(steep, 1e-4)
 
 
 def test_diagonal_path_stays_on_the_grid(rough_crack):
