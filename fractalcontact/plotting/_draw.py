@@ -17,6 +17,7 @@ from fractalcontact.plotting._closure import closure_laws, contact_area
 from fractalcontact.plotting._contact_maps import contact_domains
 from fractalcontact.plotting._decorrelation import correlation, delta_dimension
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
+from fractalcontact.plotting._directional_roughness import directional_roughness
 from fractalcontact.plotting._directions import evenly_sampled_reach
 from fractalcontact.plotting._ensemble import (
     BAND,
@@ -127,6 +128,7 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
         ("joints/area_dimension", "area_dimension", area_dimension),
         ("joints/self_weight", "self_weight", self_weight),
         ("joints/decorrelation_length", "correlation", correlation),
+        ("joints/directional_roughness", "directional_roughness", directional_roughness),
         ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
         ("contact", "closure_law", closure_laws),
         ("contact", "contact_area", contact_area),

@@ -59,6 +59,17 @@ def test_work_of_wear_is_hardness_times_volume(rough_crack):
     assert (np.diff(test.wear_depth.values, axis=1) >= 0).all()
 
 
+def test_shear_dissipates_at_least_friction_and_wear(rough_crack):
+    # T dv - N dz is the heat of friction P mu (1 + d^2) dv and the work of wear, if no elastic energy changed
+    test = sheared(rough_crack, [5e-4, 0.0], [2e6, 2e7])
+    slip = np.diff(test.shear.values)
+    work = np.cumsum(test.shear_stress.values[:, 1:] * slip, axis=1)
+    lift = test.nominal_pressure.values[:, None] * test.dilatancy.values[:, 1:]
+    wear = (test.plastic_work.values[:, 1:] - test.plastic_work.values[:, :1]) / rough_crack.nominal_area
+    friction = 0.9 * MU * test.nominal_pressure.values[:, None] * np.cumsum(np.abs(slip))
+    assert (work - lift >= friction + wear - 1e-9).all()
+
+
 def test_residual_faces_have_lost_the_worn_volume(rough_crack):
     test = sheared(rough_crack, 5e-4, 2e7, keep=("residual_lower", "residual_upper")).isel(nominal_pressure=0)
     face = rough_crack.lower
@@ -89,7 +100,7 @@ def test_friction_falls_with_the_pressure(rough_crack):
     )
 
 
-def test_soft_faces_come_to_the_sum_over_the_rigid_heights(make_face, rough):
+def test_rigid_faces_come_to_the_sum_over_the_heights(make_face, rough):
     # all but rigid: the block rests on the highest sigma/H of the delta-surface, at its first step
     face = make_face(2e-5 * rough((32, 32), 7), 1e-4, periodic=True)
     crack = fc.joints.Crack(face, young=1e14, poisson=0.0, basic_friction_angle=0.0)

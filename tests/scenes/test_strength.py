@@ -99,7 +99,8 @@ def test_mistakes_are_reported_before_anything_runs(scene, old, new, message):
 
 def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
     text = SCENE.replace(
-        'joints = ["direct_shear", "shear_curve", "strength_envelope"]\nfigures = true', "datasheet = true"
+        'joints = ["direct_shear", "shear_curve", "strength_envelope"]\nfigures = true',
+        "datasheet = true\nfigures = true",
     )
     text = text.replace("[joint.direct_shear]", "shear = 2e-4\n[joint.direct_shear]")
     path = scene(text)
@@ -107,6 +108,7 @@ def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
     assert {"joints/roughness_coefficient", "joints/closure", "joints/transmissivity"} <= names
     assert "joints/direct_shear" not in names
     tree = fc.scenes.run(path, out=tmp_path / "out", progress=False)
+    assert (tmp_path / "out" / "directional_roughness.png").is_file()
     page = (tmp_path / "out" / "datasheet.pdf").read_bytes()
     assert page.startswith(b"%PDF")
     assert len(re.findall(rb"/Type /Page\b", page)) == 1
