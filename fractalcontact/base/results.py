@@ -31,6 +31,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import label
+from fractalcontact.base.surface_argument import with_surface
 from fractalcontact.base.validation import Problems, did_you_mean
 
 P = ParamSpec("P")
@@ -96,8 +97,9 @@ def public_result(
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
-            parameters = checked(*arguments, **options)
-            result = function(*arguments, **options)
+            given, words, notes = with_surface(name, signature, arguments, options)
+            parameters = checked(*given, **words)
+            result = function(*given, **words)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {} if completeness is None else {"completeness": completeness}
@@ -108,10 +110,14 @@ def public_result(
             if isinstance(result, xr.Dataset):
                 _set_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
-            return stamp(label(result, keep_notes=True), name, parameters, **entries)
+            result = stamp(label(result, keep_notes=True), name, parameters, **entries)
+            if notes:
+                result.attrs["history"] += f" (surface: {notes})"
+            return result
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
-            checked(*arguments, **options)
+            given, words, _ = with_surface(name, signature, arguments, options)
+            checked(*given, **words)
 
         public = cast("PublicFunction[P, R]", call)
         public.validate = validate  # type: ignore[method-assign]

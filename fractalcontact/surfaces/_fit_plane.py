@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
-from fractalcontact.surfaces._units import UNITS, in_metres
 
 
 def check_heights(problems: Problems, heights: Any) -> int | None:

@@ -12,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
+from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._fit_plane import (
@@ -23,7 +24,6 @@ from fractalcontact.surfaces._fit_plane import (
     point_array,
 )
 from fractalcontact.surfaces._grid_input import check_length
-from fractalcontact.surfaces._units import UNITS
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.from_points"

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import file_suffix, open_bytes
-from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"

@@ -16,6 +16,7 @@ import xarray as xr
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
+from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
@@ -44,7 +45,6 @@ from fractalcontact.surfaces._read_points import (
     listed_points,
     point_content,
 )
-from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"

@@ -14,12 +14,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._files import NotATable, Table, file_suffix, open_bytes, read_table
 from fractalcontact.surfaces._instruments import PROJECT
-from fractalcontact.surfaces._units import UNITS, in_metres
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read_points"

@@ -1,0 +1,129 @@
+"""Surfaces as users have them, brought into the form that public functions expect.
+
+The argument `surface` of a public function may be a Dataset with one height, have its axes in another order
+or descending, be in other units of length, or be a plain array with `spacing=` beside it. What was done is
+said in the `history` of the result.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.grid import METRES, plane_coords
+from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.validation import Problems, float_array
+
+SURFACE, SPACING = "surface", "spacing"
+
+
+def with_surface(
+    where: str, signature: inspect.Signature, arguments: tuple[Any, ...], options: Mapping[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any], str]:
+    """Return the arguments of a call with its surface in the usual form, and what was done to it.
+
+    Parameters
+    ----------
+    where : str
+        Public name of the function.
+    signature : Signature
+        That of the function; nothing is done where it has no argument `surface`, or it has a `spacing`.
+    """
+    names = list(signature.parameters)
+    if SURFACE not in names or SPACING in names:
+        return arguments, dict(options), ""
+    place, words = names.index(SURFACE), dict(options)
+    value = arguments[place] if place < len(arguments) else words.get(SURFACE)
+    spacing = words.pop(SPACING, None)
+    surface, notes = usual_form(where, value, spacing)
+    if surface is not value:
+        if place < len(arguments):
+            arguments = (*arguments[:place], surface, *arguments[place + 1 :])
+        else:
+            words[SURFACE] = surface
+    return arguments, words, ", ".join(notes)
+
+
+def usual_form(where: str, value: Any, spacing: Any = None) -> tuple[Any, list[str]]:
+    """Return heights with dims (..., y, x), ascending and in metres; other values as they are."""
+    notes: list[str] = []
+    if spacing is not None:
+        return _labelled(where, value, spacing), [f"labelled with the spacing {spacing}"]
+    if isinstance(value, xr.Dataset) and (height := _only_height(value)) is not None:
+        value, notes = height, [f"variable {height.name!r} taken"]
+    if not isinstance(value, xr.DataArray) or "x" not in value.dims:
+        return value, notes
+    core = tuple(dim for dim in ("y", "x") if dim in value.dims)
+    if value.dims[-len(core) :] != core:
+        value = value.transpose(..., *core)
+        notes.append(f"transposed to ({', '.join(map(str, value.dims))})")
+    for dim in core:
+        value, done = _ascending_metres(value, dim)
+        notes += done
+    unit = value.attrs.get("units")
+    if isinstance(unit, str) and unit in UNITS and unit not in METRES and value.dtype.kind in "fiu":
+        value = in_metres(value.astype(np.float64), unit).assign_attrs(value.attrs | {"units": "m"})
+        notes.append(f"heights converted from {unit}")
+    return value, notes
+
+
+def _only_height(dataset: xr.Dataset) -> xr.DataArray | None:
+    """Return the variable `height`, or the only numeric one along x; None if there is none."""
+    maps = [
+        str(name)
+        for name, array in dataset.data_vars.items()
+        if "x" in array.dims and array.dtype.kind in "fiu"
+    ]
+    name = "height" if "height" in maps else maps[0] if len(maps) == 1 else None
+    if name is None:
+        return None
+    array = dataset[name]
+    provenance = dataset.attrs.get("provenance")
+    return array if provenance is None else array.assign_attrs(provenance=provenance)
+
+
+def _ascending_metres(array: xr.DataArray, dim: str) -> tuple[xr.DataArray, list[str]]:
+    """Return an array with a coordinate in metres that ascends, and what was done."""
+    if dim not in array.coords or array.coords[dim].dtype.kind not in "fiu" or array.sizes[dim] < 2:
+        return array, []
+    axis, notes = array.coords[dim], []
+    unit = axis.attrs.get("units")
+    if isinstance(unit, str) and unit in UNITS and unit not in METRES:
+        attributes = dict(axis.attrs) | {"units": "m"}
+        if isinstance(attributes.get("period"), (int, float, np.number)):
+            attributes["period"] = in_metres(float(attributes["period"]), unit)
+        centres = in_metres(axis.values.astype(np.float64), unit)
+        array = array.assign_coords({dim: (dim, centres, attributes)})
+        notes.append(f"{dim} converted from {unit}")
+    if axis.values[0] > axis.values[-1]:
+        array = array.isel({dim: slice(None, None, -1)})
+        notes.append(f"{dim} reversed")
+    return array, notes
+
+
+def _labelled(where: str, value: Any, spacing: Any) -> xr.DataArray:
+    """Return a plain array as heights in metres on a uniform grid."""
+    with Problems(where) as problems:
+        is_plain = not isinstance(value, (xr.DataArray, xr.Dataset))
+        expected = "none beside labelled heights, which have coordinates"
+        problems.require(is_plain, SPACING, expected, spacing)
+        axes = np.ndim(value) if is_plain else 2
+        problems.require(axes in (1, 2), SURFACE, "an array of shape (ny, nx) or (nx,)", value)
+        if problems.numbers(SPACING, spacing, above=0):
+            size = float_array(spacing).size
+            problems.require(size in (1, axes), SPACING, "one length in metres, or (y, x)", spacing)
+    try:
+        heights = np.ma.filled(np.ma.asarray(value, dtype=np.float64), np.nan)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(
+            where, [f"{SURFACE}: expected an array of real numbers, got {value!r:.60}"]
+        ) from error
+    core = ("y", "x")[2 - heights.ndim :]
+    steps = np.broadcast_to(float_array(spacing), heights.ndim)
+    coords = plane_coords(heights.shape, steps.tolist(), (False,) * heights.ndim, core)
+    return xr.DataArray(heights, coords, core, name="height")
