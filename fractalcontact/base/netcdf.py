@@ -11,6 +11,7 @@ one lock of the process is held for the whole file, and xarray gets a file that 
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import platform
 import shutil
@@ -22,7 +23,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.schema import CONVENTIONS, encoded
 from fractalcontact.base.validation import Problems
@@ -92,12 +93,15 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     return target
 
 
-def open(path: str | os.PathLike[str]) -> Any:
-    """Read a NetCDF file into memory and close it.
+def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
+    """Read a NetCDF file into memory and close it, or open it as dask arrays.
 
     Parameters
     ----------
     path : path-like
+    chunks : "auto", int or mapping, optional
+        Sizes of blocks as xarray takes them, for example ``{"step": 1}``: the arrays are read when they are
+        computed, and the file stays open. Needs dask (extra `dask`).
 
     Returns
     -------
@@ -106,8 +110,12 @@ def open(path: str | os.PathLike[str]) -> Any:
 
     Raises
     ------
+    InvalidInput
+        `chunks` is no size of blocks.
     UnreadableFile
         The file does not exist, is truncated, or is not NetCDF.
+    MissingExtra
+        `chunks` is given, and dask is not installed.
 
     Examples
     --------
@@ -123,8 +131,14 @@ def open(path: str | os.PathLike[str]) -> Any:
     where = "fractalcontact.open"
     if not source.is_file():
         raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    if chunks is not None:
+        if importlib.util.find_spec("dask") is None:
+            raise MissingExtra("chunks", "dask", "dask")
+        if not (chunks == "auto" or _is_size(chunks) or _are_sizes(chunks)):
+            expected = "'auto', a size of blocks, or a mapping of dims to sizes"
+            raise InvalidInput(where, [f"chunks: expected {expected}, got {chunks!r}"])
     try:
-        tree = xr.DataTree.from_dict(_read(source))
+        tree = xr.DataTree.from_dict(_read(source) if chunks is None else _opened(source, chunks))
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
     for node in tree.subtree:
@@ -209,6 +223,36 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
             dataset.set_close(None)
             groups[name] = dataset
     return groups
+
+
+def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
+    """Return the groups of a file as dask arrays, which read it under the lock."""
+    import netCDF4
+    from xarray.backends import NetCDF4DataStore
+
+    with NETCDF_LOCK, netCDF4.Dataset(path) as file:
+        names = list(_group_names(file))
+    groups = {}
+    for name in names:
+        store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)
+        dataset = xr.open_dataset(store)
+        own = (
+            {dim: size for dim, size in chunks.items() if dim in dataset.dims}
+            if hasattr(chunks, "items")
+            else chunks
+        )
+        groups[name] = dataset.chunk(own)
+    return groups
+
+
+def _is_size(size: object) -> bool:
+    return isinstance(size, int) and not isinstance(size, bool) and (size > 0 or size == -1)
+
+
+def _are_sizes(chunks: object) -> bool:
+    return isinstance(chunks, Mapping) and all(
+        isinstance(dim, str) and (size == "auto" or _is_size(size)) for dim, size in chunks.items()
+    )
 
 
 def _group_names(group: Any) -> Iterator[str]:

@@ -210,3 +210,27 @@ def test_unreadable_files_are_refused(tmp_path, result):
     (tmp_path / "text.nc").write_text("hello")
     with pytest.raises(UnreadableFile, match="complete"):
         fc.open(tmp_path / "text.nc")
+
+
+def test_open_in_blocks(tmp_path):
+    """A file opened with chunks holds dask arrays of the same values, in every group."""
+    pytest.importorskip("dask")
+    surfaces = fc.surfaces.fbm((16, 20), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1, members=4)
+    path = fc.save(surfaces, tmp_path / "members.nc")
+    lazy = fc.open(path, chunks={"member": 1})
+    assert lazy.chunks[0] == (1, 1, 1, 1)
+    assert lazy.compute().identical(fc.open(path))
+    tree = xr.DataTree.from_dict({"/a": surfaces.to_dataset(name="height"), "/b": xr.Dataset({"step": [1, 2]})})
+    opened = fc.open(fc.save(tree, tmp_path / "tree.nc"), chunks="auto")
+    assert opened["a/height"].chunks is not None
+    np.testing.assert_array_equal(opened["a/height"], surfaces)
+    # functions that promise it take the blocks, one surface at a time
+    blocked = fc.dimensions.estimate(lazy, "increments")
+    np.testing.assert_allclose(blocked.hurst, fc.dimensions.estimate(surfaces, "increments").hurst, rtol=1e-9)
+
+
+@pytest.mark.parametrize("chunks", [0, "some", {"x": 0}, {1: 2}, 1.5, True])
+def test_wrong_chunks(tmp_path, chunks):
+    path = fc.save(fc.surfaces.from_array(np.eye(4), 1.0), tmp_path / "a.nc")
+    with pytest.raises(InvalidInput, match="chunks"):
+        fc.open(path, chunks=chunks)

@@ -41,7 +41,9 @@ def test_plain_array_with_its_spacing(wrap):
     np.testing.assert_allclose(result.rms_slope, EXPECTED.rms_slope, rtol=1e-5)
     fc.surfaces.describe.validate(SURFACE.values, spacing=1e-4)
     profile = fc.dimensions.estimate(SURFACE.values[0], spacing=1e-4)
-    np.testing.assert_allclose(profile.hurst, fc.dimensions.estimate(SURFACE[0].drop_vars("y")).hurst, rtol=1e-6)
+    np.testing.assert_allclose(
+        profile.hurst, fc.dimensions.estimate(SURFACE[0].drop_vars("y")).hurst, rtol=1e-6
+    )
 
 
 def test_masked_points_are_missing():
@@ -55,7 +57,8 @@ def test_masked_points_are_missing():
 def test_periodic_axis_in_other_units_stays_periodic():
     surface = fc.surfaces.spectral((16, 16), 1e-4, hurst=0.6, rms_height=1e-6, rng=1)
     coords = {
-        d: (d, surface[d].values * 1e3, {"units": "mm", "period": surface[d].attrs["period"] * 1e3}) for d in "yx"
+        d: (d, surface[d].values * 1e3, {"units": "mm", "period": surface[d].attrs["period"] * 1e3})
+        for d in "yx"
     }
     result = fc.dimensions.estimate(surface.assign_coords(coords))
     expected = fc.dimensions.estimate(surface)
