@@ -78,8 +78,8 @@ _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
 QUANTITIES: dict[str, Quantity] = {
     # coordinates of the plane and of the paths through it
-    "x": Quantity("m", "position along x", {"standard_name": "projection_x_coordinate", "axis": "X"}),
-    "y": Quantity("m", "position along y", {"standard_name": "projection_y_coordinate", "axis": "Y"}),
+    "x": Quantity("m", "position along x"),
+    "y": Quantity("m", "position along y"),
     "step": Quantity("1", "step of the load path"),
     "shear": Quantity("m", "shear displacement of the block"),
     "direction": Quantity(None, "direction in which the block slides (E is +x, N is +y)"),

@@ -220,7 +220,9 @@ def test_open_in_blocks(tmp_path):
     lazy = fc.open(path, chunks={"member": 1})
     assert lazy.chunks[0] == (1, 1, 1, 1)
     assert lazy.compute().identical(fc.open(path))
-    tree = xr.DataTree.from_dict({"/a": surfaces.to_dataset(name="height"), "/b": xr.Dataset({"step": [1, 2]})})
+    tree = xr.DataTree.from_dict(
+        {"/a": surfaces.to_dataset(name="height"), "/b": xr.Dataset({"step": [1, 2]})}
+    )
     opened = fc.open(fc.save(tree, tmp_path / "tree.nc"), chunks="auto")
     assert opened["a/height"].chunks is not None
     np.testing.assert_array_equal(opened["a/height"], surfaces)
