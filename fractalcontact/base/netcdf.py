@@ -234,7 +234,7 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
         names = list(_group_names(file))
     groups = {}
     for name in names:
-        store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)
+        store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
         dataset = xr.open_dataset(store)
         own = (
             {dim: size for dim, size in chunks.items() if dim in dataset.dims}
