@@ -193,7 +193,18 @@ def domain_grows(tree: xr.DataTree) -> Finding | None:
     domain = _domain(tree)
     if domain is None or len(domain.pressure) < 2:
         return None
-    dimension, null = domain.values["box_dimension"], domain.values["null_dimension"]
+    return _growth(domain.values["box_dimension"], domain.values["null_dimension"])
+
+
+def domain_grows_whole(tree: xr.DataTree) -> Finding | None:
+    states = _states(tree)
+    if states is None or states.sizes["step"] < 2:
+        return None
+    return _growth(*_over_block(states))
+
+
+def _growth(dimension: Array, null: Array) -> Finding:
+    """Return whether a dimension over (shear, step) grows with the force at every shear."""
     steps = np.diff(dimension, axis=1)
     grows = (steps >= -NO_FALL).all(axis=1) & (dimension[:, -1] > dimension[:, 0] + NO_FALL)
     values = (
@@ -231,21 +242,33 @@ def domain_falls(tree: xr.DataTree) -> Finding | None:
     return trend(f"{listed(dimension, '.2f')}; null {listed(null, '.2f')}", dimension[:, None], -1)
 
 
+def _states(tree: xr.DataTree) -> xr.DataArray | None:
+    """Return the maps of contact over shear > 0 and step; None where the study did not keep them."""
+    if read_closure(tree, "joints/closure", "contact_fraction") is None:
+        return None
+    data = towards_west(tree["joints/closure"].to_dataset())
+    if "state" not in data:
+        return None
+    states = data["state"].transpose("shear", "step", "y", "x")
+    return states.isel(shear=np.flatnonzero(np.asarray(states["shear"].values) > 0))
+
+
+def _over_block(states: xr.DataArray) -> tuple[Array, Array]:
+    """Return the dimension of domains and of their null, with boxes from one cell to the block."""
+    from fractalcontact import domains
+
+    edge = min(states.sizes["y"], states.sizes["x"])
+    boxes = domains.box_dimension(states, scales=[size for size in range(1, edge + 1) if edge % size == 0])
+    return np.asarray(boxes["box_dimension"].values), np.asarray(boxes["null_dimension"].values)
+
+
 def _whole_block(tree: xr.DataTree) -> tuple[Array, Array] | None:
     """Return the dimension counted over the whole block and that of its null, at the shears up to .80 mm."""
     closure = read_closure(tree, "joints/closure", "contact_fraction")
-    steps = None if closure is None else closure.steps()
-    if closure is None or steps is None or "state" not in tree["joints/closure"].data_vars:
+    steps, states = None if closure is None else closure.steps(), _states(tree)
+    if closure is None or steps is None or states is None:
         return None
-    from fractalcontact import domains
-
-    data = towards_west(tree["joints/closure"].to_dataset())
-    mask = data["state"].isel(step=steps[-1])
-    shear = np.asarray(mask["shear"].values)
-    mask = mask.isel(shear=np.flatnonzero((shear > 0) & (shear <= PLATEAU * (1 + SAME_POINT))))
-    edge = min(mask.sizes["y"], mask.sizes["x"])
-    boxes = domains.box_dimension(mask, scales=[size for size in range(1, edge + 1) if edge % size == 0])
-    return np.asarray(boxes["box_dimension"].values), np.asarray(boxes["null_dimension"].values)
+    return _over_block(states[closure.up_to(PLATEAU), steps[-1]])
 
 
 def domain_falls_whole(tree: xr.DataTree) -> Finding | None:

@@ -161,7 +161,7 @@ def test_claim_that_follows_from_the_model_has_no_verdict(falsification):
     for found in falsification.values():
         for claim, (_, verdict) in found.items():
             assert (verdict == "by construction") == CRITERIA[claim].startswith("by construction")
-    assert len(CLAIMS) == 28
+    assert len(CLAIMS) == 29
 
 
 def test_results_of_a_plane(study):
@@ -230,3 +230,25 @@ def test_table_from_the_file_alone_is_the_same(study, tmp_path):
     path = fc.save(study("egg box"), tmp_path / "result.nc")
     assert paper_table(fc.open(path)) == paper_table(study("egg box"))
     assert paper_table(xr.DataTree()) == ""
+
+
+def test_every_member_of_an_ensemble_is_judged(study):
+    """An ensemble of the smooth face and the plane: their own findings, counted."""
+    pair = [study(name) for name in ("smooth", "plane")]
+    rigid = [tree["joints/rigid_dilatancy"].to_dataset() for tree in pair]
+    joined = xr.concat(rigid, "member", coords="minimal", compat="override", join="override")
+    joined = joined.drop_vars("initial_offset").assign_coords(member=[0, 1])
+    both = xr.DataTree.from_dict({"/joints/rigid_dilatancy": joined})
+    head = paper_table(both).splitlines()[0]
+    assert "member 0 of 2" in head
+    counted = findings(both)
+    verdicts = [findings(tree) for tree in pair]
+    for claim in (
+        "delta_r keeps rising (E, S)",
+        "... because of the mean slope",
+        "... then a plateau (W, N)",
+    ):
+        agreed = [found[claim][1] for found in verdicts].count("yes")
+        assert counted[claim] == (verdicts[0][claim][0], f"yes in {agreed} of 2")
+    assert counted["... because of the mean slope"][1] == "yes in 1 of 2"
+    assert counted["face: dimension 2.15 to 2.29"][1] == "not tested"

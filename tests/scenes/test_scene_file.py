@@ -188,3 +188,40 @@ def test_press_takes_its_modulus_from_the_material(write):
     text = SOUND[: SOUND.index("[joint]")] + "[contact]\nnormal_force = 1.0\n[want]\ncontact = ['press']\n"
     pressed = fc.scenes.run(fc.scenes.load(write(text)), progress=False)["contact"]
     assert float(pressed["contact_modulus"]) == pytest.approx(30e9 / (2 * (1 - 0.2**2)))
+
+
+@pytest.mark.parametrize(
+    ("word", "tables", "named"),
+    [
+        ("elimination", "", "joint.block: expected a value for elimination"),
+        ("elimination", "[joint.elimination]\nblock = 1.2e-3\nclosure = 1e-6\nmethod = 'fast'", "method"),
+        ("elimination", "[joint.elimination]\nblock = -1.0", "joint.elimination.block"),
+        (
+            "self_weight",
+            "",
+            "joint.structure_size: expected a value(?s:.*)joint.unit_weight: expected a value",
+        ),
+        ("self_weight", "[joint.self_weight]\nstructure_size = 0.0\nunit_weight = 1.0", "structure_size"),
+        ("area_dimension", "[joint.area_dimension]\nclosure = 1e-6", "joint.area_dimension.closure"),
+        ("area_dimension", '[joint.area_dimension]\ndirection = ["E", "W"]', "one direction for area_dim"),
+        ("area_dimension", "[joint.area_dimension]\nnominal_pressure = 1e6\nnormal_force = 1.0", "one of a"),
+    ],
+)
+def test_problems_of_the_stages_of_the_paper_are_named(write, word, tables, named):
+    text = SOUND.replace("[want]", f"{tables}\n[want]").replace('"closure", "rigid_dilatancy"', f'"{word}"')
+    with pytest.raises(InvalidInput, match=named):
+        fc.scenes.load(write(text))
+
+
+@pytest.mark.parametrize(
+    ("word", "table", "named"),
+    [
+        ("elimination", "block = 1.0", "block: expected"),
+        ("area_dimension", "factors = [1, 7]", "divisors of the 24 x 24 cells"),
+        ("self_weight", "structure_size = [2.0, 1.0]\nunit_weight = 1.0", "ascending sizes"),
+    ],
+)
+def test_problems_of_their_calls_are_found_before_anything_runs(write, word, table, named):
+    text = SOUND.replace("[want]", f"[joint.{word}]\n{table}\n[want]")
+    with pytest.raises(InvalidInput, match=named):
+        fc.scenes.validate(write(text.replace('"closure", "rigid_dilatancy"', f'"{word}"')))
