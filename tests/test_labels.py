@@ -115,6 +115,13 @@ CALLS = {
     ),
     "joints.directional_roughness": lambda: fc.joints.directional_roughness(rough()),
     "joints.friction": lambda: fc.joints.friction(slid()),
+    "joints.partial_slip": lambda: fc.joints.partial_slip(
+        crack(),
+        shear=[0.0, 1e-4],
+        normal_force=10.0,
+        tangential_force=[0.0, 3.0, -3.0],
+        keep=("slip_state", "traction_x", "traction_y", "slip_x", "slip_y"),
+    ),
     "joints.register": lambda: fc.joints.register(rough(), rough() + 1e-5),
     "joints.roughness_coefficient": lambda: fc.joints.roughness_coefficient(rough(), lag=4e-4),
     "joints.shear_curve": lambda: fc.joints.shear_curve(

@@ -67,6 +67,9 @@ FUNCTIONS = {
     ),
     "friction": lambda z: fc.joints.friction(annotated(sheared(z, normal_force=[1.0]))),
     "cyclic_shear": lambda z: fc.joints.cyclic_shear(annotated(sheared(z)), [0.0, 1e-4, -1e-4]),
+    "partial_slip": lambda z: fc.joints.partial_slip(
+        crack(z), shear=SHEAR, normal_force=1.0, tangential_force=[0.3, -0.3], keep=("slip_state",)
+    ),
     "register": lambda z: fc.joints.register(z, z + 1e-5),
     "roughness_coefficient": fc.joints.roughness_coefficient,
     "strength_envelope": lambda z: fc.joints.strength_envelope(

@@ -66,6 +66,10 @@ CALLS = {
     "joints.dilatancy": {"crack": CRACK, "shear": [0.0, 1e-4]},
     "joints.friction": {"dilatancy": SHEARED},
     "joints.cyclic_shear": {"dilatancy": SHEARED, "path": [0.0, 1e-4, 0.0], "nominal_pressure": 1e6},
+    "joints.partial_slip": {
+        "crack": CRACK, "shear": 1e-4, "normal_force": 1.0, "tangential_force": 0.0,
+        "friction_coefficient": 0.5,
+    },
     "joints.roughness_coefficient": {"surface": SURFACE, "lag": 1e-4},
     "joints.strength_envelope": {
         "surface": SURFACE, "nominal_pressure": 1e6, "wall_strength": 1e8, "basic_friction_angle": 30,

@@ -10,6 +10,7 @@ from ._dilatancy import dilatancy as dilatancy
 from ._direct_shear import direct_shear as direct_shear
 from ._directional_roughness import directional_roughness as directional_roughness
 from ._friction import friction as friction
+from ._partial_slip import partial_slip as partial_slip
 from ._registration import register as register
 from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
 from ._self_weight import self_weight as self_weight
@@ -42,6 +43,7 @@ __all__ = [
     "direct_shear",
     "directional_roughness",
     "friction",
+    "partial_slip",
     "register",
     "roughness_coefficient",
     "self_weight",

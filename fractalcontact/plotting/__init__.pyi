@@ -21,6 +21,7 @@ from ._islands import islands as islands
 from ._lacunarity import lacunarity as lacunarity
 from ._paper import paper_figure as paper_figure
 from ._partial_slip import slip_domains as slip_domains
+from ._partial_slip import slip_loops as slip_loops
 from ._self_weight import self_weight as self_weight
 from ._shear_curve import shear_curve as shear_curve
 from ._shear_scheme import sliding_scheme as sliding_scheme
@@ -58,6 +59,7 @@ __all__ = [
     "shear_curve",
     "sliding_scheme",
     "slip_domains",
+    "slip_loops",
     "strength_envelope",
     "surface",
 ]

@@ -31,6 +31,7 @@ from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import islands
 from fractalcontact.plotting._lacunarity import lacunarity
 from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
+from fractalcontact.plotting._partial_slip import slip_domains, slip_loops
 from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
@@ -132,6 +133,8 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
         ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
         ("contact", "closure_law", closure_laws),
         ("contact", "contact_area", contact_area),
+        ("partial_slip", "slip_loops", slip_loops),
+        ("joints/partial_slip", "joint_slip_loops", slip_loops),
     ):
         data = group(tree, path)
         if data is not None:
@@ -143,6 +146,10 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
     contact = group(tree, "contact")
     if contact is not None and "state" in contact:
         yield "contact_domains", _later(contact_domains, contact)
+    for path, name in (("partial_slip", "slip_domains"), ("joints/partial_slip", "joint_slip_domains")):
+        slipped = group(tree, path)
+        if slipped is not None and "slip_state" in slipped:
+            yield name, _later(_slip_domains, slipped)
 
 
 def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -178,6 +185,10 @@ def _friction(data: xr.Dataset) -> Figure:
 
 def _lacunarity(data: xr.Dataset) -> Figure:
     return lacunarity(data, shear=shown_shear(data))
+
+
+def _slip_domains(data: xr.Dataset) -> Figure:
+    return slip_domains(data.isel(shear=-1) if "shear" in data.dims else data)  # at the greatest shear
 
 
 def _local_slopes(data: xr.Dataset) -> Figure:

@@ -1,4 +1,4 @@
-"""Maps of stick and slip along a path of tangential force."""
+"""Maps of stick and slip along a path of tangential force, and its loops of force and displacement."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import xarray as xr
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_of_columns
-from fractalcontact.plotting._inputs import extent_of, result_of
+from fractalcontact.plotting._inputs import extent_of, result_of, table
+from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._surface import plane_scale
-from fractalcontact.plotting._units import scale_of
+from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,6 +87,72 @@ def slip_domains(
         extent, length = extent_of(path["slip_state"]), plane_scale(path["slip_state"])
         _maps.scale_bar(axes[(count - 1) // columns * columns], extent, length)
     _legend(sheet)
+    return _style.root_figure(sheet)
+
+
+@_style.styled
+def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+    """Draw tangential force against displacement, and the part of the contact that sticks against the force.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
+        (shear, step).
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has another dim longer than one.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.partial_slip(
+    ...     surface,
+    ...     contact_modulus=1e9,
+    ...     poisson=0.2,
+    ...     friction_coefficient=0.5,
+    ...     normal_force=10.0,
+    ...     tangential_force=[0.0, 3.0, -3.0, 3.0],
+    ... )
+    >>> print(fc.plotting.slip_loops(result).axes[0].get_ylabel())
+    tangential force $Q$ (N)
+    """
+    needed = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
+    data = result_of(result, "slip_loops", needed, ("shear", "step"))
+    force = table(data, "tangential_force", ("shear", "step"))
+    displacement = table(data, "tangential_displacement", ("shear", "step"))
+    stuck = table(data, "stick_area", ("shear", "step"))
+    contact = table(data, "contact_area", ("shear", "step"))
+    sheet = _style.figure_or_new(figure, (_style.WIDTH, 3.1))
+    left, right = sheet.subplots(1, 2)
+    along, up = scale_of(data["tangential_displacement"]), scale_of(data["tangential_force"])
+    colours = _style.sequence_colours(len(displacement))
+    marker = "o" if displacement.shape[1] <= _style.MAX_MARKED_POINTS else ""
+    for row, colour in enumerate(colours):
+        line: dict[str, Any] = {"color": colour, "marker": marker}
+        left.plot(along(displacement[row]), up(force[row]), **line)
+        share = 100 * stuck[row] / np.where(contact[row] > 0, contact[row], np.nan)
+        right.plot(up(force[row]), share, **line)
+    left.set_xlabel(axis_label(data["tangential_displacement"], along))
+    left.set_ylabel(axis_label(data["tangential_force"], up))
+    right.set_xlabel(axis_label(data["tangential_force"], up))
+    right.set_ylabel("part of the contact that sticks (%)")
+    right.set_ylim(0, 105)
+    title, labels = shear_words(data) if "shear" in data.dims else ("", [])
+    if labels:
+        shown = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)
+        _style.side_legend(
+            right, [_style.legend_line(labels[i], color=colours[i]) for i in shown], title=title
+        )
     return _style.root_figure(sheet)
 
 

@@ -15,6 +15,8 @@ SHORT = {
     "normal_force": "normal force $F$",
     "nominal_pressure": "nominal pressure",
     "shear": "shear displacement $v$",
+    "tangential_force": "tangential force $Q$",
+    "tangential_displacement": "tangential displacement",
     "rigid_dilatancy": r"rigid dilatancy $\delta_\mathrm{r}$",
     "dilatancy": r"dilatancy $\delta$",
     "contact_fraction": "real contact area",

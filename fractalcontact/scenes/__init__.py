@@ -11,7 +11,8 @@ Only the stages that the wanted results need are computed, imported, compiled an
 ``[joint]``       block, and the arguments of the functions of `joints` (shear, direction, normal_force ...);
                   ``[joint.closure]`` and so on give one stage its own values; ``register = true`` brings two
                   measured faces into mated position
-``[contact]``     the arguments of `contact.press`
+``[contact]``     the arguments of `contact.press`; ``[contact.partial_slip]`` those of
+                  `contact.partial_slip` (tangential_force, friction_coefficient ...)
 ``[dimensions]``  the arguments of `dimensions.estimate`
 ``[domains.lacunarity]`` and so on: the arguments of the functions of `domains`
 ``[want]``        surfaces, dimensions, contact, joints, domains: lists of results; keep: maps to store;

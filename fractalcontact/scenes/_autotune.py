@@ -215,7 +215,7 @@ def _tolerances(solver: _Solver) -> list[Option]:
 
 def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[_Solver]:
     hardness = " with a hardness" if scene.material.hardness is not None else ""
-    if scene.want.contact:
+    if scene.is_pressed:
         table = scene.table("contact")
         body = table.get("boundary", "periodic" if scene.surface.generate in PERIODIC else "free")
         steps = max((len(value) for value in table.values() if isinstance(value, list)), default=1)
@@ -224,7 +224,7 @@ def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[_Solver]:
         benchmark = f"rough, {body} body{condition}"
         yield _Solver("contact", benchmark, 1.0 + WARM_START * (steps - 1), float(np.prod(shape)))
     wanted = set(scene.want.joints)
-    if (scene.want.domains or "transmissivity" in wanted) and not scene.want.contact:
+    if (scene.want.domains or "transmissivity" in wanted) and not scene.is_pressed:
         wanted.add("closure")
     solves = sum(_joint_solves(scene, name) for name in ("closure", "elastic_dilatancy") if name in wanted)
     if solves:

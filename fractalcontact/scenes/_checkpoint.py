@@ -25,8 +25,9 @@ import fractalcontact
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.netcdf import clear_partial, unfinished
 from fractalcontact.base.schema import encoded
-from fractalcontact.scenes._inputs import contact_options, locate
+from fractalcontact.scenes._inputs import contact_options, locate, slip_options
 from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stages import PARTIAL_SLIP
 
 if TYPE_CHECKING:
     from fractalcontact.scenes._plan import Stage
@@ -201,6 +202,8 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
         facts["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
     if subpackage == "contact":
         facts["contact"] = contact_options(scene)
+    if stage.name == PARTIAL_SLIP:
+        facts["contact"] = slip_options(scene)
     if subpackage == "domains":
         facts["domains"] = scene.table("domains").get(name, {})
     facts["needs"] = [digests[need] for need in stage.needs]

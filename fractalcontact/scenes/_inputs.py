@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from pathlib import Path
@@ -13,7 +14,7 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.references import joined_references
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import ONE_LOAD, STAGES, public_function
+from fractalcontact.scenes._stages import ONE_LOAD, PARTIAL_SLIP, STAGES, public_function
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,11 +98,28 @@ def contact_options(scene: Scene) -> dict[str, Any]:
     """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
     from fractalcontact.contact import effective_modulus
 
-    options, material = dict(scene.table("contact")), scene.material
+    table, material = scene.table("contact"), scene.material
+    options = {key: value for key, value in table.items() if not isinstance(value, dict)}
     if "contact_modulus" not in options and material.young is not None and material.poisson is not None:
         options["contact_modulus"] = effective_modulus(material.young, material.poisson)
     if material.hardness is not None:
         options.setdefault("hardness", material.hardness)
+    return options
+
+
+def slip_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `partial_slip`: its own, those of `[contact]`, then those of the material."""
+    options, material = scene.stage_options(STAGES[PARTIAL_SLIP]), scene.material
+    own = scene.table("contact").get(PARTIAL_SLIP, {})
+    if any(key in own for key in LOADS):  # a load of its own replaces that of the load path
+        options = {key: value for key, value in options.items() if key not in LOADS or key in own}
+    pressed = contact_options(scene)
+    if "contact_modulus" in pressed:
+        options.setdefault("contact_modulus", pressed["contact_modulus"])
+    if material.poisson is not None:
+        options.setdefault("poisson", material.poisson)
+    if material.basic_friction_angle is not None:
+        options.setdefault("friction_coefficient", math.tan(math.radians(material.basic_friction_angle)))
     return options
 
 

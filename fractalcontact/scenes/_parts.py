@@ -23,10 +23,16 @@ from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.results import provenance_of
-from fractalcontact.scenes._inputs import contact_options, crack_options, joint_options, read_surface
+from fractalcontact.scenes._inputs import (
+    contact_options,
+    crack_options,
+    joint_options,
+    read_surface,
+    slip_options,
+)
 from fractalcontact.scenes._plan import Stage
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import public_function
+from fractalcontact.scenes._stages import PARTIAL_SLIP, public_function
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -158,6 +164,9 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
         return _dimension_work(stage, scene, results)
     if subpackage == "contact":
         return _contact_work(stage, scene, results)
+    if stage.name == PARTIAL_SLIP:
+        height, options = _heights(results, "surfaces"), slip_options(scene)
+        return StageWork((partial(call, stage.row.function, height, keep=stage.keep, **options),))
     return _joint_work(name, stage, scene, results)
 
 
@@ -222,6 +231,10 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
         shears = _as_list(options.pop("shear"))
         call_at = partial(partial, call, stage.row.function, crack, **options)
         return StageWork(tuple(call_at(shear=[shear]) for shear in shears), ("shear",), (len(shears),))
+    if name == PARTIAL_SLIP:
+        shears = _as_list(options.pop("shear"))
+        push = partial(call, stage.row.function, crack, keep=stage.keep, **options)
+        return StageWork(tuple(partial(push, shear=[shear]) for shear in shears), ("shear",), (len(shears),))
     if name == "elastic_dilatancy":
         directions = _as_list(options.pop("direction", ("E", "N", "W", "S")))
         shears = _as_list(options.pop("shear"))

@@ -17,6 +17,7 @@ from fractalcontact.scenes._stages import (
     ISLAND_MAP,
     ONE_DIRECTION,
     ONE_LOAD,
+    PARTIAL_SLIP,
     STAGES,
     StageType,
     arguments_of,
@@ -159,8 +160,10 @@ def _reasons(scene: Scene) -> dict[str, str]:
         if want.figures:
             curves = [name for name in want.dimensions if name in CURVES]
             reasons |= {f"dimensions/{name}": "figures are wanted" for name in curves}
-    if want.contact:
+    if scene.is_pressed:
         reasons["contact"] = "press is wanted"
+    if PARTIAL_SLIP in want.contact:
+        reasons[PARTIAL_SLIP] = "partial_slip is wanted"
     reasons |= _joint_reasons(scene)
     reasons |= {f"domains/{name}": f"{name} is wanted" for name in want.domains}
     return reasons
@@ -169,7 +172,7 @@ def _reasons(scene: Scene) -> dict[str, str]:
 def _joint_reasons(scene: Scene) -> dict[str, str]:
     want = scene.want
     reasons = {name: f"{name} is wanted" for name in want.joints}
-    if want.domains and not want.contact:
+    if want.domains and not scene.is_pressed:
         reasons.setdefault("closure", "the contact set is analysed")
     if "transmissivity" in reasons:
         reasons.setdefault("closure", "transmissivity needs the gap")
@@ -192,7 +195,7 @@ def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:
 
 def stored_maps(scene: Scene) -> set[str]:
     """Return the maps in the result file: those wanted, and those that its figures show."""
-    return set(scene.want.keep) | ({"state", ISLAND_MAP} if scene.want.figures else set())
+    return set(scene.want.keep) | ({"state", "slip_state", ISLAND_MAP} if scene.want.figures else set())
 
 
 def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
@@ -201,7 +204,7 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
         return tuple(name for name in row.keeps if name in stored_maps(scene))
     is_contact = row.name == "contact"
     maps = [name for name in scene.want.keep if name in CONTACT_MAPS]
-    reads_state = is_contact == bool(scene.want.contact) and bool(scene.want.domains)
+    reads_state = is_contact == scene.is_pressed and bool(scene.want.domains)
     if (reads_state or scene.want.figures) and "state" not in maps:
         maps.append("state")
     if "transmissivity" in scene.want.joints and not is_contact and "gap" not in maps:

@@ -35,7 +35,7 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     if slope > LARGEST_SLOPE:
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
     edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]
-    if scene.want.contact:
+    if scene.is_pressed:
         options = contact_options(scene)
         yield from _high_pressures(
             "contact", options, float(np.prod(edges)), float(options["contact_modulus"])

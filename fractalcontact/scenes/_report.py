@@ -57,6 +57,8 @@ def summary(tree: xr.DataTree) -> str:
         _closure(tree),
         _elimination(tree),
         _area_by_spacing(tree),
+        _partial_slip(tree, "partial_slip"),
+        _partial_slip(tree, "joints/partial_slip"),
         _delta_dimension(tree),
         _decorrelation(tree),
         _dilatancy(tree),
@@ -294,6 +296,34 @@ def _leakage(tree: xr.DataTree) -> str:
         every = (amount(state["hydraulic_aperture"].sel(axis=axis)) for axis in axes)
         rows.append((shear, amount(state["normal_force"]), amount(state["aperture"]), *every))
     return table(rows)
+
+
+def _partial_slip(tree: xr.DataTree, path: str) -> str:
+    slipped = group_of(tree, path)
+    if slipped is None:
+        return ""
+    head = ("tangential force", "displacement", "sticks", "stiffness", "dissipated energy")
+    names = ("tangential_displacement", "tangential_stiffness", "dissipated_energy")
+    rows: list[tuple[str, ...]] = [
+        ("partial slip at shear" if "shear" in slipped.dims else "partial slip", *head)
+    ]
+    for shear, path_of_force in _at_shears(slipped):
+        for step in range(path_of_force.sizes["step"]):
+            state = path_of_force.isel(step=step)
+            displacement, stiffness, energy = (amount(state[name]) for name in names)
+            share = 100 * state["stick_area"] / state["contact_area"].where(state["contact_area"] > 0)
+            force = amount(state["tangential_force"])
+            rows.append((shear or str(step), force, displacement, f"{plain(share, 1)} %", stiffness, energy))
+    text = table(rows)
+    limit = slipped["friction_coefficient"] * slipped["normal_force"].max()
+    text += "\n" + note(f"all slides at {quantity_text(float(limit.mean()), 'N')}")
+    if "stuck_ratio" in slipped:
+        first = slipped["stiffness_ratio"].isel(step=0)
+        ratios = (
+            f"{plain(first, 3)} at the first step; {plain(slipped['stuck_ratio'], 3)} where nothing slips"
+        )
+        text += "\n" + note(f"shear over normal stiffness of the joint: {ratios} (theory)")
+    return text
 
 
 def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.scenes._stages import DATASHEET, StageType
+from fractalcontact.scenes._stages import DATASHEET, PRESS, StageType
 
 Table = Mapping[str, Any]
 LOADS = ("closure", "normal_force", "nominal_pressure")
@@ -168,6 +168,11 @@ class Scene:
         if datasheet:
             words["joints"] = tuple(dict.fromkeys((*words.get("joints", ()), *DATASHEET)))
         return WantTable(**words, figures=figures, datasheet=datasheet)
+
+    @property
+    def is_pressed(self) -> bool:
+        """Whether the surface is pressed along a load path, which the domains then analyse."""
+        return PRESS in self.wanted("contact")
 
     @property
     def paper(self) -> bool:

@@ -16,7 +16,14 @@ from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.validation import NONE, Problems, did_you_mean
 from fractalcontact.scenes._plan import check_loads
 from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, WANT_KEYS, MaterialTable, Scene, Table
-from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, WANTED, arguments_of
+from fractalcontact.scenes._stages import (
+    DOMAIN_STAGES,
+    JOINT_STAGES,
+    PARTIAL_SLIP,
+    STAGES,
+    WANTED,
+    arguments_of,
+)
 
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
 SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
@@ -156,8 +163,8 @@ def _check(scene: Scene, problems: Problems) -> None:
         _check_surface(scene.table("upper"), "upper", problems)
     _check_material(scene.table("material"), problems)
     if "contact" in scene.tables:
-        _check_keys(scene.table("contact"), arguments_of("contact.press")[0], "contact", problems)
-        _check_numbers(scene.table("contact"), "contact", problems)
+        own = arguments_of("contact.press")[0]
+        _check_stages(scene.table("contact"), "contact", own, (PARTIAL_SLIP,), problems)
     if "dimensions" in scene.tables:
         keys = [key for key in arguments_of("dimensions.estimate")[0] if key != "methods"]  # from [want]
         _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
@@ -224,7 +231,8 @@ def _check_stages(
     _check_numbers(rest, name, problems)
     subpackage = "joints" if name == "joint" else name
     for stage, options in own.items():
-        _check_keys(options, STAGES[f"{subpackage}/{stage}"].arguments(), f"{name}.{stage}", problems)
+        row = STAGES[stage if name == "contact" else f"{subpackage}/{stage}"]
+        _check_keys(options, row.arguments(), f"{name}.{stage}", problems)
         _check_numbers(options, f"{name}.{stage}", problems)
 
 
@@ -251,8 +259,9 @@ def _check_want(scene: Scene, problems: Problems) -> None:
 
 def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
+    _check_partial_slip(scene, problems)
     contact, material = scene.table("contact"), scene.table("material")
-    if scene.want.joints or (scene.wanted("domains") and not scene.wanted("contact")):
+    if scene.want.joints or (scene.wanted("domains") and not scene.is_pressed):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):
@@ -260,8 +269,31 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
         has_modulus = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
         problems.require(has_modulus, "contact.contact_modulus", expected, NONE)
         expected = "exactly one of closure, normal_force, nominal_pressure"
-        one_load = sum(key in contact for key in LOADS) == 1
-        problems.require(one_load, "contact", expected, sorted(contact) or NONE)
+        if scene.is_pressed:
+            one_load = sum(key in contact for key in LOADS) == 1
+            problems.require(one_load, "contact", expected, sorted(contact) or NONE)
+
+
+def _check_partial_slip(scene: Scene, problems: Problems) -> None:
+    """Check that partial slip, where it is wanted, has a force, one load, friction, and elastic bodies."""
+    material, row = scene.table("material"), STAGES[PARTIAL_SLIP]
+    wanted = [PARTIAL_SLIP in scene.wanted(subpackage) for subpackage in ("contact", "joints")]
+    if any(wanted):
+        expected = "no hardness: partial slip is that of elastic bodies"
+        problems.require("hardness" not in material, "material.hardness", expected, "a value")
+    if not wanted[0]:
+        return
+    options, own = scene.stage_options(row), scene.table("contact").get(PARTIAL_SLIP, {})
+    for key, source in (
+        ("tangential_force", ""),
+        ("poisson", "poisson"),
+        ("friction_coefficient", "basic_friction_angle"),
+    ):
+        expected = f"a value, or {source} in [material]" if source else "a value"
+        problems.require(key in options or source in material, f"{row.table}.{key}", expected, NONE)
+    loads = [key for key in LOADS if key in own] or [key for key in LOADS if key in options]
+    expected = "exactly one of closure, normal_force, nominal_pressure"
+    problems.require(len(loads) == 1, row.table, expected, loads or NONE)
 
 
 def _check_numbers(table: Table, name: str, problems: Problems) -> None:

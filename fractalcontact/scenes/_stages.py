@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
+SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
+PRESS, PARTIAL_SLIP = "press", "partial_slip"
 FIGURES = "figures"
 
 # stages of a joint with one path of load, and with one direction
-ONE_LOAD = ("closure", "elimination", "area_dimension")
+ONE_LOAD = ("closure", "elimination", "area_dimension", PARTIAL_SLIP)
 ONE_DIRECTION = (*ONE_LOAD, "delta_surface", "delta_dimension", "decorrelation_length")
 
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
@@ -113,6 +115,8 @@ _ROWS = (
     _curve("variation"),
     _curve("covering"),
     StageType("contact", _SURFACE, "contact.press", "contact", keeps=CONTACT_MAPS),
+    # not below contact: its steps are others than those of the load path
+    StageType(PARTIAL_SLIP, _SURFACE, "contact.partial_slip", "contact.partial_slip", keeps=SLIP_MAPS),
     StageType("joints/faces", _SURFACE, "joints.register", "upper"),
     _joint("delta_surface"),
     _joint("delta_dimension"),
@@ -120,6 +124,7 @@ _ROWS = (
     _joint("closure", keeps=CONTACT_MAPS),
     _joint("elimination", function="closure"),
     _joint("area_dimension"),
+    _joint(PARTIAL_SLIP, keeps=SLIP_MAPS),
     _joint("elastic_dilatancy", function="dilatancy"),
     _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
     _joint("roughness_coefficient", _SURFACE, takes_surface=True),
@@ -161,10 +166,10 @@ DOMAIN_STAGES = _words("domains")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
     "surfaces": ("height", "describe"),
-    "contact": ("press",),
+    "contact": (PRESS, PARTIAL_SLIP),
     "joints": JOINT_STAGES,
     "domains": DOMAIN_STAGES,
-    "keep": (*CONTACT_MAPS, ISLAND_MAP),
+    "keep": (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP),
 }
 
 

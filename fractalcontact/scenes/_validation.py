@@ -21,6 +21,7 @@ from fractalcontact.scenes._inputs import (
     generator_options,
     joint_options,
     read_surface,
+    slip_options,
     spacing_of,
 )
 from fractalcontact.scenes._parts import map_reader
@@ -28,7 +29,7 @@ from fractalcontact.scenes._plan import Stage, stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scene import Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import parse
-from fractalcontact.scenes._stages import JOINT_STAGES, public_function
+from fractalcontact.scenes._stages import JOINT_STAGES, PARTIAL_SLIP, public_function
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -117,7 +118,7 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
 
 def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
     """Check the block and the shears, which must not push it off its face."""
-    joint_presses = bool(scene.want.domains) and not scene.want.contact
+    joint_presses = bool(scene.want.domains) and not scene.is_pressed
     if not (scene.want.joints or joint_presses):
         return
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
@@ -163,6 +164,8 @@ def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
                 _validate_call(stage.row.function, surface, list(scene.want.dimensions), **options)
             elif stage.name == "contact" and not is_flat:
                 _validate_call(stage.row.function, surface, keep=stage.keep, **contact_options(scene))
+            elif stage.name == PARTIAL_SLIP and not is_flat:
+                _validate_call(stage.row.function, surface, keep=stage.keep, **slip_options(scene))
             elif stage.reads_map:
                 reader, maps = map_reader(stage, scene), _zero_maps(scene, surface)
                 _validate_call(
@@ -189,7 +192,7 @@ def _zero_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
     """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
     from fractalcontact import surfaces
 
-    is_surface = bool(scene.want.contact) or scene.joint.block is None
+    is_surface = scene.is_pressed or scene.joint.block is None
     spacing = spacing_of(surface)
     edges = np.broadcast_to(0.0 if is_surface else scene.joint.block, 2)
     cells = surface.shape if is_surface else tuple(np.rint(edges / spacing).astype(int).tolist())

@@ -53,7 +53,30 @@ def test_fewer_panels_and_no_contact(sheared):
     assert "no contact" in plotting.slip_domains(empty).axes[0].get_title(loc="left")
 
 
+def test_loops_are_the_values_of_the_result(sheared):
+    left, right = plotting.slip_loops(sheared).axes
+    x, y = left.lines[0].get_data()
+    np.testing.assert_allclose(y, sheared["tangential_force"])
+    assert left.get_xlabel() == "tangential displacement (µm)"
+    np.testing.assert_allclose(x, 1e6 * sheared["tangential_displacement"])
+    share = 100 * sheared["stick_area"] / sheared["contact_area"]
+    np.testing.assert_allclose(right.lines[0].get_ydata(), share)
+
+
+def test_loops_of_a_joint():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=2e-6, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
+    pushed = fc.joints.partial_slip(crack, shear=[1e-4, 3e-4], normal_force=50, tangential_force=[0, 20, -20])
+    figure = plotting.slip_loops(pushed)
+    left, right = figure.axes
+    assert len(left.lines) == len(right.lines) == 2
+    np.testing.assert_allclose(left.lines[1].get_xdata(), 1e6 * pushed["tangential_displacement"][1])
+    render(figure)
+
+
 def test_bad_input(sheared):
+    with pytest.raises(InvalidInput, match="stick_area"):
+        plotting.slip_loops(sheared.drop_vars("stick_area"))
     with pytest.raises(InvalidInput, match="slip_state"):
         plotting.slip_domains(sheared.drop_vars("slip_state"))
     with pytest.raises(InvalidInput, match="panels"):

@@ -131,6 +131,8 @@ REQUIREMENTS = {
     "joints/area_dimension": _SOLVER,
     "joints/self_weight": _SOLVER,
     "joints/elastic_dilatancy": _SOLVER,
+    "joints/partial_slip": _SOLVER,
+    "partial_slip": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover")),
     "domains/box_counts": Requirement(_SPECIAL, ("mean cover",)),
