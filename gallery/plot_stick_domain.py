@@ -48,9 +48,11 @@ for name, planes in sets.items():
     print(f"{name}: part of the nodes that differ {different.round(3)}")
 
 # %%
-# The box dimension of the stick set falls slowly towards sliding, while that of random sets of the same
-# coverage falls to that of scattered points: the last nodes that stick are clustered on the highest
-# asperities. The lacunarity, here with boxes of four nodes, tells the same.
+# The box dimension of the stick set falls with the tangential force, to isolated clusters on the highest
+# asperities, and it falls as that of the contact does when it is unloaded. Random sets of the same coverage
+# have a higher dimension until near sliding, and a lower one then, when they are scattered points. The
+# lacunarity, here with boxes of four nodes, rises to several times that of random sets: what sticks last is
+# clustered.
 
 SCALES = (2, 4, 8, 16, 32)  # of all sets, in nodes
 measured = {

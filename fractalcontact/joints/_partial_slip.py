@@ -28,6 +28,7 @@ METHODS = ("superposition", "full")
 LOADS = ("closure", "normal_force", "nominal_pressure")
 LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient
 ROUNDING = 1e-12
+RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 BLOCK_ROUNDING = 1e-3  # relative error of the tangential stiffness, and more
 COLUMNS = (
     "tangential_displacement", "tangential_stiffness", "stick_area", "slip_area", "dissipated_energy",
@@ -130,8 +131,8 @@ def partial_slip(
         the solver columns of `contact.partial_slip`; shear_stiffness K_s and stiffness_ratio K_s/K_n. Over
         shear: interface_stiffness K_n (Pa/m, at the normal load), sliding_force (N), at which all slides,
         contact_area, closure; stuck_ratio 2 (1 - nu)/(2 - nu), the theory for K_s/K_n before any slip. The
-        part of the flat block is subtracted from both stiffnesses, as from the interface closure; mated
-        faces have infinite ones.
+        part of the flat block is subtracted from both stiffnesses, as from the interface closure; they are
+        NaN where nothing is left, for mated faces.
 
     Raises
     ------
@@ -174,8 +175,11 @@ def partial_slip(
     ).assign_coords(shear=("shear", shears), tangential_force=("step", forces), direction=towards.name)
     if names:
         result = result.assign_coords(block_coords(crack))
-    if bool(np.isnan(result["stiffness_ratio"]).any()):
-        result["stiffness_ratio"].attrs["reason"] = "NaN where both are infinite: the faces are mated"
+    for name in ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio"):
+        finite = np.isfinite(result[name])
+        if not finite.all():
+            result[name] = result[name].where(finite)
+            result[name].attrs["reason"] = RIGID
     _warn(result, shears)
     return result.assign_attrs(method=method, achieved_residual=float(result["residual"].max()))
 

@@ -74,9 +74,9 @@ def test_stiffness_ratio_before_any_slip(method, error, poisson):
 def test_block_is_subtracted_from_both_stiffnesses(method):
     """A mated joint is as stiff as the block alone: the interface is rigid."""
     result = pushed([0.0, 50.0], shear=0.0, method=method)
-    assert np.isinf(result["shear_stiffness"]).all()
-    assert np.isinf(result["interface_stiffness"]).all()
-    assert "mated" in result["stiffness_ratio"].attrs["reason"]
+    for name in ("shear_stiffness", "interface_stiffness", "stiffness_ratio"):
+        assert np.isnan(result[name]).all()
+        assert "mated" in result[name].attrs["reason"]
     assert not result["slip_area"].any()
     block = fc.contact.flat_stiffness((48, 48), 1e-4, contact_modulus=crack().contact_modulus)
     np.testing.assert_allclose(result["tangential_stiffness"], block * 1.6 / 1.8, rtol=0.02)
