@@ -1,4 +1,4 @@
-"""The command `fractalcontact`: run a scene, measure accuracy, list the methods, show the contents of a file.
+"""The command `fractalcontact`: run a scene, answer a question, measure accuracy, show what a file has.
 
 Exit codes: 0 success, 2 invalid input (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT
 finishes the current task and keeps the results; a second SIGINT stops at once.
@@ -20,6 +20,11 @@ from fractalcontact.base.process import block_dask_import, collect_garbage_less_
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 WRONG_INPUT, STOPPED = 2, 128
+QUESTIONS = {
+    "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
+    "contact": "contact of a scan with a flat under growing pressure",
+    "joint": "closure, dilatancy and leakage of two scanned faces",
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -68,6 +73,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(action=_run)
 
+    for question, line in QUESTIONS.items():
+        _add_question(commands, question, line)
+
+    init = commands.add_parser("init", help="write a commented scene to start from")
+    init.add_argument("scene", nargs="?", default="scene.toml", help="the file to write (default scene.toml)")
+    init.set_defaults(action=_init)
+
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
     accuracy.add_argument(
         "names",
@@ -114,6 +126,63 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", help="a NetCDF file that this package wrote")
     info.set_defaults(action=_info)
     return parser
+
+
+def _add_question(commands: Any, question: str, line: str) -> None:
+    """Add a command that answers one question to a scan."""
+    command = commands.add_parser(question, help=line)
+    command.add_argument("scan", help="file of the surface: every format of fractalcontact.surfaces.read")
+    if question == "joint":
+        command.add_argument("upper", help="file of the upper face, in the same frame")
+    if question != "roughness":
+        command.add_argument("--young", type=float, required=True, help="Young's modulus of both bodies, Pa")
+        command.add_argument("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
+    command.add_argument(
+        "--units", help="unit of the heights, and of the coordinates of points: m, mm, um ..."
+    )
+    command.add_argument("--spacing", type=float, help="distance between the points, or of the cells, in m")
+    command.add_argument(
+        "-o", "--out", help="folder for the results (default: SCAN_QUESTION, without suffix)"
+    )
+    command.add_argument("--scene", action="store_true", help="print the scene and run nothing")
+    command.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    command.set_defaults(action=_answer, question=question, plan=False, workers=0)
+
+
+def _answer(options: argparse.Namespace) -> int:
+    """Write the scene of a question into the folder of its results, and run it."""
+    from fractalcontact import scenes
+    from fractalcontact.base.output_folder import output_folder
+
+    scan, folder = Path(options.scan), options.out
+    if folder is None:
+        folder = f"{scan.name.partition('.')[0]}_{options.question}"
+    arguments = {"spacing": options.spacing, "units": options.units}
+    if options.question != "roughness":
+        arguments |= {"young": options.young, "poisson": options.poisson}
+    place = "." if options.scene else folder
+    upper = getattr(options, "upper", None)
+    text = scenes.template(options.question, scan, upper, folder=place, **arguments)
+    if options.scene:
+        print(text)
+        return 0
+    output_folder(folder)
+    options.out, options.scene = folder, Path(folder) / f"{options.question}.toml"
+    options.scene.write_text(text, encoding="utf-8")
+    return _run(options)
+
+
+def _init(options: argparse.Namespace) -> int:
+    """Write a commented scene; an existing file stays."""
+    from fractalcontact.base.datasets import datasets_folder
+
+    target = Path(options.scene)
+    if target.exists() or not target.parent.is_dir():
+        expected = "the name of a new file in an existing folder"
+        raise InvalidInput("fractalcontact init", [f"scene: expected {expected}, got {target.name!r}"])
+    target.write_text((datasets_folder() / "new_scene.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    print(f"written: {target}\nfractalcontact run {target} -o out")
+    return 0
 
 
 def _run(options: argparse.Namespace) -> int:

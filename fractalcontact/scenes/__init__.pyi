@@ -9,6 +9,7 @@ from ._run import run as run
 from ._scene import Scene as Scene
 from ._scene_file import load as load
 from ._tables import tables as tables
+from ._template import template as template
 from ._validation import validate as validate
 
 __all__ = [
@@ -23,5 +24,6 @@ __all__ = [
     "run",
     "summary",
     "tables",
+    "template",
     "validate",
 ]

@@ -261,7 +261,10 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     _check_partial_slip(scene, problems)
     contact, material = scene.table("contact"), scene.table("material")
-    if scene.want.joints or (scene.wanted("domains") and not scene.is_pressed):
+    slides = any(
+        name in JOINT_STAGES and not STAGES[f"joints/{name}"].takes_surface for name in scene.want.joints
+    )
+    if slides or (scene.wanted("domains") and not scene.is_pressed):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):

@@ -29,7 +29,7 @@ from fractalcontact.scenes._plan import Stage, stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scene import Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import parse
-from fractalcontact.scenes._stages import JOINT_STAGES, PARTIAL_SLIP, public_function
+from fractalcontact.scenes._stages import JOINT_STAGES, PARTIAL_SLIP, STAGES, public_function
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -119,7 +119,8 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
 def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
     """Check the block and the shears, which must not push it off its face."""
     joint_presses = bool(scene.want.domains) and not scene.is_pressed
-    if not (scene.want.joints or joint_presses):
+    slides = any(not STAGES[f"joints/{name}"].takes_surface for name in scene.want.joints)
+    if not (slides or joint_presses):
         return
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
         return

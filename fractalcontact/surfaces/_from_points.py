@@ -151,7 +151,7 @@ def from_points(
     frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
     if values.shape[1] == 2:
         gridded = _profile(values, spacing, largest_gap)
-    elif (lattice := _lattice(values, spacing) if triangles is None else None) is not None:
+    elif (lattice := _lattice(values, spacing)) is not None:
         gridded = lattice
     else:
         given = None if triangles is None else _finite_triangles(point_array(points), triangles)

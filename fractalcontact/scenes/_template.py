@@ -1,0 +1,176 @@
+"""Scenes for usual questions to a measured surface, as text to run or to start from."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.validation import Problems
+
+WHERE = "fractalcontact.scenes.template"
+QUESTIONS = ("roughness", "contact", "joint")
+JRC_LAG = 0.508e-3  # m: the interval of the readings of Tse and Cruden
+JRC_LENGTHS = 10  # least number of intervals along a surface
+LIGHT, FULL = 1e-3, 0.2  # fractions of true contact of the default loads
+PRESSURES = (1e5, 1e7)  # Pa: usual loads of a joint
+
+
+def template(
+    question: str,
+    scan: str | os.PathLike[str],
+    upper: str | os.PathLike[str] | None = None,
+    *,
+    young: float | None = None,
+    poisson: float = 0.2,
+    folder: str | os.PathLike[str] = ".",
+    **reading: Any,
+) -> str:
+    """Return a scene that answers a usual question to a measured surface.
+
+    Parameters
+    ----------
+    question : {"roughness", "contact", "joint"}
+        Dimension with its interval, roughness coefficient (JRC) and directional roughness; contact of the
+        surface with a flat under growing pressure; or closure, dilatancy and leakage of two faces.
+    scan, upper : path-like
+        Files of the surface, and of the second face of a joint.
+    young, poisson : float
+        Young's modulus (Pa) and Poisson's ratio of both bodies, for "contact" and "joint".
+    folder : path-like
+        Folder of the scene; the files are named relative to it.
+    **reading
+        Arguments of `fractalcontact.surfaces.read` for both files: spacing, units, plane ...
+
+    Returns
+    -------
+    str
+        TOML. Loads and shears are chosen from the size and the slope of the surface, which is read for that.
+
+    Raises
+    ------
+    InvalidInput
+        An unknown question, no modulus or no second face where it is needed, or a profile.
+    UnreadableFile
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+    >>> path = fc.save(surface, tempfile.mkdtemp() + "/scan.nc")
+    >>> print(fc.scenes.template("roughness", path, folder=path.parent).partition("[want]")[0])
+    title = "Roughness of scan.nc"
+    <BLANKLINE>
+    [surface]
+    read = "scan.nc"
+    <BLANKLINE>
+    <BLANKLINE>
+    """
+    options = {key: value for key, value in reading.items() if value is not None}
+    with Problems(WHERE) as problems:
+        problems.choice("question", question, QUESTIONS)
+        if problems.path("scan", scan):
+            problems.require(Path(scan).is_file(), "scan", "an existing file", Path(scan).name)
+        if question != "roughness":
+            problems.number("young", young, above=0)
+            problems.number("poisson", poisson, above=-1, at_most=0.5)
+        if question == "joint" and problems.path("upper", upper):
+            problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
+    facts = _facts(scan, options)
+    tables = [("surface", _file_table(scan, folder, options, facts["missing"] and question != "roughness"))]
+    if question == "joint":
+        tables.append(("upper", _file_table(str(upper), folder, options, facts["missing"])))
+    if question != "roughness":
+        tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
+    tables += {"roughness": _roughness, "contact": _contact, "joint": _joint}[question](facts, young, poisson)
+    text = [f"title = {json.dumps(f'{question.capitalize()} of {Path(scan).name}')}", ""]
+    for name, table in tables:
+        text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
+    return "\n".join(text)
+
+
+def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return spacing, extent, rms slope of a surface, and whether it has gaps."""
+    from fractalcontact import surfaces
+
+    surface = surfaces.read(scan, **options)
+    if "y" not in surface.dims:
+        message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
+        raise InvalidInput(WHERE, [message])
+    steps = [float(surface[dim][1] - surface[dim][0]) for dim in ("y", "x")]
+    extent = min(surface.sizes[dim] * step for dim, step in zip(("y", "x"), steps, strict=True))
+    statistics = surfaces.describe(surface)
+    return {
+        "spacing": max(steps),
+        "extent": extent,
+        "slope": float(statistics["rms_slope"]),
+        "missing": bool(surface.isnull().any()),
+    }
+
+
+def _file_table(
+    scan: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], fill: bool
+) -> dict[str, Any]:
+    """Return the table that reads a file."""
+    path = Path(os.path.relpath(Path(scan).resolve(), Path(folder).resolve())).as_posix()
+    return {"read": path, **options, **({"fill": True} if fill else {})}
+
+
+def _roughness(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:
+    want: dict[str, Any] = {"surfaces": ["height", "describe"], "dimensions": ["default", "variogram"]}
+    if facts["spacing"] <= JRC_LAG and facts["extent"] >= JRC_LENGTHS * JRC_LAG:
+        want["joints"] = ["roughness_coefficient", "directional_roughness"]
+    return [("want", want | {"figures": True})]
+
+
+def _contact(facts: Mapping[str, Any], young: Any, poisson: float) -> list[tuple[str, dict[str, Any]]]:
+    # a fraction of true contact needs about half of it times modulus and rms slope (Bush; Persson)
+    modulus = 0.5 * float(young) / (1.0 - poisson**2)
+    unit = 0.5 * modulus * max(facts["slope"], 1e-12)
+    loads = {"first": _rounded(LIGHT * unit), "last": _rounded(FULL * unit), "count": 8}
+    want = {
+        "surfaces": ["height", "describe"],
+        "contact": ["press"],
+        "domains": ["box_dimension", "islands"],
+        "keep": ["state"],
+        "figures": True,
+    }
+    return [("contact", {"nominal_pressure": loads}), ("want", want)]
+
+
+def _joint(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:
+    step = facts["spacing"]
+    block = step * math.floor(0.6 * facts["extent"] / step)
+    farthest = step * math.floor(0.15 * facts["extent"] / step)
+    shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]
+    joint = {"block": float(f"{block:.9g}"), "register": True, "shear": sorted(set(shears))}
+    loads = {"nominal_pressure": {"first": PRESSURES[0], "last": PRESSURES[1], "count": 6}}
+    dilatancy = {"direction": ["E", "N", "W", "S"]}
+    want = {
+        "surfaces": ["height", "describe"],
+        "joints": ["closure", "rigid_dilatancy", "transmissivity"],
+        "keep": ["state"],
+        "figures": True,
+    }
+    return [("joint", joint), ("joint.closure", loads), ("joint.rigid_dilatancy", dilatancy), ("want", want)]
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.9g}")
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_toml, value))}]"
+    return json.dumps(value)

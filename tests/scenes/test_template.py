@@ -1,0 +1,101 @@
+"""Scenes for usual questions: what they ask for, and the commands that run them."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.cli import main
+
+HURST = 0.7
+
+
+@pytest.fixture
+def scans(tmp_path, monkeypatch):
+    """Write two mated faces of 96 x 96 points, the upper one 0.1 mm above, and work in their folder."""
+    monkeypatch.chdir(tmp_path)
+    lower = fc.surfaces.fbm((96, 96), 2e-4, hurst=HURST, rms_increment=1e-5, rng=3)
+    fc.save(lower, tmp_path / "lower.nc")
+    fc.save(lower + 1e-4, tmp_path / "upper.nc")
+    return tmp_path
+
+
+def test_roughness_of_a_list_of_points(scans):
+    """The command reads points, and its result is that of the functions."""
+    lower = fc.open("lower.nc")
+    y, x = np.meshgrid(lower.y, lower.x, indexing="ij")
+    np.savetxt("scan.xyz", 1e3 * np.stack([x, y, lower.values], axis=-1).reshape(-1, 3), fmt="%.9f")
+    assert main(["roughness", "scan.xyz", "--units", "mm", "--quiet"]) == 0
+    tree = fc.open(scans / "scan_roughness" / "result.nc")
+    result = tree["dimensions"].to_dataset().sel({"method": "default"})
+    expected = fc.dimensions.estimate(fc.surfaces.read("scan.xyz", units="mm")).sel({"method": "default"})
+    assert float(result.hurst) == float(expected.hurst)
+    assert float(result.ci_low) < HURST < float(result.ci_high)
+    assert "roughness_coefficient" in tree["joints"].children
+    assert {"report.html", "surface.png"} <= {path.name for path in (scans / "scan_roughness").iterdir()}
+
+
+def test_printed_scene_is_the_one_that_runs(scans, capsys):
+    """`--scene` prints the scene and runs nothing; the scene beside the results has the same tables."""
+    words = ["contact", "lower.nc", "--young", "3e10", "--spacing", "2e-4"]
+    assert main([*words, "--scene"]) == 0
+    printed = tomllib.loads(capsys.readouterr().out)
+    assert not (scans / "lower_contact").exists()
+    assert printed["surface"] == {"read": "lower.nc", "spacing": 2e-4}
+    assert main([*words, "--quiet", "-o", "out"]) == 0
+    run = tomllib.loads((scans / "out" / "contact.toml").read_text())
+    assert run["surface"].pop("read") == "../lower.nc"
+    assert printed["surface"].pop("read") == "lower.nc"
+    assert run == printed
+    fractions = fc.open(scans / "out" / "result.nc")["contact"].to_dataset()["contact_fraction"]
+    assert float(fractions[0]) < 0.01
+    assert 0.05 < float(fractions[-1]) < 0.4
+
+
+def test_joint_of_two_faces(scans):
+    assert main(["joint", "lower.nc", "upper.nc", "--young", "3e10", "-o", "out", "--quiet"]) == 0
+    joints = fc.open(scans / "out" / "result.nc")["joints"]
+    assert {"closure", "rigid_dilatancy", "transmissivity"} <= set(joints.children)
+    # mated faces touch everywhere before they slide
+    assert float(joints["closure"]["contact_fraction"].isel(shear=0, step=-1)) > 0.9
+
+
+def test_scan_with_gaps_is_filled_where_it_is_pressed(scans):
+    gapped = fc.open("lower.nc")
+    fc.save(gapped.where((gapped.x > 1e-3) | (gapped.y > 1e-3)), "gaps.nc")
+    assert "fill" not in tomllib.loads(fc.scenes.template("roughness", "gaps.nc"))["surface"]
+    assert tomllib.loads(fc.scenes.template("contact", "gaps.nc", young=1e9))["surface"]["fill"] is True
+
+
+def test_coarse_surface_has_no_roughness_coefficient(scans):
+    lower = fc.open("lower.nc")
+    fc.save(fc.surfaces.from_array(1e5 * lower.values, 10.0), "land.nc")
+    assert "joints" not in tomllib.loads(fc.scenes.template("roughness", "land.nc"))["want"]
+
+
+def test_new_scene_is_valid_and_is_not_overwritten(scans, capsys):
+    assert main(["init"]) == 0
+    assert fc.scenes.validate("scene.toml").want.joints == ("closure", "rigid_dilatancy")
+    before = (scans / "scene.toml").read_bytes()
+    assert main(["init"]) == 2
+    assert "a new file" in capsys.readouterr().err
+    assert (scans / "scene.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "problem"),
+    [
+        (("colour", "lower.nc"), {}, "question"),
+        (("roughness", "nowhere.nc"), {}, "existing file"),
+        (("contact", "lower.nc"), {}, "young"),
+        (("contact", "lower.nc"), {"young": -1.0}, "young"),
+        (("joint", "lower.nc"), {"young": 1e9}, "upper"),
+        (("roughness", "profile.nc"), {}, "a profile"),
+    ],
+)
+def test_wrong_questions(scans, arguments, options, problem):
+    fc.save(fc.surfaces.fbm(64, 1e-4, hurst=0.5, rms_increment=1e-6, rng=1), "profile.nc")
+    with pytest.raises(InvalidInput, match=problem):
+        fc.scenes.template(*arguments, **options)
