@@ -78,7 +78,7 @@ def test_study_stopped_at_every_part_gives_the_same_bytes(uninterrupted, tmp_pat
     assert len(numbers) > 6
     assert set(numbers) == {number}
     assert {signum: signal.getsignal(signum) for signum in before} == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]
     assert variables(tmp_path / "result.nc") == expected
 
 
@@ -135,7 +135,7 @@ def test_killed_study_leaves_no_incomplete_file(uninterrupted, tmp_path, number)
     assert not (tmp_path / "result.nc").exists()
     tree = fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     assert "completeness" not in tree.attrs
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]
     assert variables(tmp_path / "result.nc") == uninterrupted[1]
 
 

@@ -76,7 +76,7 @@ def test_remote_workers_return_their_parts_and_a_stopped_ensemble_resumes(uninte
     fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False, client=again)
     assert set().union(*again.kept) == part_names
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]
 
 
 def test_lost_worker_is_reported_and_nothing_else_is_lost(uninterrupted, tmp_path):
@@ -149,7 +149,7 @@ def test_stopped_worker_processes_end_and_the_study_resumes(uninterrupted, tmp_p
     assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), message
     fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]
 
 
 def test_killed_worker_process_is_reported_and_the_study_resumes(uninterrupted, tmp_path):
@@ -191,4 +191,4 @@ def test_killed_worker_of_dask_changes_no_byte(uninterrupted, tmp_path, once_the
         killer.join(5)
     assert killed
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["result.nc"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]

@@ -60,7 +60,7 @@ def test_folder_of_another_run_is_refused(tmp_path):
     assert not list(out.iterdir())
     os.close(other)
     fc.scenes.run(scene, out=out, progress=False)
-    assert [path.name for path in out.iterdir()] == ["result.nc"]
+    assert sorted(path.name for path in out.iterdir()) == ["report.html", "result.nc"]
 
 
 def test_invalid_client_is_refused():
@@ -79,7 +79,7 @@ def test_command_reports_file_size_and_peak_memory(tmp_path):
     (tmp_path / "study.toml").write_text(SOUND.replace('"closure", ', ""), encoding="utf-8")
     last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-1]
     size = (tmp_path / "out" / "result.nc").stat().st_size
-    printed = re.search(r"result\.nc \((\S+) MB\); peak memory (\d+) MB", last)
+    printed = re.search(r"result\.nc \((\S+) MB\), report\.html; peak memory (\d+) MB", last)
     assert printed, last
     assert float(printed[1]) == pytest.approx(size / 1e6, rel=0.1)
     assert 50 < int(printed[2]) < 1000
