@@ -46,6 +46,7 @@ CALLS = {
     "dimensions.covering": {"surface": SURFACE},
     "dimensions.cube_counts": {"surface": SURFACE},
     "dimensions.roughness_length": {"surface": SURFACE},
+    "dimensions.waves": {"surface": SURFACE},
     "dimensions.estimate": {"surface": SURFACE, "methods": "variogram"},
     "contact.effective_modulus": {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
     "contact.flat_stiffness": {"shape": (8, 8), "spacing": 1e-4, "contact_modulus": 1e9},

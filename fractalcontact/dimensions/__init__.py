@@ -3,6 +3,7 @@
 estimate          Hurst exponent and fractal dimension with a 95 % interval
 methods           names of the methods of `estimate`, with one line each
 directions        exponent by direction, and tests of isotropy
+waves             single waves, such as marks of machining
 spectrum          power spectral density, averaged over directions
 variogram         half the mean square increment against the lag
 madogram          half the mean absolute increment against the lag

@@ -9,6 +9,7 @@ from ._variation import variation as variation
 from ._variogram import madogram as madogram
 from ._variogram import second_variogram as second_variogram
 from ._variogram import variogram as variogram
+from ._waves import waves as waves
 
 __all__ = [
     "covering",
@@ -22,4 +23,5 @@ __all__ = [
     "spectrum",
     "variation",
     "variogram",
+    "waves",
 ]

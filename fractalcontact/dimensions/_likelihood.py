@@ -19,6 +19,7 @@ from fractalcontact.dimensions._periodic_modes import PeriodicModes
 from fractalcontact.dimensions._quantisation import quantisation, quantisation_note
 from fractalcontact.dimensions._records import CONSTANT, SIGNIFICANT, Estimate, joined, plane, undefined
 from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._waves import without_waves
 from fractalcontact.dimensions._whittle import LEAST_MODES, WhittleFit, fit_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -44,11 +45,20 @@ _NEGATIVE_NOISE = (
 
 
 def likelihood(surface: Surface, scales: Scales, noise: bool) -> Estimate:
-    """Fit the periodic family where every axis is periodic, otherwise fractional Brownian heights."""
+    """Fit the periodic family where every axis is periodic, otherwise fractional Brownian heights.
+
+    Single waves are removed first.
+    """
     if surface.is_constant:
         return undefined(CONSTANT)
     if surface.is_plane:
         return plane()
+    surface, wave_note = without_waves(surface)
+    estimate = _fitted(surface, scales, noise)
+    return replace(estimate, note=joined(wave_note, estimate.note))
+
+
+def _fitted(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     if all(surface.grid.periodic) and surface.is_complete:
         return _periodic_surface(surface, scales, noise)
     if surface.finest_scale and scales is None:

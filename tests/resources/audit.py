@@ -101,7 +101,7 @@ class Requirement:
 
 _SOLVER = Requirement((FFT, "scipy.special"), ("contact solver",))
 _SUMS = Requirement((FFT,), ("increment sums",))
-_EXACT = Requirement((FFT, "scipy.special"), ("increment sums",))
+_EXACT = Requirement((FFT, "scipy.ndimage", "scipy.special"), ("increment sums",))
 _LABELS = ("scipy.ndimage", "scipy.special")
 _SPECIAL = ("scipy.special",)
 

@@ -1,0 +1,166 @@
+"""Single waves: found, named and removed; false alarms on surfaces without them; marks in `estimate`."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+
+SPACING = 1e-5
+STEP = 1e-7
+
+
+def brownian(shape, hurst, seed):
+    return fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=STEP, rng=seed)
+
+
+def marks(surface, azimuth, wavelength, amplitude, phase=0.7):
+    """Return a cosine; azimuth in degrees, wavelength in spacings, amplitude in rms increments."""
+    angle = np.radians(azimuth)
+    along = surface.x * np.cos(angle) + (surface.y * np.sin(angle) if "y" in surface.dims else 0.0)
+    phases = (0.0 * surface + along).values * (2 * np.pi / (wavelength * SPACING))
+    return amplitude * STEP * np.cos(phases + phase)
+
+
+@pytest.mark.parametrize(("azimuth", "wavelength"), [(30.0, 6.3), (90.0, 5.0), (151.0, 9.1), (0.0, 3.2)])
+@pytest.mark.parametrize("shape", [(128, 128), (100, 150)])
+def test_wave_is_named(azimuth, wavelength, shape):
+    surface = brownian(shape, 0.5, 1)
+    result = fc.dimensions.waves(surface + marks(surface, azimuth, wavelength, 2.0))
+    assert result.sizes["wave"] == 1
+    assert float(result.wavelength[0]) == pytest.approx(wavelength * SPACING, rel=5e-3)
+    turned = (float(result.wave_azimuth[0]) - azimuth + 90.0) % 180.0 - 90.0
+    assert abs(turned) < 0.5
+    assert float(result.wave_amplitude[0]) == pytest.approx(2.0 * STEP, rel=0.1)
+    assert float(result.wave_p_value[0]) < 1e-6
+
+
+def test_pure_waves_are_exact():
+    surface = 0.0 * brownian((96, 128), 0.5, 1)
+    noise = 1e-2 * STEP * np.random.default_rng(1).standard_normal(surface.shape)
+    both = surface + noise + marks(surface, 20.0, 7.3, 3.0) + marks(surface, 110.0, 4.4, 1.0)
+    result = fc.dimensions.waves(both)
+    assert result.wave.values.tolist() == [0, 1]
+    assert result.wavelength.values / SPACING == pytest.approx([7.3, 4.4], rel=1e-4)
+    assert result.wave_azimuth.values == pytest.approx([20.0, 110.0], abs=0.02)
+    assert result.wave_amplitude.values / STEP == pytest.approx([3.0, 1.0], rel=1e-3)
+
+
+def test_periodic_surface_and_profile():
+    surface = fc.surfaces.spectral((96, 96), SPACING, hurst=0.7, rms_height=STEP, rng=2)
+    assert fc.dimensions.waves(surface).sizes["wave"] == 0
+    amplitude = 0.3
+    result = fc.dimensions.waves(surface + marks(surface, 0.0, 8.0, amplitude))
+    assert float(result.wavelength[0]) == pytest.approx(8.0 * SPACING, rel=1e-12)
+    assert float(result.wave_amplitude[0]) == pytest.approx(amplitude * STEP, rel=0.1)
+    profile = brownian((1024,), 0.3, 3)
+    result = fc.dimensions.waves(profile + marks(profile, 0.0, 11.0, 2.0))
+    assert float(result.wavelength[0]) == pytest.approx(11.0 * SPACING, rel=1e-3)
+    assert float(result.wave_azimuth[0]) == 0.0
+
+
+def blurred(seed):
+    return gaussian_filter(brownian((128, 128), 0.5, seed).values, 2.5)
+
+
+def anisotropic(seed):
+    return fc.surfaces.spectral(
+        (160, 160), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=4.0, azimuth=30.0, rng=seed
+    ).values[:128, :128]
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        pytest.param(lambda seed: brownian((128, 128), 0.2, seed).values, id="rough"),
+        pytest.param(lambda seed: brownian((128, 128), 0.9, seed).values, id="smooth"),
+        pytest.param(blurred, id="blurred"),
+        pytest.param(anisotropic, id="lay"),
+        pytest.param(lambda seed: np.round(brownian((96, 96), 0.5, seed) / STEP).values, id="rounded"),
+        pytest.param(lambda seed: brownian((2048,), 0.4, seed).values, id="profile"),
+    ],
+)
+def test_no_wave_where_there_is_none(heights):
+    for seed in range(6):
+        assert fc.dimensions.waves(fc.surfaces.from_array(heights(seed), SPACING)).sizes["wave"] == 0
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0])
+def test_band_limited_surface_has_no_wave(ratio):
+    for seed in range(6):
+        surface = fc.surfaces.spectral(
+            (128, 128), SPACING, hurst=0.7, rms_height=STEP, rolloff=30 * SPACING, short_cutoff=5 * SPACING,
+            anisotropy_ratio=ratio, azimuth=30.0, rng=seed,
+        )  # fmt: skip
+        assert fc.dimensions.waves(surface).sizes["wave"] == 0
+
+
+def test_invariances():
+    surface = brownian((96, 128), 0.6, 4)
+    marked = surface + marks(surface, 40.0, 6.0, 1.0)
+    first = fc.dimensions.waves(marked)
+    scaled = fc.dimensions.waves(fc.surfaces.from_array(2.0**20 * marked.values + 1.0, 2.0**10 * SPACING))
+    assert scaled.wavelength.values == pytest.approx(2.0**10 * first.wavelength.values, rel=1e-9)
+    assert scaled.wave_amplitude.values == pytest.approx(2.0**20 * first.wave_amplitude.values, rel=1e-9)
+    turned = fc.dimensions.waves(fc.surfaces.from_array(marked.values.T, SPACING))
+    assert float(turned.wave_azimuth[0]) == pytest.approx(90.0 - float(first.wave_azimuth[0]), abs=1e-3)
+
+
+def test_stack_is_padded():
+    surface = brownian((96, 96), 0.5, 5)
+    stack = fc.dimensions.waves(
+        fc.surfaces.from_array(
+            np.stack([surface.values, (surface + marks(surface, 30.0, 5.0, 2.0)).values]), SPACING
+        )
+    )
+    assert stack.wavelength.dims[-1] == "wave"
+    assert np.isnan(stack.wavelength.values[0]).all()
+    assert np.isfinite(stack.wavelength.values[1]).all()
+
+
+def test_gaps_are_refused():
+    surface = brownian((32, 32), 0.5, 6)
+    surface[3, 3] = np.nan
+    with pytest.raises(InvalidInput, match="surface"):
+        fc.dimensions.waves(surface)
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 10.0])
+def test_marks_do_not_change_the_estimate(amplitude):
+    for seed in range(3):
+        surface = brownian((128, 128), 0.7, 10 + seed)
+        alone = fc.dimensions.estimate(surface)
+        marked = fc.dimensions.estimate(surface + marks(surface, 25.0 + 20 * seed, 7.0, amplitude))
+        assert float(marked.hurst[0]) == pytest.approx(float(alone.hurst[0]), abs=0.006)
+        width = [float(each.ci_high[0] - each.ci_low[0]) for each in (marked, alone)]
+        assert width[0] == pytest.approx(width[1], rel=0.1)
+        assert "a single wave removed: " in marked.hurst.attrs["comment"]
+        assert "removed" not in alone.hurst.attrs["comment"]
+
+
+def test_marks_on_profiles_and_periodic_surfaces():
+    profile = brownian((2048,), 0.5, 20)
+    marked = fc.dimensions.estimate(profile + marks(profile, 0.0, 9.0, 5.0))
+    assert float(marked.hurst[0]) == pytest.approx(float(fc.dimensions.estimate(profile).hurst[0]), abs=0.02)
+    surface = fc.surfaces.spectral((128, 128), SPACING, hurst=0.7, rms_height=STEP, rng=21)
+    marked = fc.dimensions.estimate(surface + marks(surface, 0.0, 8.0, 1.0))
+    assert float(marked.hurst[0]) == pytest.approx(float(fc.dimensions.estimate(surface).hurst[0]), abs=0.01)
+
+
+def test_sum_of_waves_is_left_alone():
+    surface = fc.surfaces.weierstrass((1024,), SPACING, hurst=0.5, rms_height=STEP)
+    assert "removed" not in fc.dimensions.estimate(surface).hurst.attrs["comment"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_coverage_with_marks(hurst):
+    rng = np.random.default_rng(7)
+    inside = []
+    for seed in range(200):
+        surface = brownian((128, 128), hurst, 1000 + seed)
+        wave = marks(surface, rng.uniform(5, 85), rng.uniform(4, 12), 10 ** rng.uniform(-1, 0.5))
+        result = fc.dimensions.estimate(surface + wave)
+        inside.append(float(result.ci_low[0]) <= hurst <= float(result.ci_high[0]))
+    assert np.mean(inside) >= 0.9
