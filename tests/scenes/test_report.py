@@ -17,11 +17,6 @@ ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
 )
 
 
-@pytest.fixture(autouse=True)
-def wide_screen(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-
-
 @pytest.fixture(scope="module")
 def ensemble(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ensemble")
