@@ -188,14 +188,16 @@ def _init(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from fractalcontact import scenes
     from fractalcontact.base.output_folder import RESULT
+    from fractalcontact.base.threads import most_workers
+    from fractalcontact.base.validation import Problems
 
     if options.plan:
         print(scenes.plan(scenes.validate(options.scene)))
         return 0
     if options.out is None:
         raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
-    if options.workers < 0:
-        raise InvalidInput("fractalcontact run", [f"--workers: expected at least 0, got {options.workers}"])
+    with Problems("fractalcontact run") as problems:
+        problems.integer("--workers", options.workers, at_least=0, at_most=most_workers())
     tree = scenes.run(options.scene, out=options.out, progress=not options.quiet, workers=options.workers)
     if not options.quiet:
         print(scenes.summary(tree))

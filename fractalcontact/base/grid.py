@@ -195,7 +195,16 @@ def surface_faults(
                 yield f"{argument}.{dim}", f"at least {smallest} points", surface.sizes[dim]
 
 
+def distinct(values: Array) -> Array:
+    """Return a view of an array without the repetitions along its broadcast axes, to check all its values.
+
+    The flat surface that stands for a large one while a scene is validated is one such value.
+    """
+    return values[tuple(slice(0, 1) if stride == 0 else slice(None) for stride in values.strides)]
+
+
 def _missing_faults(heights: Array, argument: str) -> Iterator[Fault]:
+    heights = distinct(heights)
     missing = heights.size - int(np.count_nonzero(np.isfinite(heights)))
     if missing:
         expected = "finite values (see fractalcontact.surfaces.fill)"
@@ -206,6 +215,7 @@ def _size_faults(heights: Array, argument: str, decades: int) -> Iterator[Fault]
     """Yield finite heights, or a range of them, whose powers float64 cannot represent."""
     if heights.size == 0:
         return
+    heights = distinct(heights)
     low, high = float(heights.min()), float(heights.max())
     if not (np.isfinite(low) and np.isfinite(high)):
         observed = heights[np.isfinite(heights)]

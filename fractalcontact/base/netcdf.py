@@ -25,11 +25,14 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.packing import require_unpacked, unpacked_limit
 from fractalcontact.base.schema import CONVENTIONS, encoded
 from fractalcontact.base.validation import Problems
 
+SAVE = "fractalcontact.save"
 PARTIAL = ".partial"
 LONGEST_NAME = 255  # bytes, of a variable, a dim or an attribute
+RATIO = 250  # size in memory over that of a large file; contact maps are packed to a hundredth
 FULL_DISK = 1 << 16  # bytes: a disk with less free space counts as full
 _TYPE = "fractalcontact_kind"
 _GLOBAL = ("Conventions", "title", "institution", "source", "history", "references", "comment", "provenance")
@@ -67,7 +70,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     ('surface.nc', True)
     """
     target = Path(path)
-    where = "fractalcontact.save"
+    where = SAVE
     if target.suffix != ".nc":
         raise InvalidInput(where, [f"path: expected a name that ends in '.nc', got {target.name!r}"])
     if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
@@ -91,6 +94,23 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     finally:
         temporary.unlink(missing_ok=True) if target.parent.is_dir() else None
     return target
+
+
+def replace_attribute(path: Path, name: str, value: str) -> None:
+    """Replace a global attribute of a file, in a copy that takes its place when it is complete."""
+    import netCDF4
+
+    copy = unfinished(path)
+    try:
+        shutil.copyfile(path, copy)
+        with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
+            file.setncattr(name, value)
+        copy.replace(path)
+    except (OSError, RuntimeError) as error:
+        reason = _failure_reason(path.parent, error)
+        raise InvalidInput(SAVE, [f"path: {path.name!r} cannot be written here: {reason}"]) from error
+    finally:
+        copy.unlink(missing_ok=True)
 
 
 def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
@@ -139,6 +159,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
             raise InvalidInput(where, [f"chunks: expected {expected}, got {chunks!r}"])
     try:
         tree = xr.DataTree.from_dict(_read(source) if chunks is None else _opened(source, chunks))
+    except UnreadableFile:
+        raise
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
     for node in tree.subtree:
@@ -217,11 +239,13 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
 
     groups = {}
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
-        for name in _group_names(file):
-            store = NetCDF4DataStore(file, group=name, lock=False)  # type: ignore[no-untyped-call]
-            dataset = xr.open_dataset(store).load()
-            dataset.set_close(None)
-            groups[name] = dataset
+        unpacked = sum(_unpacked_size(group) for group in _groups(file))
+        limit = unpacked_limit(path.stat().st_size, RATIO)
+        require_unpacked("fractalcontact.open", path.name, unpacked, limit)
+        for group in _groups(file):
+            store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
+            groups[group.path] = xr.open_dataset(store).load()
+            groups[group.path].set_close(None)
     return groups
 
 
@@ -231,7 +255,7 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
     from xarray.backends import NetCDF4DataStore
 
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
-        names = list(_group_names(file))
+        names = [group.path for group in _groups(file)]
     groups = {}
     for name in names:
         store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
@@ -255,11 +279,19 @@ def _are_sizes(chunks: object) -> bool:
     )
 
 
-def _group_names(group: Any) -> Iterator[str]:
-    """Yield the path of a group of a NetCDF file and of all groups in it."""
-    yield group.path
+def _unpacked_size(group: Any) -> int:
+    """Return the bytes of the arrays of one group of a NetCDF file in memory."""
+    return sum(
+        int(np.prod(variable.shape, dtype=object)) * getattr(variable.dtype, "itemsize", 1)
+        for variable in group.variables.values()
+    )
+
+
+def _groups(group: Any) -> Iterator[Any]:
+    """Yield a group of a NetCDF file and all groups in it."""
+    yield group
     for child in group.groups.values():
-        yield from _group_names(child)
+        yield from _groups(child)
 
 
 def _failure_reason(folder: Path, error: Exception) -> str:

@@ -50,6 +50,11 @@ def _available_processors() -> int:
     return os.cpu_count() or 1
 
 
+def most_workers() -> int:
+    """Return the largest number of processes that a study may be shared between."""
+    return max(8, 4 * (os.cpu_count() or 1))
+
+
 @contextmanager
 def limit(threads: int) -> Iterator[None]:
     """Use this number of threads inside the block."""

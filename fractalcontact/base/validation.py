@@ -219,7 +219,9 @@ class Problems:
 
     def finite(self, argument: str, array: xr.DataArray | np.ndarray, *, remedy: str = "") -> bool:
         """Check that all values are finite; otherwise report how many are not."""
-        values = np.asarray(array)
+        from fractalcontact.base.grid import distinct  # loads xarray
+
+        values = distinct(np.asarray(array))
         missing = values.size - int(np.count_nonzero(np.isfinite(values)))
         expected = "finite values" + (f" ({remedy})" if remedy else "")
         return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import UNIFORM, Grid, read_grid
+from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
 from fractalcontact.base.provenance import plain
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._compass import (
@@ -230,7 +230,7 @@ def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
 
 def _check_heights(problems: Problems, argument: str, face: xr.DataArray, layout: Block) -> None:
     values = np.asarray(face.values, dtype=np.float64)
-    infinite = int(np.count_nonzero(np.isinf(values)))
+    infinite = int(np.count_nonzero(np.isinf(distinct(values))))
     problems.require(infinite == 0, argument, "no infinite heights", f"{infinite} of them")
     problems.finite(f"{argument} inside the block", values[layout.slices], remedy=FILL)
 

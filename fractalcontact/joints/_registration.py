@@ -390,9 +390,9 @@ def _tile_numbers(shape: tuple[int, ...]) -> Array:
 
 
 def _has_full_rank(matrix: Array) -> bool:
-    """Return whether every parameter changes the match."""
+    """Return whether every parameter changes the match; the first two are the shifts."""
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
-    if not (scale > 0).all():
+    if not (scale > 0).all() or scale[:2].min() < RANK * scale[:2].max():  # relief along one axis alone
         return False
     return bool(np.linalg.svd(matrix / np.outer(scale, scale), compute_uv=False)[-1] > RANK)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.errors import ScaleWarning
+from fractalcontact.base.grid import distinct
 from fractalcontact.scenes._inputs import contact_options, spacing_of
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import STAGES
@@ -27,11 +28,19 @@ def warn(messages: Iterable[str]) -> None:
         warnings.warn(message, ScaleWarning, stacklevel=3)
 
 
+def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> float:
+    squares = [
+        np.nanmean((np.diff(heights, axis=axis) / spacing[axis]) ** 2)
+        for axis in (0, 1)
+        if heights.shape[axis] > 1
+    ]
+    return float(np.sqrt(np.sum(squares)))
+
+
 def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     """Yield the implausible values of a scene and its surface."""
     spacing = spacing_of(surface)
-    squares = [np.nanmean((np.diff(surface.values, axis=axis) / spacing[axis]) ** 2) for axis in (0, 1)]
-    slope = float(np.sqrt(np.sum(squares)))
+    slope = _rms_slope(distinct(surface.values), spacing)
     if slope > LARGEST_SLOPE:
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
     edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]

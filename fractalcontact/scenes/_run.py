@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf, provenance, schema, signals
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, output_folder
 from fractalcontact.base.references import PAPER, joined_references
+from fractalcontact.base.threads import most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._caveats import MEMBER, caveats
@@ -53,9 +56,9 @@ def run(
     progress : bool, default True
         Show a bar for stages of several parts.
     workers : int, default 0
-        Share the study between so many processes on this machine; 0 for none. An ensemble is shared by
-        members, any other study by the parts of a stage. A script needs an ``if __name__ == "__main__"``
-        guard for it.
+        Share the study between so many processes on this machine; 0 for none, at most 4 for each processor.
+        An ensemble is shared by members, any other study by the parts of a stage. A script needs an
+        ``if __name__ == "__main__"`` guard for it.
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
         is set on the worker. Workers need no access to `out`; a scene that reads files needs them there.
@@ -115,23 +118,26 @@ def _run(
             raise signals.Stopped(
                 stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
             )
-        figures = []
-        if scene.want.figures:
-            figures = _draw(tree, folder, progress, paper=scene.paper)
-            _note_run_time(tree, start)
+        # before figures and report: a disk that fills, or a kill, while they are made loses nothing
         netcdf.save(tree, folder / RESULT)
-        report(tree, folder / REPORT, figures=figures)
-        if scene.want.datasheet:
-            tables(tree, folder / TABLES)
-            _draw_datasheet(tree, folder / DATASHEET)
         (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+        with _beside_the_result():
+            figures = []
+            if scene.want.figures:
+                figures = _draw(tree, folder, progress, paper=scene.paper)
+                _note_run_time(tree, start)
+                netcdf.replace_attribute(folder / RESULT, "provenance", tree.attrs["provenance"])
+            report(tree, folder / REPORT, figures=figures)
+            if scene.want.datasheet:
+                tables(tree, folder / TABLES)
+                _draw_datasheet(tree, folder / DATASHEET)
         store.clear()
     return tree
 
 
 def _check_workers(workers: int, client: Any) -> None:
     with Problems("fractalcontact.scenes.run") as problems:
-        if problems.integer("workers", workers, at_least=0) and workers:
+        if problems.integer("workers", workers, at_least=0, at_most=most_workers()) and workers:
             problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)
 
@@ -221,6 +227,19 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     temporary = netcdf.unfinished(target)
     page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
     temporary.replace(target)
+
+
+@contextmanager
+def _beside_the_result() -> Iterator[None]:
+    """Report an error of the file system in the block, in words that say what is complete."""
+    try:
+        yield
+    except OSError as error:
+        expected = f"figures and a report beside {RESULT}, which is complete; the same run makes them"
+        reason = error.strerror or str(error)
+        raise InvalidInput(
+            "fractalcontact.scenes.run", [f"out: expected {expected}, got: {reason}"]
+        ) from error
 
 
 def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> list[Path]:

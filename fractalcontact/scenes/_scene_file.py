@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import fields
@@ -32,6 +33,10 @@ SETTINGS = ("title", "paper", "error", "budget")
 TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
 LONGEST_RANGE = 1_000_000
+LARGEST_FILE = 1 << 20  # bytes
+LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
+NOT_IN_KEYS = re.compile(r"[^\w\s.\"'-]")
+KEY_PART = re.compile(r"[\w\"']\s*\.")
 COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
 
 # bounds of the arguments that several stages share: one number, or one or several
@@ -91,8 +96,11 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
         problems.path("path", path)
     source = _find(Path(path))
     try:
-        tables = tomllib.loads(source.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        tables = tomllib.loads(_text(source))
+    except RecursionError:
+        reason = "not a TOML file: lists or tables are nested too deeply"
+        raise UnreadableFile(f"scene {source.name}", [reason]) from None
+    except ValueError as error:  # not TOML or not UTF-8, too large, or a number of more than 4300 digits
         raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
     problems = Problems(f"scene {source.stem}")
     tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
@@ -101,6 +109,20 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
     if not problems.messages:
         check_loads(scene, problems)
     return scene, problems
+
+
+def _text(source: Path) -> str:
+    """Return the text of a scene; refuse one that takes the parser minutes or gigabytes."""
+    with source.open("rb") as file:
+        content = file.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise ValueError(f"expected at most {LARGEST_FILE >> 10} KiB, got more")
+    text = content.decode("utf-8-sig").replace("\r\n", "\n")
+    for number, line in enumerate(text.splitlines(), 1):
+        words = NOT_IN_KEYS.split("" if line.lstrip().startswith("#") else line)
+        if max(len(KEY_PART.findall(word)) for word in words) > LONGEST_KEY:
+            raise ValueError(f"expected a key of at most {LONGEST_KEY} parts, got more in line {number}")
+    return text
 
 
 def _find(path: Path) -> Path:

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._inputs import (
     PRESSING,
@@ -111,9 +114,16 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
     shape = shape if isinstance(shape, list) else [shape] * 2
     if math.prod(shape) < LARGE:
         return None
-    from fractalcontact import surfaces
+    return _zeros(shape, np.broadcast_to(table.options["spacing"], 2).tolist())
 
-    return surfaces.from_array(np.zeros(shape), table.options["spacing"])
+
+def _zeros(
+    shape: Sequence[int], spacing: Sequence[float], periodic: Sequence[bool] = (False, False)
+) -> xr.DataArray:
+    """Return a surface of zeros that is one number in memory, whatever its size."""
+    coords = plane_coords(shape, spacing, periodic)
+    zeros = xr.DataArray(np.broadcast_to(0.0, shape), dims=("y", "x"), coords=coords, name="height")
+    return label(zeros)
 
 
 def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
@@ -168,10 +178,9 @@ def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: P
             elif stage.name == PARTIAL_SLIP and not is_flat:
                 _validate_call(stage.row.function, surface, keep=stage.keep, **slip_options(scene))
             elif stage.reads_map:
-                reader, maps = map_reader(stage, scene), _zero_maps(scene, surface)
-                _validate_call(
-                    reader.function, maps if reader.variable == "gap" else maps > 0, **reader.options
-                )
+                reader = map_reader(stage, scene)
+                maps = _empty_maps(scene, surface, float if reader.variable == "gap" else bool)
+                _validate_call(reader.function, maps, **reader.options)
             elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
                 if not stage.row.takes_surface and (scene.joint.register or (is_flat and name in PRESSING)):
                     continue
@@ -189,13 +198,12 @@ def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
     public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 
 
-def _zero_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
+def _empty_maps(scene: Scene, surface: xr.DataArray, dtype: type) -> xr.DataArray:
     """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
-    from fractalcontact import surfaces
-
     is_surface = scene.is_pressed or scene.joint.block is None
     spacing = spacing_of(surface)
     edges = np.broadcast_to(0.0 if is_surface else scene.joint.block, 2)
     cells = surface.shape if is_surface else tuple(np.rint(edges / spacing).astype(int).tolist())
     periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
-    return surfaces.from_array(np.zeros(cells), spacing, periodic=periodic).expand_dims(step=2)
+    maps = _zeros(cells, spacing, periodic)
+    return maps.copy(data=np.broadcast_to(dtype(0), cells)).expand_dims(step=2)

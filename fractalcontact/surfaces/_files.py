@@ -6,6 +6,7 @@ import gzip
 import io
 import math
 import re
+import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +15,13 @@ from typing import IO, Any
 import numpy as np
 
 from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.packing import require_unpacked, unpacked_limit
 
 Array = np.ndarray[Any, np.dtype[Any]]
-LEAST_UNPACKED = 1 << 26  # bytes to which any gzip file may unpack
-MOST_RATIO = 200  # of the unpacked size over that of the gzip file; text and heights reach 10
+WHERE = "fractalcontact.surfaces.read"
+RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
+_BLOCK = 1 << 22  # bytes
+HEADER = 200  # lines; no format has a longer header
 COMMENTS = ("//", "%")
 DECIMAL = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 HEADED = re.compile(r"(?P<name>[^\s\[(][^\[(\s]*(?: [^\[(\s]+)*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?(?=\s|$)")
@@ -34,21 +38,60 @@ def open_bytes(path: Path) -> IO[bytes]:
     """Open a file for reading bytes; a gzip file is decompressed in memory, up to a multiple of its size."""
     if path.suffix.lower() != ".gz":
         return path.open("rb")
-    most = max(LEAST_UNPACKED, MOST_RATIO * path.stat().st_size)
+    limit = unpacked_limit(path.stat().st_size, RATIO)
+    content = io.BytesIO()
     try:
         with gzip.open(path) as file:
-            content = file.read(most + 1)
+            while content.tell() <= limit and (block := file.read(_BLOCK)):
+                content.write(block)
     except (OSError, EOFError, zlib.error) as error:
-        message = f"path: {path.name!r} is corrupt ({error})"
-        raise UnreadableFile("fractalcontact.surfaces.read", [message]) from error
-    if len(content) > most:
-        message = f"path: {path.name!r} unpacks to more than {MOST_RATIO} times its size: unpack it first"
-        raise UnreadableFile("fractalcontact.surfaces.read", [message])
-    return io.BytesIO(content)
+        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
+    require_unpacked(WHERE, path.name, content.tell(), limit)
+    content.seek(0)
+    return content
+
+
+def check_unpacked(name: str, file: IO[bytes]) -> None:
+    """Refuse an archive (zip: npz, x3p), HDF5 or MATLAB file that unpacks to far more than its size."""
+    head = file.read(8)
+    limit, unpacked = unpacked_limit(file.seek(0, io.SEEK_END), RATIO), 0
+    file.seek(0)
+    try:
+        if head.startswith(b"PK"):
+            with zipfile.ZipFile(file) as archive:
+                unpacked = sum(entry.file_size for entry in archive.infolist())
+        elif head == b"\x89HDF\r\n\x1a\n":
+            unpacked = _hdf5_size(file)
+        elif head.startswith(b"MATLAB"):
+            from scipy.io import whosmat
+
+            unpacked = sum(8 * math.prod(shape) for _, shape, _ in whosmat(file))
+    except Exception as error:
+        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
+    file.seek(0)
+    require_unpacked(WHERE, name, unpacked, limit)
+
+
+def _hdf5_size(file: IO[bytes]) -> int:
+    """Return the sum of the sizes of all arrays in an HDF5 file."""
+    import h5py  # comes with SurfaceTopography
+
+    sizes = [0]
+    with h5py.File(file) as content:
+        content.visititems(lambda _, node: sizes.append(int(getattr(node, "nbytes", 0))))
+    return sum(sizes)
 
 
 class NotATable(ValueError):
-    """A text is not a table of numbers; the message names the line and the column."""
+    """A text is not a table of numbers; the message names the line and the column.
+
+    `is_damaged` if the wrong line is not in a header: it is no list of points after a header either.
+    """
+
+    def __init__(self, message: str, line: int = 0) -> None:
+        super().__init__(message)
+        self.line = line
+        self.is_damaged = False
 
 
 class EmptyTable(NotATable):
@@ -101,7 +144,7 @@ def read_table(path: Path) -> Table:
     if len(lines) > 1 and lines[0][1].isdigit() and int(lines[0][1]) == len(lines) - 1:
         lines = lines[1:]
     first = lines[0][1]
-    delimiter = next((mark for mark in ";\t," if mark in first), None)
+    delimiter = _delimiter(first)
     is_named = len(lines) > 1 and _has_no_number(first.split(delimiter))
     rows = lines[1:] if is_named else lines
     comma = _has_decimal_comma(rows[0][1])
@@ -113,7 +156,11 @@ def read_table(path: Path) -> Table:
         contents = [content for _, content in rows]
         values = np.loadtxt(contents, delimiter=delimiter, ndmin=2, comments=None)
     except ValueError:
-        values = _parsed([(number, content.split(delimiter)) for number, content in rows], delimiter)
+        try:
+            values = _parsed(rows, delimiter)
+        except NotATable as error:
+            error.is_damaged = _is_damaged(rows)
+            raise
     names, units = _header(first if is_named else comment, delimiter, values.shape[1])
     return Table(values, names, units, is_named, comma)
 
@@ -165,14 +212,39 @@ def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, 
     return tuple(match["name"].strip() for match in found), tuple(match["unit"] or "" for match in found)
 
 
-def _parsed(rows: list[tuple[int, list[str]]], delimiter: str | None) -> Array:
+def _is_damaged(lines: list[tuple[int, str]]) -> bool:
+    """Return whether lines that are no table are no list of points either, after a header of any length."""
+    header = next((k for k, (_, line) in enumerate(lines[:HEADER]) if _has_numbers(line)), HEADER)
+    if header in (0, HEADER):
+        return header == 0
+    try:
+        _parsed(lines[header:], _delimiter(lines[header][1]))
+    except NotATable as beyond:
+        return beyond.line > lines[header][0] + HEADER
+    return False
+
+
+def _has_numbers(line: str) -> bool:
+    """Return whether a line has nothing else than numbers."""
+    try:
+        return bool([_number(cell, 0, 0) for cell in line.split(_delimiter(line))])
+    except NotATable:
+        return False
+
+
+def _delimiter(line: str) -> str | None:
+    return next((mark for mark in ";\t," if mark in line), None)
+
+
+def _parsed(lines: list[tuple[int, str]], delimiter: str | None) -> Array:
     """Convert the cells one by one, to name the place of a wrong one."""
+    rows = [(number, content.split(delimiter)) for number, content in lines]
     if delimiter and all(len(cells) > 1 and not cells[-1].strip() for _, cells in rows):
         rows = [(number, cells[:-1]) for number, cells in rows]
     (first, head), values = rows[0], []
     for number, cells in rows:
         if len(cells) != len(head):
-            raise NotATable(f"line {number} has {len(cells)} values, line {first} has {len(head)}")
+            raise NotATable(f"line {number} has {len(cells)} values, line {first} has {len(head)}", number)
         values.append([_number(cell, number, column) for column, cell in enumerate(cells, 1)])
     return np.array(values)
 
@@ -185,7 +257,8 @@ def _number(cell: str, line: int, column: int) -> float:
         return float(word.replace("_", "?"))
     except ValueError:
         hint = ", a decimal comma" if "," in word else ""
-        raise NotATable(f"line {line}, column {column}: expected a number, got {word[:40]!r}{hint}") from None
+        fault = f"line {line}, column {column}: expected a number, got {word[:40]!r}{hint}"
+        raise NotATable(fault, line) from None
 
 
 def read_npy(path: Path) -> Array:

@@ -17,7 +17,7 @@ from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._files import file_suffix, open_bytes
+from fractalcontact.surfaces._files import check_unpacked, file_suffix, open_bytes
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
@@ -25,6 +25,7 @@ PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
 # formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map
 FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "xyz")
+POINTS = "xyz"
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
 
@@ -56,7 +57,11 @@ class Reading:
 
 
 def read_instrument(
-    path: Path, channel: str | int | None, units: str | None, spacing: Sequence[float] | None
+    path: Path,
+    channel: str | int | None,
+    units: str | None,
+    spacing: Sequence[float] | None,
+    try_points: bool = True,
 ) -> Reading:
     """Read one channel of an instrument's file.
 
@@ -70,6 +75,8 @@ def read_instrument(
         Unit of the heights, for a file that states none (or a wrong one).
     spacing : sequence of float or None
         (y, x) in metres, or one of them for both, for a file that states none (or a wrong one).
+    try_points : bool
+        False if the file is no list of points: its reader takes minutes to find that out.
 
     Raises
     ------
@@ -82,9 +89,10 @@ def read_instrument(
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
     # some of the readers open NetCDF files, and filters of warnings are shared by all threads
     with NETCDF_LOCK, _quiet() as messages, open_bytes(path) as file:
+        check_unpacked(path.name, file)
         other_unit = _other_unit(file.read(4096))
         file.seek(0)
-        reader = _open(file, path)
+        reader = _open(file, path, try_points)
         chosen = _channel(reader, channel, path.name)
         size, unit, lateral = _stated(chosen, other_unit, units)
         with Problems(WHERE, UnreadableFile) as problems:
@@ -114,14 +122,32 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
         yield messages
 
 
-def _open(file: Any, path: Path) -> Any:
+def _open(file: Any, path: Path, try_points: bool) -> Any:
     """Return the library's reader of an open file."""
     from SurfaceTopography.IO import open_topography
 
     try:
-        return open_topography(file)
+        return open_topography(file) if try_points else _open_without_points(file)
     except Exception as error:
         raise UnreadableFile(WHERE, [_reason(str(error), path)]) from error
+
+
+def _open_without_points(file: Any) -> Any:
+    """Return what `open_topography` does, without a try of the reader of lists of points."""
+    from SurfaceTopography.IO import open_topography, readers
+    from SurfaceTopography.IO.Reader import MagicMatch
+
+    faults, head = [], file.read(4096)
+    file.seek(0)
+    for reader in readers:
+        if reader.format() == POINTS or reader.can_read(head) == MagicMatch.NO:
+            continue
+        try:
+            return open_topography(file, format=reader.format())
+        except Exception as error:
+            faults.append(f"tried {reader.__name__}: \n {error}\n\n")
+            file.seek(0)
+    raise ValueError("".join(faults))
 
 
 def _reason(text: str, path: Path) -> str:

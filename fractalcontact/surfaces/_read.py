@@ -252,12 +252,13 @@ def _text_content(
         table = read_table(path)
     except NotATable as error:
         if columns is None and spacing is None and file_suffix(path) not in ALWAYS_POINTS:
-            return _instrument_content(path, channel, units, spacing, first_row)
-        if not isinstance(error, EmptyTable):
+            points = not error.is_damaged
+            return _instrument_content(path, channel, units, spacing, first_row, try_points=points)
+        if not isinstance(error, EmptyTable) and not error.is_damaged:
             with contextlib.suppress(UnreadableFile, MissingExtra):
-                content = _instrument_content(path, channel, units, spacing, first_row)
                 # a list of points has a size too, whatever its lines are
-                if content.entries["stated_size"] is not None and content.entries["format"] != "xyz":
+                content = _instrument_content(path, channel, units, spacing, first_row, try_points=False)
+                if content.entries["stated_size"] is not None:
                     return content
         fault = f"is not a table of numbers ({error})"
         raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault}"]) from error
@@ -310,6 +311,8 @@ def _table_content(
     """Return an array of numbers: a text table, or that of an npy file."""
     try:
         values = read_npy(path) if table is None else table.values
+    except UnreadableFile:
+        raise
     except ValueError as error:
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
     if table is None and values.ndim == 2 and values.shape[1] in (2, 3) and len(values) >= LEAST_POINTS:
@@ -335,10 +338,15 @@ def _from_bottom(values: Array, first_row: str | None) -> Array:
 
 
 def _instrument_content(
-    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
+    path: Path,
+    channel: str | int | None,
+    units: str | None,
+    spacing: Any,
+    first_row: str | None,
+    try_points: bool = True,
 ) -> FileContent:
     try:
-        reading = read_instrument(path, channel, units, spacing)
+        reading = read_instrument(path, channel, units, spacing, try_points)
     except MissingExtra:
         if file_suffix(path) in TABLES and spacing is None:
             expected = f"the spacing in metres, for {path.name!r} as a table of heights"

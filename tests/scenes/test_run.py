@@ -11,6 +11,7 @@ import xarray as xr
 from study import SOUND, command, watch_calls
 
 import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
 
 WHOLE = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -41,6 +42,29 @@ def test_file_has_the_wanted_groups(study):
     assert not (out / ".stages").exists()
     assert list(out.glob("*.png"))
     assert not list(out.glob(".*"))
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch, error):
+    tree, out = study
+    with monkeypatch.context() as patch:
+        patch.setattr(fc.plotting, "draw", lambda *a, **k: (_ for _ in ()).throw(error))
+        with pytest.raises((InvalidInput, KeyboardInterrupt)) as caught:
+            fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
+    if isinstance(error, OSError):
+        assert "result.nc, which is complete" in str(caught.value)
+        assert "No space left" in str(caught.value)
+    saved = fc.open(tmp_path / "result.nc")
+    for name in ("joints/closure", "domains/lacunarity", "surfaces"):
+        assert set(saved[name].variables) == set(tree[name].variables)
+    np.testing.assert_array_equal(saved["joints/closure/closure"], tree["joints/closure/closure"])
+    calls = []
+    watch_calls(monkeypatch, calls.append)
+    again = fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
+    assert not [name for name in calls if name != "describe"]  # the parts of the first run are still there
+    assert list(tmp_path.glob("*.png"))
+    assert fc.open(tmp_path / "result.nc").attrs["provenance"] == again.attrs["provenance"]
+    assert '"figures": {"run_time"' in again.attrs["provenance"]
 
 
 def test_every_group_passes_the_cf_checker(study, compliance, tmp_path):

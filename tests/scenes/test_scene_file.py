@@ -1,5 +1,7 @@
 """Scene files: valid ones are read, and all problems of others are listed at once."""
 
+import time
+
 import pytest
 from study import SOUND, command
 
@@ -126,6 +128,32 @@ def test_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, ne
     for word in words:
         assert word in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ".".join(["a"] * 20_000) + " = 1\n",
+        "[" + ".".join(["a"] * 20_000) + "]\n",
+        "a = {" + " . ".join(["'a'"] * 20_000) + " = 1}\n",
+        "a = " + "[" * 20_000 + "]" * 20_000,
+        SOUND + "# a comment\n" * 100_000,
+    ],
+    ids=["key", "header", "inline table", "list", "large"],
+)
+def test_scene_that_takes_the_parser_minutes_is_refused(write, text):
+    """Its time and memory grow with the square of the parts of a key: 38 s and 1.6 GB."""
+    path, start = write(text), time.perf_counter()
+    with pytest.raises(UnreadableFile, match="not a TOML file"):
+        fc.scenes.load(path)
+    assert time.perf_counter() - start < 5.0
+
+
+def test_text_with_many_points_is_read(write):
+    title = "e.g. this, " * 50 + "1.5, 2.5, " * 50 + "." * 100
+    comment = "# " + "a.b" * 100
+    scene = fc.scenes.load(write(SOUND.replace('title = "a small study"', f'title = "{title}"\n{comment}')))
+    assert scene.tables["title"] == title
 
 
 def test_incompressible_material_is_allowed(write):

@@ -1,14 +1,17 @@
 """Files: formats, orientation, units, gaps, corruption, scale, and provenance."""
 
 import gzip
+import io
 import json
 import sys
 
 import numpy as np
 import pytest
+import scipy.io
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.base import packing
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 
 HEIGHTS = np.arange(12.0).reshape(3, 4) * 1e-6
@@ -74,6 +77,60 @@ def test_invalid_table_names_its_cell(tmp_path, text, problem, units):
     with pytest.raises(UnreadableFile, match=problem) as caught:
         fc.surfaces.read(tmp_path / "a.csv", spacing=1.0, units=units)
     assert "reader" not in str(caught.value)
+
+
+@pytest.mark.parametrize("spacing", [1e-5, None])
+@pytest.mark.parametrize("header", ["", "# made by hand\n", "height map\nmade by hand\n"])
+def test_one_wrong_row_is_found_quickly(tmp_path, monkeypatch, header, spacing):
+    """The reader of lists of points tries 600 times to skip rows: 40 s for 512 x 512 points."""
+    xyz = pytest.importorskip("SurfaceTopography.IO.XYZ")
+    tried = []
+    monkeypatch.setattr(xyz.XYZReader, "_read", lambda reader: tried.append(reader))
+    rows = [",".join(["0.5"] * 20) for _ in range(600)]
+    rows[400] = rows[400].replace("0.5", "O.5", 1)
+    (tmp_path / "a.csv").write_text(header + "\n".join(rows))
+    with pytest.raises(UnreadableFile) as caught:
+        fc.surfaces.read(tmp_path / "a.csv", spacing=spacing)
+    assert tried == []
+    if spacing is not None and not header.startswith("height"):
+        assert "column 1: expected a number, got 'O.5'" in str(caught.value)
+
+
+def packed(path):
+    """Write five million zeros in few bytes, in the format of the name."""
+    zeros = np.zeros((2000, 2500))
+    if path.suffix == ".gz":
+        content = io.BytesIO()
+        np.save(content, zeros)
+        path.write_bytes(gzip.compress(content.getvalue()))
+    elif path.suffix == ".npz":
+        np.savez_compressed(path, height=zeros)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, {"height": zeros}, do_compression=True)
+    elif path.suffix == ".h5":
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file.create_dataset("height", zeros.shape, "f8", chunks=(100, 100), compression="gzip")
+    else:
+        surface = fc.surfaces.from_array(zeros, 1e-5)
+        surface.encoding = {"zlib": True, "complevel": 9}
+        fc.save(surface, path)
+    assert path.stat().st_size < 100_000
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.npy.gz", "a.npz", "a.mat", "a.h5", "a.nc"])
+def test_file_that_fills_the_memory_is_refused(tmp_path, monkeypatch, name):
+    """7.8 MB unpacked to 5.6 GB; here the limit is a megabyte, and the file unpacks to 38."""
+    path = packed(tmp_path / name)
+    if name == "a.npy.gz":
+        assert fc.surfaces.read(path, spacing=1e-5).shape == (2000, 2500)
+    monkeypatch.setattr(packing, "SMALL", 1 << 20)
+    with pytest.raises(UnreadableFile, match=r"expected at most \d+ MiB when unpacked") as caught:
+        fc.surfaces.read(path, spacing=1e-5)
+    assert str(caught.value).count("problem") == 1
+    if name == "a.nc":
+        with pytest.raises(UnreadableFile, match=r"expected at most \d+ MiB when unpacked"):
+            fc.open(path)
 
 
 def test_missing_marks_quotes_and_trailing_separators(tmp_path):
