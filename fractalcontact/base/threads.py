@@ -17,6 +17,8 @@ from typing import Any
 
 SHARE = 32768  # elements worth a thread of their own
 LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+# matplotlib is not safe in threads: its parser of formulas is shared, and so are its settings
+DRAWING_LOCK = threading.RLock()
 
 _limit: ContextVar[int | None] = ContextVar("fractalcontact_threads", default=None)
 
@@ -173,3 +175,6 @@ def _forget_threads() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget_threads)
+    os.register_at_fork(
+        before=DRAWING_LOCK.acquire, after_in_parent=DRAWING_LOCK.release, after_in_child=DRAWING_LOCK.release
+    )

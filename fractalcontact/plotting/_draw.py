@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.netcdf import unfinished
 from fractalcontact.base.progress import track
+from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.plotting._area_dimension import area_dimension
 from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
 from fractalcontact.plotting._closure import closure_laws, contact_area
@@ -89,9 +90,10 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, drawing in track(_all_drawings(tree, paper), progress, "figures", unit="figure"):
-        figure = drawing()
-        written.append(_write(figure, folder / f"{name}.png"))
-        figure.clear()
+        with DRAWING_LOCK:
+            figure = drawing()
+            written.append(_write(figure, folder / f"{name}.png"))
+            figure.clear()
     return written
 
 

@@ -17,7 +17,7 @@ from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, output_folder
 from fractalcontact.base.references import PAPER, joined_references
-from fractalcontact.base.threads import most_workers
+from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._caveats import MEMBER, caveats
@@ -223,9 +223,10 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
 
     first = tree.map_over_datasets(lambda dataset: dataset.isel({MEMBER: 0}, missing_dims="ignore"))
     first.attrs = dict(tree.attrs)
-    page = plotting.datasheet(first, notes=caveats(first))
     temporary = netcdf.unfinished(target)
-    page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+    with DRAWING_LOCK:
+        page = plotting.datasheet(first, notes=caveats(first))
+        page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
     temporary.replace(target)
 
 

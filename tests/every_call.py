@@ -1,0 +1,218 @@
+"""A small call of every public function that computes or reads, made in threads and in processes.
+
+`python every_call.py threads fork` makes the calls one after another, then in three threads at once, then in
+a process that is forked afterwards; it prints what differs, as JSON.
+"""
+
+import functools
+import hashlib
+import importlib
+import json
+import multiprocessing
+import os
+import random
+import sys
+import tempfile
+import threading
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+import test_labels as labels
+import xarray as xr
+from study import SOUND
+
+import fractalcontact as fc
+from fractalcontact.base import threads
+
+SCENE = SOUND.replace("[48, 48]", "[24, 24]").replace("2.4e-3", "1e-3")
+SCENE += 'dimensions = ["variogram"]\nfigures = true\n'
+LIMIT = 240.0  # seconds after which a process counts as hanging
+# classes and constants; `extremes` runs every case in a process of its own, `worst_results` sorts them
+LEFT_OUT = {
+    "accuracy.Benchmark",
+    "accuracy.Case",
+    "accuracy.Method",
+    "accuracy.Result",
+    "accuracy.cases",
+    "accuracy.extremes",
+    "accuracy.worst_results",
+    "contact.ContactOptions",
+    "contact.LoadPath",
+    "joints.PARK_PAULAY",
+    "scenes.Scene",
+    "surfaces.SelfAffine",
+}
+# these draw what others have computed; `scenes.run` draws figures too
+SUBPACKAGES = [name for name in fc.__all__ if name not in ("plotting", "save", "open")]
+
+
+@functools.cache
+def study():
+    """Return a finished study, for the functions that read one."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "small.toml").write_text(SCENE, encoding="utf-8")
+    return fc.scenes.run(folder / "small.toml", out=folder, progress=False), folder
+
+
+def scene():
+    return study()[1] / "small.toml"
+
+
+def opened(folder):
+    return fc.open(fc.save(labels.rough(), folder / "opened.nc"))
+
+
+def run(folder):
+    tree = fc.scenes.run(scene(), out=folder / "run", progress=False)
+    assert fc.open(folder / "run" / "result.nc").attrs["provenance"] == tree.attrs["provenance"]
+    return tree
+
+
+def measured():
+    method = fc.accuracy.Method("m", [4, 8], lambda n: n, lambda n: n, lambda n, _: 1.0 / n)
+    return fc.accuracy.measure({"surfaces": [fc.accuracy.Benchmark("b", "e", "t", (method,))]}, budget=0.1)
+
+
+CALLS = {
+    "save": lambda folder: xr.open_dataset(fc.save(labels.rough(), folder / "saved.nc")).load(),
+    "open": opened,
+    "contact.effective_modulus": lambda _: fc.contact.effective_modulus(1e9, 0.2),
+    "contact.flat_stiffness": lambda _: fc.contact.flat_stiffness((20, 20), 1e-4, contact_modulus=1e9),
+    "dimensions.methods": lambda _: fc.dimensions.methods(),
+    "joints.Crack": lambda _: labels.crack().faces()[0],
+    "joints.bandis_constants": lambda _: fc.joints.bandis_constants(10.0, 100e6, 0.2e-3),
+    "joints.bandis_closure": lambda _: fc.joints.bandis_closure(
+        1e6, initial_stiffness=1e10, greatest_closure=1e-3
+    ),
+    "joints.barton_bandis_scaled": lambda _: fc.joints.barton_bandis_scaled(10.0, 100e6, 1.0),
+    "joints.barton_choubey_strength": lambda _: fc.joints.barton_choubey_strength(
+        1e6, roughness=10.0, wall_strength=100e6, residual_angle=30.0
+    ),
+    "joints.self_weight_strength": lambda _: fc.joints.self_weight_strength(
+        10.0, unit_weight=25e3, friction_angle=30.0
+    ),
+    "joints.size_effect": lambda _: fc.joints.size_effect(10.0, contact_dimension=1.7),
+    "scenes.contents": lambda _: fc.scenes.contents(study()[1] / "result.nc"),
+    "scenes.load": lambda _: str(fc.scenes.load(scene()).tables),
+    "scenes.validate": lambda _: str(fc.scenes.validate(scene()).tables),
+    "scenes.plan": lambda _: str(fc.scenes.plan(fc.scenes.load(scene()))),
+    "scenes.paper_criteria": lambda _: fc.scenes.paper_criteria(),
+    "scenes.paper_table": lambda _: fc.scenes.paper_table(study()[0]),
+    "scenes.report": lambda folder: fc.scenes.report(study()[0], folder / "report.html").name,
+    "scenes.reproduce": lambda _: fc.scenes.reproduce(study()[0]["joints/closure"].to_dataset()),
+    "scenes.run": run,
+    "scenes.summary": lambda _: fc.scenes.summary(study()[0]),
+    "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
+    "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
+    "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
+    "accuracy.examine": lambda _: str([r.name for r in fc.accuracy.examine(fc.accuracy.cases["one cell"])]),
+    "accuracy.measure": lambda _: str(sorted(measured().children)),
+    "accuracy.summary": lambda _: fc.accuracy.summary(measured())[:20],
+}
+
+
+def names():
+    """Return every public function that computes or reads; a new one is in it by itself."""
+    found = ["save", "open"]
+    for subpackage in SUBPACKAGES:
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
+        found += [name for function in module.__all__ if (name := f"{subpackage}.{function}") not in LEFT_OUT]
+    return found
+
+
+def has_call(name):
+    return name in CALLS or (name.partition(".")[0] in labels.SUBPACKAGES and name not in labels.UNLABELLED)
+
+
+def fingerprint(name, folder):
+    """Return a digest of the numbers that a function returns; run times are left out."""
+    folder.mkdir(exist_ok=True)
+    result = CALLS[name](folder) if name in CALLS else labels.result_of(name, folder)
+    if isinstance(result, xr.DataArray):
+        result = result.to_dataset(name="values")
+    if isinstance(result, xr.Dataset):
+        result = xr.DataTree(result)
+    if isinstance(result, xr.DataTree):
+        result = [
+            (node.path, str(key), variable.values if variable.dtype == object else variable.values.tobytes())
+            for node in result.subtree
+            for key, variable in node.variables.items()
+            if "run_time" not in str(key)
+        ]
+    if isinstance(result, np.ndarray):
+        result = result.tobytes()
+    text = repr(result)
+    if name in ("scenes.contents", "scenes.summary"):
+        text = "".join(letter for letter in text if not letter.isdigit() and letter not in " .")
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def fingerprints(order=None, expected=None):
+    """Return the digest of every function, or the error; those that are as expected are left out."""
+    folder, found = Path(tempfile.mkdtemp()), {}
+    for name in order or names():
+        try:
+            found[name] = fingerprint(name, folder)
+        except BaseException:
+            found[name] = traceback.format_exc(limit=-3)
+    return {name: value for name, value in found.items() if value != (expected or {}).get(name)}
+
+
+def in_threads(expected):
+    """Make all calls in three threads at once, in three orders."""
+    differing = [{} for _ in range(3)]
+    orders = [names(), names()[::-1], random.Random(1).sample(names(), len(names()))]
+
+    def work(number):
+        differing[number] = fingerprints(orders[number], expected)
+
+    running = [threading.Thread(target=work, args=(number,), daemon=True) for number in range(3)]
+    for thread in running:
+        thread.start()
+    for thread in running:
+        thread.join(LIMIT)
+    hanging = {"threads": "do not end"} if any(thread.is_alive() for thread in running) else {}
+    return differing[0] | differing[1] | differing[2] | hanging
+
+
+def prepare():
+    """Run even small loops in bands of three threads."""
+    warnings.simplefilter("ignore")
+    os.environ["FRACTALCONTACT_THREADS"] = "3"
+    threads.SHARE = 256
+
+
+def send(connection, expected):
+    prepare()
+    connection.send(fingerprints(expected=expected))
+
+
+def in_process(method, expected):
+    """Make all calls in a process that starts in this way."""
+    context = multiprocessing.get_context(method)
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=send, args=(sender, expected))
+    process.start()
+    try:
+        return receiver.recv() if receiver.poll(LIMIT) else {method: "the process does not end"}
+    except EOFError:
+        return {method: "the process died"}
+    finally:
+        process.kill() if process.is_alive() and not receiver.poll(0) else None
+        process.join(10)
+
+
+def main(modes):
+    prepare()
+    expected, differing = fingerprints(), {}
+    differing["one after another"] = {key: text for key, text in expected.items() if len(text) != 64}
+    for mode in modes:
+        differing[mode] = in_threads(expected) if mode == "threads" else in_process(mode, expected)
+    print(json.dumps({mode: entries for mode, entries in differing.items() if entries}), flush=True)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
