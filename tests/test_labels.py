@@ -82,6 +82,7 @@ CALLS = {
     "surfaces.describe": lambda: fc.surfaces.describe(rough()),
     "dimensions.estimate": lambda: fc.dimensions.estimate(rough(), list(fc.dimensions.methods())),
     "dimensions.spectrum": lambda: fc.dimensions.spectrum(periodic()),
+    "dimensions.hurst_map": lambda: fc.dimensions.hurst_map(rough(), 1.6e-3),
     "dimensions.waves": lambda: fc.dimensions.waves(rough()),
     "contact.press": pressed,
     "contact.partial_slip": lambda: fc.contact.partial_slip(

@@ -46,6 +46,7 @@ CALLS = {
     "dimensions.covering": {"surface": SURFACE},
     "dimensions.cube_counts": {"surface": SURFACE},
     "dimensions.roughness_length": {"surface": SURFACE},
+    "dimensions.hurst_map": {"surface": SURFACE, "window": 1.0},
     "dimensions.waves": {"surface": SURFACE},
     "dimensions.estimate": {"surface": SURFACE, "methods": "variogram"},
     "contact.effective_modulus": {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},

@@ -3,6 +3,7 @@
 estimate          Hurst exponent and fractal dimension with a 95 % interval
 methods           names of the methods of `estimate`, with one line each
 directions        exponent by direction, and tests of isotropy
+hurst_map         exponent in windows that move over the surface
 waves             single waves, such as marks of machining
 spectrum          power spectral density, averaged over directions
 variogram         half the mean square increment against the lag

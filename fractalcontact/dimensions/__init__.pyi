@@ -2,6 +2,7 @@ from ._covering_area import covering as covering
 from ._cube_counts import cube_counts as cube_counts
 from ._directions import directions as directions
 from ._estimate import estimate as estimate
+from ._hurst_map import hurst_map as hurst_map
 from ._methods import methods as methods
 from ._roughness_length import roughness_length as roughness_length
 from ._spectrum import spectrum as spectrum
@@ -16,6 +17,7 @@ __all__ = [
     "cube_counts",
     "directions",
     "estimate",
+    "hurst_map",
     "madogram",
     "methods",
     "roughness_length",

@@ -1,0 +1,111 @@
+"""Map of the Hurst exponent: the closed-form estimate in windows that move over the surface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.grid import read_grid
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._increments import increments
+from fractalcontact.dimensions._records import Estimate, undefined
+from fractalcontact.dimensions._surface_input import check_surface, read_surfaces
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+SMALLEST = 16  # points along the edge of a window
+FEWEST = 25  # observed points in a window
+_FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
+
+
+def _check(problems: Problems, *, surface: Any, window: Any, step: Any) -> None:
+    is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_FIELDS)
+    is_number = problems.number("window", window, above=0.0)
+    problems.number("step", step, above=0.0, optional=True)
+    if not (is_valid and is_number):
+        return
+    grid = read_grid(surface)
+    least, most = SMALLEST * max(grid.spacing), min(grid.extent)
+    expected = f"a length from {least:g} m ({SMALLEST} points) to {most:g} m"
+    problems.require(least * (1 - 1e-9) <= window <= most * (1 + 1e-9), "window", expected, window)
+
+
+@public_result(title="Map of the Hurst exponent", check=_check)
+def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None) -> xr.Dataset:
+    """Estimate the Hurst exponent in square windows that move over a surface.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., y, x); NaN where missing. Of a dask array only one row of windows is in
+        memory at a time.
+    window : float
+        Edge of a window in m, at least 16 points.
+    step : float, optional
+        Distance between neighbouring windows in m; by default half a window.
+
+    Returns
+    -------
+    Dataset over the leading dims and (y, x), the centres of the windows in m
+        `hurst`, `standard_error`, `ci_low`, `ci_high` of the method "increments" of `estimate`, and
+        `fractal_dimension`. NaN where fewer than 25 points of a window were observed, or where heights do
+        not vary.
+
+    Raises
+    ------
+    InvalidInput
+        A profile, wrong axes, or a window that does not fit.
+
+    Notes
+    -----
+    Windows that overlap have correlated errors: compare those at least one window apart.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((96, 128), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    >>> result = fc.dimensions.hurst_map(surface, 3.2e-3)
+    >>> dict(result.hurst.sizes), round(float(result.hurst.mean()), 1)
+    ({'y': 5, 'x': 7}, 0.7)
+    """
+    grid = read_grid(surface)
+    edges = [max(SMALLEST, round(window / spacing)) for spacing in grid.spacing]
+    edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
+    length = 0.5 * window if step is None else float(step)
+    steps = [max(1, round(length / spacing)) for spacing in grid.spacing]
+    rows, columns = (
+        np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)
+    )
+    leading = surface.dims[:-2]
+    records = []
+    for plane in range(int(np.prod(surface.shape[:-2], dtype=int))):
+        index = np.unravel_index(plane, surface.shape[:-2])
+        single = surface.isel(dict(zip(leading, map(int, index), strict=True)))
+        for row in rows:
+            band = single.isel(y=slice(int(row), int(row) + edges[0])).compute()
+            parts = (band.isel(x=slice(int(start), int(start) + edges[1])) for start in columns)
+            records += [_estimated(part) for part in parts]
+    shape = (*surface.shape[:-2], rows.size, columns.size)
+    data: dict[str, Any] = {
+        name: (surface.dims, np.reshape([getattr(record, name) for record in records], shape))
+        for name in _FIELDS
+    }
+    data["fractal_dimension"] = surface.dims, 3.0 - data["hurst"][1]
+    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=data))
+    for dim, starts, edge in zip(("y", "x"), (rows, columns), edges, strict=True):
+        place = surface.coords[dim].values if dim in surface.coords else None
+        spacing = grid.spacing[0 if dim == "y" else 1]
+        first = float(place[0]) if place is not None else 0.5 * spacing
+        coords[dim] = dim, first + (starts + 0.5 * (edge - 1)) * spacing
+    return xr.Dataset(data, coords=coords)
+
+
+def _estimated(part: xr.DataArray) -> Estimate:
+    """Return the estimate of one window."""
+    if np.count_nonzero(np.isfinite(part.values)) < FEWEST:
+        return undefined(f"fewer than {FEWEST} points were observed")
+    return increments(read_surfaces(part)[0], None, False).limited()
