@@ -17,12 +17,13 @@ from fractalcontact.base import rng as streams
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.netcdf import open as read
 from fractalcontact.base.netcdf import save
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
 from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
-from fractalcontact.base.validation import NONE, Problems, float_array, word_tuple
+from fractalcontact.base.validation import NONE, Problems, word_tuple
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -66,18 +67,16 @@ def _check(
     **_: Any,
 ) -> None:
     problems.numbers("hurst", hurst, at_least=0.01, at_most=0.99)
-    for size in np.atleast_1d(sizes).tolist():
-        problems.integer("sizes", size, at_least=16)
+    has_sizes = problems.numbers("sizes", sizes, at_least=16, integral=True)
     chosen = problems.choices("families", families, FAMILIES)
     if methods is not None:
         chosen = problems.choices("methods", methods, dimensions.methods()) and chosen
     if chosen:
         some = bool(word_tuple(families)) and (methods is None or bool(word_tuple(methods)))
         problems.require(some, "families / methods", "at least one of each", NONE)
-    if members is not None:
-        counts = np.atleast_1d(members).tolist()
-        for count in counts:
-            problems.integer("members", count, at_least=2)
+    has_members = problems.numbers("members", members, at_least=2, integral=True, optional=True)
+    if has_members and has_sizes and members is not None:
+        counts = float_array(members)
         lengths = 1, len(np.unique(sizes))
         expected = f"one number, or one for each of the {lengths[1]} sizes"
         problems.require(len(counts) in lengths, "members", expected, members)

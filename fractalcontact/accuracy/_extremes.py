@@ -21,10 +21,12 @@ from fractalcontact.base.signals import Stop
 from fractalcontact.base.validation import Problems, word_list
 
 
-def _check(problems: Problems, *, names: Any, **_: Any) -> None:
-    if names is not None:
-        items = [names] if isinstance(names, Case) else word_list(names)
-        problems.choices("names", [item for item in items if not isinstance(item, Case)], cases)
+def _check(problems: Problems, *, names: Any, stop: Any) -> None:
+    problems.require(stop is None or isinstance(stop, Stop), "stop", "a Stop, or None", stop)
+    if isinstance(names, (list, tuple)):
+        names = [item for item in names if not isinstance(item, Case)]
+    if names is not None and not isinstance(names, Case):
+        problems.choices("names", names, cases)
 
 
 @public_result(title="Extreme cases", achieved_error="exact", check=_check)

@@ -129,6 +129,8 @@ def measure(
     with Problems(WHERE) as problems:
         _check_parts(problems, parts)
         problems.number("budget", budget, above=0)
+        problems.boolean("progress", progress)
+        problems.require(stop is None or isinstance(stop, Stop), "stop", "a Stop, or None", stop)
     if not isinstance(parts, Mapping):
         parts = {name: benchmarks(name) for name in (SUBPACKAGES if parts is None else word_tuple(parts))}
     curves = [

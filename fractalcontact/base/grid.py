@@ -7,12 +7,14 @@ period = n * spacing, so that a crop is not periodic.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
+
+from fractalcontact.base.numbers import is_real
 
 UNIFORM = 1e-6  # largest distance of a centre from its place on a uniform axis, in spacings
 DECADES = 100  # squares and cubes of lengths between 1e-100 and 1e100 m can be represented
@@ -131,26 +133,35 @@ def grid_faults(array: Any, argument: str, dims: Sequence[str] = ("y", "x")) -> 
         yield f"{argument}.dims", f"(..., {', '.join(dims)})", array.dims
         return
     for dim in dims:
-        yield from _axis_faults(array, dim, f"{argument}.{dim}")
+        yield from axis_faults(array, dim, f"{argument}.{dim}")
 
 
-def _axis_faults(array: xr.DataArray, dim: str, name: str) -> Iterator[Fault]:
+def axis_faults(array: xr.DataArray | xr.Dataset, dim: str, name: str) -> Iterator[Fault]:
+    """Yield what keeps a dim from having a uniform coordinate of ascending centres in metres."""
+    expected = "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)"
     if dim not in array.coords:
-        expected = "a coordinate of cell centres in metres (see fractalcontact.surfaces.from_array)"
         yield name, expected, "no coordinate"
         return
     coordinate = array.coords.variables[dim]  # several times as fast as coords[dim]
-    units = coordinate.attrs.get("units", "m")
-    if units not in METRES:
-        yield f"{name}.units", "'m'", units
+    yield from _units_faults(coordinate.attrs, name)
+    period = coordinate.attrs.get("period")
+    if period is not None and not is_length(period):
+        yield f"{name}.period", "one length in metres", period
+    if coordinate.dims != (dim,) or coordinate.dtype.kind not in "iuf":
+        yield name, expected, f"dims {coordinate.dims} and type {coordinate.dtype}"
+        return
     centres = np.asarray(coordinate.values, dtype=np.float64)
     n = centres.size
-    if n < 2:
-        if coordinate.attrs.get("period") is None:
-            yield name, "at least 2 points, or a period", f"{n}"
+    if n < 1 or (n < 2 and period is None):
+        yield name, "at least 2 points, or a period", f"{n}"
         return
-    spacing = float(centres[-1] - centres[0]) / (n - 1)
-    if not np.isfinite(spacing) or spacing <= 0:
+    if not np.isfinite(centres).all():
+        yield name, "finite, ascending cell centres", f"{centres[0]:g} ... {centres[-1]:g}"
+        return
+    if n < 2:
+        return
+    spacing = (float(centres[-1]) - float(centres[0])) / (n - 1)
+    if not 0 < spacing < np.inf:
         yield name, "finite, ascending cell centres", f"{centres[0]:g} ... {centres[-1]:g}"
     elif not _within(spacing, DECADES):
         yield name, f"a spacing of {_decades(DECADES)}", f"{spacing:g}"
@@ -158,6 +169,17 @@ def _axis_faults(array: xr.DataArray, dim: str, name: str) -> Iterator[Fault]:
         distance = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
         if not distance <= UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max()):
             yield name, "uniform spacing", f"centres up to {distance / spacing:.3g} spacings off their place"
+
+
+def _units_faults(attributes: Mapping[Any, Any], name: str) -> Iterator[Fault]:
+    units = attributes.get("units", "m")
+    if not (isinstance(units, str) and units in METRES):
+        yield f"{name}.units", "'m'", units
+
+
+def is_length(value: Any) -> bool:
+    """Return whether an attribute is one positive length in metres that float64 holds."""
+    return is_real(value) and _within(value, DECADES)
 
 
 def surface_faults(
@@ -179,16 +201,19 @@ def surface_faults(
     yield from grid_faults(surface, argument, dims)
     if not leading and surface.ndim > len(dims):
         yield f"{argument}.dims", f"({', '.join(dims)}) alone", surface.dims
-    units = surface.attrs.get("units", "m")
-    if units not in METRES:
-        yield f"{argument}.units", "'m'", units
-    if not np.issubdtype(surface.dtype, np.number) or np.issubdtype(surface.dtype, np.complexfloating):
+    for dim in surface.dims[: -len(dims)] if leading else ():
+        if surface.sizes[dim] == 0:
+            yield f"{argument}.{dim}", "at least one entry", "none"
+    yield from _units_faults(surface.attrs, argument)
+    if surface.dtype.kind not in "iuf":
         yield argument, "real numbers", f"type {surface.dtype}"
     else:
         if finite:
             yield from _missing_faults(surface.values, argument)
         if surface.chunks is None:
             yield from _size_faults(surface.values, argument, decades)
+        if surface.chunks is None and not finite and np.isinf(surface.values).any():
+            yield argument, "heights that are finite or NaN", "infinite heights"
     if surface.dims[-len(dims) :] == dims:
         for dim in dims:
             if surface.sizes[dim] < smallest:

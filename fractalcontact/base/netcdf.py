@@ -69,13 +69,14 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     >>> path.name, fc.open(path).identical(surface)
     ('surface.nc', True)
     """
-    target = Path(path)
     where = SAVE
-    if target.suffix != ".nc":
-        raise InvalidInput(where, [f"path: expected a name that ends in '.nc', got {target.name!r}"])
-    if not isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree)):
-        expected = "a DataArray, Dataset or DataTree"
-        raise InvalidInput(where, [f"result: expected {expected}, got {type(result).__name__}"])
+    with Problems(where) as problems:
+        if problems.path("path", path):
+            name = Path(path).name
+            problems.require(name.endswith(".nc"), "path", "a name that ends in '.nc'", name)
+        is_labelled = isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree))
+        problems.require(is_labelled, "result", "a DataArray, Dataset or DataTree", type(result).__name__)
+    target = Path(path)
     groups = _as_file(result)
     with Problems(where) as problems:
         _check_words(problems, groups)
@@ -147,10 +148,10 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     >>> type(statistics).__name__, statistics.rms_height.attrs["units"]
     ('Dataset', 'm')
     """
-    source = Path(path)
     where = "fractalcontact.open"
-    if not source.is_file():
-        raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    with Problems(where, UnreadableFile) as problems:
+        problems.file("path", path)
+    source = Path(path)
     if chunks is not None:
         if importlib.util.find_spec("dask") is None:
             raise MissingExtra("chunks", "dask", "dask")

@@ -10,6 +10,7 @@ from typing import Any
 
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.validation import Problems
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,10 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
     """
     import netCDF4  # loads slowly
 
-    source = Path(path)
     where = "fractalcontact.open"
-    if not source.is_file():
-        raise UnreadableFile(where, [f"path: expected an existing file, got {source.name!r}"])
+    with Problems(where, UnreadableFile) as problems:
+        problems.file("path", path)
+    source = Path(path)
     groups: dict[str, Header] = {}
 
     def walk(group: Any, name_of_group: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.netcdf import clear_partial
+from fractalcontact.base.validation import Problems
 
 RESULT, PARTIAL_RESULT = "result.nc", "partial.nc"
 WHERE = "fractalcontact run"
@@ -16,6 +17,8 @@ WHERE = "fractalcontact run"
 
 def output_folder(out: str | os.PathLike[str]) -> Path:
     """Return the output folder, created if necessary and without temporary files of interrupted runs."""
+    with Problems(WHERE) as problems:
+        problems.path("out", out, what="the path of a folder")
     out = Path(out)
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -101,9 +101,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         if value.ndim > 1 and value.size > LONGEST_TABLE:
             return {"shape": list(value.shape), "dtype": str(value.dtype)}
-        return value.tolist()
+        return plain(value.tolist())
     if isinstance(value, np.generic):
-        return value.item()
+        return plain(value.item())
     if isinstance(value, np.random.Generator):
         return "Generator"
     if isinstance(value, np.random.SeedSequence):

@@ -28,11 +28,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import label
 from fractalcontact.base.surface_argument import with_surface
-from fractalcontact.base.validation import Problems, did_you_mean
+from fractalcontact.base.validation import Problems, check_flags, did_you_mean
 
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
@@ -72,7 +73,8 @@ def public_result(
         The error in words, for a result without a number for it.
     check : callable, optional
         Called as ``check(problems, **arguments)`` with a `Problems` and every argument, defaults included,
-        before the function; its problems are raised together.
+        before the function; its problems are raised together. Arguments declared as `bool` are checked
+        already, and left out unless it names them.
     error : type, default InvalidInput
         The exception that lists the problems.
     """
@@ -80,8 +82,9 @@ def public_result(
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature = inspect.signature(function)
         name = public_name(function)
+        own_flags = set() if check is None else set(inspect.signature(check).parameters)
 
-        def checked(*arguments: Any, **options: Any) -> dict[str, Any]:
+        def checked(*arguments: Any, **options: Any) -> inspect.BoundArguments:
             try:
                 bound = signature.bind(*arguments, **options)
             except TypeError as cause:
@@ -89,21 +92,24 @@ def public_result(
                 hint = did_you_mean(unknown[0], signature.parameters) if unknown else ""
                 raise TypeError(f"{name}: {cause}{hint}") from None
             bound.apply_defaults()
-            if check is not None:
-                with Problems(name, error) as problems:
-                    check(problems, **bound.arguments)
-            return bound.arguments
+            bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
+            with Problems(name, error) as problems:
+                checked_flags = check_flags(problems, signature, bound.arguments) - own_flags
+                if check is not None:
+                    given = bound.arguments.items()
+                    check(problems, **{key: value for key, value in given if key not in checked_flags})
+            return bound
 
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
             given, words, notes = with_surface(name, signature, arguments, options)
-            parameters = checked(*given, **words)
-            result = function(*given, **words)
+            bound = checked(*given, **words)
+            result = function(*bound.args, **bound.kwargs)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {} if completeness is None else {"completeness": completeness}
-            parameters = parameters | entries.pop("parameters", {})
+            parameters = bound.arguments | entries.pop("parameters", {})
             if achieved_error is not None:
                 entries.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.numbers import is_real
+from fractalcontact.base.validation import Problems
+
+STREAMS = (np.random.Generator, np.random.BitGenerator, np.random.SeedSequence)
+LARGEST_SEED = 1 << 8192  # Python writes integers of up to 4300 digits
 
 RNGLike = (
     np.random.Generator
@@ -28,11 +32,32 @@ def generator(rng: RNGLike) -> np.random.Generator:
     InvalidInput
         The argument is neither.
     """
-    try:
-        return _restored(rng) if isinstance(rng, Mapping) else np.random.default_rng(rng)
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
+    with Problems("fractalcontact") as problems:
+        stream = _stream(rng)
         expected = "a Generator, an integer >= 0 or several of them, the record of a stream, or None"
-        raise InvalidInput("fractalcontact", [f"rng: expected {expected}, got {rng!r}"]) from error
+        problems.require(stream is not None, "rng", expected, rng)
+    return cast(np.random.Generator, stream)
+
+
+def _stream(rng: Any) -> np.random.Generator | None:
+    """Return the Generator of an argument, None if it is none of those that `generator` takes."""
+    if isinstance(rng, Mapping):
+        try:
+            return _restored(rng)
+        except (TypeError, ValueError, KeyError, AttributeError):
+            return None
+    if rng is not None and not isinstance(rng, STREAMS):
+        is_sequence = isinstance(rng, (list, tuple)) or (isinstance(rng, np.ndarray) and rng.ndim == 1)
+        seeds = list(rng) if is_sequence else [rng]
+        if not seeds or not all(map(_is_seed, seeds)):
+            return None
+    return np.random.default_rng(rng)
+
+
+def _is_seed(value: Any) -> bool:
+    """Return whether a value is an integer that a record can state."""
+    integer = is_real(value) and isinstance(value, (int, np.integer))
+    return integer and 0 <= value < LARGEST_SEED
 
 
 def record(rng: np.random.Generator) -> dict[str, Any]:

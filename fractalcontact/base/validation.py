@@ -13,16 +13,20 @@ problem; if there is none, all values are valid. A check that needs valid values
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
-from os import PathLike
+from inspect import Signature
+from os import R_OK, PathLike, access, fsencode, fspath
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.numbers import float_array as float_array  # converts what `numbers` has passed
+from fractalcontact.base.numbers import is_real, number_of_axes, real_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 LARGEST_INTEGER = 1 << 53  # larger integers are not all representable as float64
+LONGEST_NAME, LONGEST_PATH = 255, 4096  # bytes of a file name and of a path that file systems hold
 
 
 class Words(str):
@@ -78,8 +83,12 @@ class Problems:
 
     def add(self, argument: str, expected: str, got: object) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
+        self.note(argument, f"{argument}: expected {expected}, got {_shown(got)}")
+
+    def note(self, argument: str, message: str) -> None:
+        """Note a problem of an argument in words that are ready."""
         self.arguments.append(argument)
-        self.messages.append(f"{argument}: expected {expected}, got {_shown(got)}")
+        self._extend([message])
 
     @contextmanager
     def collect(self, prefix: str = "") -> Iterator[None]:
@@ -140,19 +149,20 @@ class Problems:
         at_most: float | None = None,
         optional: bool = False,
         integral: bool = False,
+        any_shape: bool = False,
     ) -> bool:
         """Check for one or several finite real numbers inside the bounds; `float_array` converts them.
 
-        With `integral` they must be integers, of any numeric type.
+        With `integral` they must be integers, of any numeric type; `any_shape` allows several dims.
         """
         if value is None and optional:
             return True
         expected = _interval(above, at_least, below, at_most)
-        values = _real_numbers(value)
+        values = real_numbers(value)
         if values is None or values.size == 0:
             self.add(argument, expected, value if values is None else "an empty sequence")
             return False
-        if values.ndim > 1:
+        if values.ndim > 1 and not any_shape:
             self.add(argument, "a number or a 1-D sequence", f"an array of shape {values.shape}")
             return False
         good = np.isfinite(values)
@@ -182,7 +192,7 @@ class Problems:
         if value is None and optional:
             return True
         inside = False
-        if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        if is_real(value) and isinstance(value, (int, np.integer)):
             low = -LARGEST_INTEGER if at_least is None else at_least
             high = LARGEST_INTEGER if at_most is None else at_most
             inside = low <= int(value) <= high
@@ -202,8 +212,8 @@ class Problems:
     def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> bool:
         """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""
         words = tuple(allowed)
-        if not isinstance(value, str) and (
-            not isinstance(value, (Sequence, np.ndarray)) or number_of_axes(value) != 1
+        if not isinstance(value, (str, list, tuple)) and not (
+            isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "UO"
         ):
             self.add(argument, f"a sequence of any of {_quoted(words)}", value)
             return False
@@ -226,10 +236,32 @@ class Problems:
         expected = "finite values" + (f" ({remedy})" if remedy else "")
         return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
 
-    def path(self, argument: str, value: Any) -> bool:
-        """Check for the path of a file: text or a `pathlib.Path`."""
-        valid = isinstance(value, (str, PathLike)) and str(value) != "" and "\0" not in str(value)
-        return self.require(valid, argument, "the path of a file", value)
+    def path(self, argument: str, value: Any, *, what: str = "the path of a file") -> bool:
+        """Check for the path of a file: text or a `pathlib.Path` that a file system can hold."""
+        text = fspath(value) if isinstance(value, PathLike) else value
+        if not isinstance(text, str) or text == "" or "\0" in text:
+            return self.require(False, argument, what, value)
+        try:
+            name = fsencode(text)
+        except UnicodeEncodeError:
+            return self.require(False, argument, f"{what}, in letters that Unicode has", ascii(text))
+        longest = max(map(len, name.split(b"/")))
+        fits = longest <= LONGEST_NAME and len(name) < LONGEST_PATH
+        return self.require(fits, argument, f"names of at most {LONGEST_NAME} bytes", f"{longest} bytes")
+
+    def file(self, argument: str, value: Any, *, what: str = "an existing file") -> bool:
+        """Check for the path of a regular file that may be read; a device or a pipe is none."""
+        if not self.path(argument, value):
+            return False
+        try:
+            is_file = Path(value).is_file()
+        except OSError as error:  # a folder on the way may not be searched
+            return self.require(False, argument, what, Words(f"{Path(value).name!r}: {error.strerror}"))
+        if not self.require(is_file, argument, what, Path(value).name):
+            return False
+        may_read = access(value, R_OK)
+        got = Words(f"{Path(value).name!r}: no permission to read it")
+        return self.require(may_read, argument, f"{what} that may be read", got)
 
     def surface(
         self,
@@ -280,6 +312,23 @@ class Problems:
 
         return self._add_all(grid_faults(array, argument, dims))
 
+    def tree(self, argument: str, value: Any) -> bool:
+        """Check for the DataTree of a study."""
+        import xarray as xr
+
+        expected = "a DataTree, from fractalcontact.scenes.run or fractalcontact.open"
+        return self.require(isinstance(value, xr.DataTree), argument, expected, value)
+
+    def result(self, argument: str, data: Any) -> bool:
+        """Check that a labelled result has the dims, types and units of the schema."""
+        import xarray as xr
+
+        from fractalcontact.base.labelled import result_faults  # loads xarray
+
+        if not isinstance(data, xr.Dataset):
+            return self.require(False, argument, "a Dataset, the result of a public function", data)
+        return self._add_all(result_faults(data, argument))
+
     def _add_all(self, faults: Iterable[tuple[str, str, object]]) -> bool:
         """Note every fault; return whether there is none."""
         before = len(self.messages)
@@ -300,9 +349,12 @@ class Problems:
         return self.require(allowed, argument, expected, value)
 
 
-def float_array(value: Any) -> np.ndarray:
-    """Return one or several numbers that passed `Problems.numbers` as a 1-D float64 array."""
-    return np.atleast_1d(np.asarray(value, dtype=np.float64))
+def check_flags(problems: Problems, signature: Signature, arguments: Mapping[str, Any]) -> set[str]:
+    """Check the arguments that a signature declares as `bool`, and return their names: no word is true."""
+    flags = {name for name, parameter in signature.parameters.items() if parameter.annotation == "bool"}
+    for name in sorted(flags):
+        problems.boolean(name, arguments[name])
+    return flags
 
 
 def word_list(value: Any) -> list[Any]:
@@ -324,26 +376,6 @@ def did_you_mean(word: object, words: Iterable[str]) -> str:
     """Return a question that names the allowed word nearest to a wrong one, or nothing."""
     near = get_close_matches(word, tuple(words), n=1) if isinstance(word, str) else []
     return f" (did you mean {near[0]!r}?)" if near and near[0] != word else ""
-
-
-def number_of_axes(value: Any) -> int | None:
-    """Return the number of axes, 0 for a scalar; None for a ragged sequence."""
-    try:
-        return np.ndim(value)
-    except ValueError:
-        return None
-
-
-def _real_numbers(value: Any) -> np.ndarray | None:
-    """Return real numbers as an array of at least one axis, None for anything else."""
-    if isinstance(value, (bool, np.bool_, str, bytes, dict)):
-        return None
-    try:
-        if np.iscomplexobj(value):
-            return None
-        return float_array(value)
-    except (TypeError, ValueError, OverflowError):
-        return None
 
 
 def _interval(
@@ -374,5 +406,9 @@ def _shown(value: object) -> str:
     if isinstance(value, (np.floating, np.integer, np.bool_)):
         value = value.item()
     in_words = isinstance(value, Words) or (isinstance(value, str) and " " in value)
-    text = str(value) if in_words else repr(value)
+    try:
+        text = str(value) if in_words else repr(value)
+    except Exception:  # more than 4300 digits, lists nested too deeply, an object that cannot be shown
+        return f"a value of type {type(value).__name__} that cannot be shown"
+    text = " ".join(text.encode("utf-8", "backslashreplace").decode().split())
     return text if len(text) <= 120 else text[:117] + "..."

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.numbers import float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.contact._options import BOUNDARIES, ContactOptions
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
 from fractalcontact.contact._scaled_problem import (

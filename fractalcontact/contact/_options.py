@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import PAPER, joined_references
-from fractalcontact.base.validation import Problems, float_array, given_option
+from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._scaled_problem import length_unit, make_units, scaled_body
 

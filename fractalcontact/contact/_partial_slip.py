@@ -15,10 +15,11 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._load_path import Step, scaled_path, solve_path
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._superposition import (
@@ -48,7 +49,6 @@ def _check(
     azimuth: Any,
     method: Any,
     keep: Any,
-    progress: Any,
     closure: Any,
     normal_force: Any,
     nominal_pressure: Any,
@@ -63,7 +63,6 @@ def _check(
     problems.number("azimuth", azimuth)
     problems.choice("method", method, METHODS)
     problems.choices("keep", keep, SLIP_MAPS)
-    problems.boolean("progress", progress)
     options = problems.construct(ContactOptions, **keywords)
     load = problems.construct(
         LoadPath.from_keywords,

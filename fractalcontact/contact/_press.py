@@ -32,7 +32,6 @@ def _check(
     surface: Any,
     contact_modulus: Any,
     keep: Any,
-    progress: Any,
     closure: Any,
     normal_force: Any,
     nominal_pressure: Any,
@@ -43,7 +42,6 @@ def _check(
     problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
-    problems.boolean("progress", progress)
     options = problems.construct(ContactOptions, **keywords)
     load = problems.construct(
         LoadPath.from_keywords,

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _spectral_sectors as sectors
 from fractalcontact.dimensions._anisotropy import (
     LEAST_LAGS,

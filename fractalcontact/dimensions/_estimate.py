@@ -56,12 +56,11 @@ _FIELDS = (
 _NAMES = (*_FIELDS, "fractal_dimension", "topothesy", "run_time", "method", "increment_lag")
 
 
-def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, noise: Any) -> None:
+def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any) -> None:
     names = [DEFAULT]
     if methods is not None and problems.choices("methods", methods, ("default", *METHODS)):
         names = [DEFAULT if name == "default" else name for name in word_tuple(methods)]
         problems.require(bool(names), "methods", "at least one name", methods)
-    problems.boolean("noise", noise)
     is_valid = check_surface(
         problems,
         surface,

@@ -264,9 +264,6 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
         return
     if np.isfinite(heights.min()) and np.isfinite(heights.max()):
         return
-    problems.require(
-        not np.isinf(heights).any(), "surface", "heights that are finite or NaN", "infinite heights"
-    )
     core = int(np.prod(heights.shape[-axes:]))
     if not gaps:
         problems.finite("surface", heights, remedy="see fractalcontact.surfaces.fill")

@@ -30,8 +30,7 @@ SOURCE = (
 )
 
 
-def _check(problems: Problems, *, masks: Any, corrected: Any) -> None:
-    problems.boolean("corrected", corrected)
+def _check(problems: Problems, *, masks: Any) -> None:
     is_list = isinstance(masks, (list, tuple)) and len(masks) > 1
     if not problems.require(is_list, "masks", "a list of two masks or more", masks):
         return

@@ -65,8 +65,7 @@ def _check_boxes(
     problems.choice("cover", cover, COVERS)
     check_mask(problems, mask, valid=valid, periodic=periodic)
     shape = plane_shape(mask)
-    if shape is not None:
-        check_box_sizes(problems, argument, sizes, _longest_box(shape, cover))
+    check_box_sizes(problems, argument, sizes, _longest_box(shape, cover))
 
 
 def _longest_box(shape: Sequence[int], cover: Any) -> int:

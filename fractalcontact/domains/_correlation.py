@@ -33,8 +33,7 @@ SOURCE = (
 def _check(problems: Problems, *, mask: Any, scales: Any, periodic: Any, valid: Any) -> None:
     check_mask(problems, mask, valid=valid, periodic=periodic)
     shape = plane_shape(mask)
-    if shape is not None:
-        check_box_sizes(problems, "scales", scales, min(shape))
+    check_box_sizes(problems, "scales", scales, min(shape))
 
 
 @public_result(title="Correlation dimension", references=SOURCE, check=_check)

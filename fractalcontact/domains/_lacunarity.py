@@ -36,8 +36,7 @@ def _check(problems: Problems, *, mask: Any, box_sizes: Any, boxes: Any, periodi
     problems.choice("boxes", boxes, ("gliding", "fixed"))
     check_mask(problems, mask, valid=valid, periodic=periodic)
     shape = plane_shape(mask)
-    if shape is not None:
-        check_box_sizes(problems, "box_sizes", box_sizes, min(shape))
+    check_box_sizes(problems, "box_sizes", box_sizes, min(shape))
 
 
 @public_result(title="Lacunarity", references=SOURCE, achieved_error="exact to rounding", check=_check)

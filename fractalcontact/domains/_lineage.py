@@ -20,7 +20,7 @@ CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flag
 def check_path(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
     """Check a mask with a leading dim along which its planes follow each other."""
     check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
-    if plane_shape(mask) is not None:
+    if isinstance(mask, xr.DataArray) and plane_shape(mask)[0] <= mask.size:
         expected = "at least one leading dim for the path, as in (step, y, x)"
         problems.require(mask.ndim > 2, "mask.dims", expected, "(y, x)")
 

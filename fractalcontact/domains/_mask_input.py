@@ -17,9 +17,10 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, periodic_axes, read_grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES
 from fractalcontact.base.threads import thread_count
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import LARGEST_INTEGER, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 S = TypeVar("S")
@@ -88,14 +89,14 @@ def check_mask(
     problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, argument: str = "mask"
 ) -> bool:
     """Check a mask, its observed cells and the choice of periodicity; `read_planes` then reads them."""
-    if not _check_cells(problems, mask, argument):
-        problems.boolean("periodic", periodic, optional=True)
-        return False
-    has_grid = any(dim in mask.coords for dim in CORE_DIMS)
-    if has_grid and not problems.grid(argument, mask):
-        return False
-    is_valid = periodic is None or problems.periodic("periodic", periodic, mask_grid(mask))
-    return (valid is None or _check_valid(problems, valid, mask)) and is_valid
+    is_choice = problems.boolean("periodic", periodic, optional=True)
+    is_mask = _check_cells(problems, mask, argument)
+    is_valid = valid is None or _check_valid(problems, valid, mask if is_mask else None)
+    if is_mask and any(dim in mask.coords for dim in CORE_DIMS):
+        is_mask = problems.grid(argument, mask)
+    if is_mask and is_choice and periodic is not None:
+        is_choice = problems.periodic("periodic", periodic, mask_grid(mask))
+    return is_mask and is_valid and is_choice
 
 
 def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
@@ -114,12 +115,15 @@ def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
     return False
 
 
-def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray) -> bool:
-    """Check that the observed cells lie on the same grid, and on the same leading dims, as the mask."""
+def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray | None) -> bool:
+    """Check that the observed cells lie on the same grid, and on the same leading dims, as a valid mask."""
+    mask_dims = CORE_DIMS if mask is None else tuple(mask.dims)
     dims = tuple(valid.dims) if isinstance(valid, xr.DataArray) else None
-    if dims is None or valid.dtype.kind != "b" or dims not in (CORE_DIMS, tuple(mask.dims)):
-        problems.add("valid", f"a boolean DataArray with dims (y, x) or {tuple(mask.dims)}", valid)
+    if dims is None or valid.dtype.kind != "b" or (mask is not None and dims not in (CORE_DIMS, mask_dims)):
+        problems.add("valid", f"a boolean DataArray with dims (y, x) or {mask_dims}", valid)
         return False
+    if mask is None:
+        return True
     expected_shape = mask.shape[-valid.ndim :]
     if valid.shape != expected_shape:
         problems.add("valid", f"the shape of the mask, {expected_shape}", f"shape {valid.shape}")
@@ -142,10 +146,10 @@ def _same_coordinates(first: Array, second: Array) -> bool:
     return bool(np.all(np.abs(first - second) <= 1e-6 * spacing))
 
 
-def plane_shape(mask: Any) -> tuple[int, int] | None:
-    """Return (ny, nx) of a mask with dims (..., y, x), None of anything else."""
+def plane_shape(mask: Any) -> tuple[int, int]:
+    """Return (ny, nx) of a mask with dims (..., y, x); of anything else, the largest there could be."""
     if not isinstance(mask, xr.DataArray) or tuple(mask.dims[-2:]) != CORE_DIMS or mask.size == 0:
-        return None
+        return LARGEST_INTEGER, LARGEST_INTEGER
     return int(mask.shape[-2]), int(mask.shape[-1])
 
 

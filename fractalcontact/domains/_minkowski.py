@@ -10,9 +10,10 @@ import xarray as xr
 
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
@@ -32,8 +33,7 @@ SHORT_REACH = 2**14  # cells; distances up to it are kept as int16
 def _check(problems: Problems, *, mask: Any, radii: Any, periodic: Any, valid: Any) -> None:
     check_mask(problems, mask, valid=valid, periodic=periodic)
     shape = plane_shape(mask)
-    if shape is not None:
-        problems.numbers("radii", radii, at_least=0.5, at_most=float(max(shape)), optional=True)
+    problems.numbers("radii", radii, at_least=0.5, at_most=float(max(shape)), optional=True)
 
 
 @public_result(title="Minkowski dimension", references=SOURCE, check=_check)

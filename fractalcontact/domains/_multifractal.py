@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     EXPECTED,
     Array,
@@ -50,8 +51,7 @@ def _check(problems: Problems, *, mask: Any, q: Any, scales: Any, valid: Any) ->
         )
     check_mask(problems, _support(mask), valid=valid)
     shape = plane_shape(mask)
-    if shape is not None:
-        check_box_sizes(problems, "scales", scales, max(shape))
+    check_box_sizes(problems, "scales", scales, max(shape))
 
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)

@@ -11,21 +11,20 @@ import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(problems: Problems, *, path: Any, spacing: Any, threshold: Any, dark: Any) -> None:
-    if problems.path("path", path):
-        problems.require(Path(path).is_file(), "path", "an existing file", Path(path).name)
+def _check(problems: Problems, *, path: Any, spacing: Any, threshold: Any) -> None:
+    problems.file("path", path)
     if problems.numbers("spacing", spacing, above=0):
         size = float_array(spacing).size
         problems.require(size in (1, 2), "spacing", "one number or (y, x)", f"{size} numbers")
     problems.number("threshold", threshold, optional=True)
-    problems.boolean("dark", dark)
 
 
 @public_result(

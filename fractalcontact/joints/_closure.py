@@ -13,11 +13,12 @@ import xarray as xr
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
@@ -60,11 +61,9 @@ def _check(
     nominal_pressure: Any,
     bulk: Any,
     keep: Any,
-    progress: Any,
     **solver: Any,
 ) -> None:
     check_sliding(problems, crack, shear, direction)
-    problems.boolean("progress", progress)
     load = problems.construct(
         fc.contact.LoadPath.from_keywords,
         closure=closure,

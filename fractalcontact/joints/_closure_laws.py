@@ -34,6 +34,8 @@ def _check(problems: Problems, *, closure: Any, **_: Any) -> None:
     if not isinstance(closure, xr.Dataset):
         problems.add("closure", expected, f"an object of type {type(closure).__name__}")
         return
+    if not problems.result("closure", closure):
+        return
     names = ("interface_closure", "nominal_pressure")
     absent = [name for name in names if name not in closure.variables or "step" not in closure[name].dims]
     problems.require(not absent, "closure", expected, f"no {', '.join(absent)} over step")

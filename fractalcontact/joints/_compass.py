@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import Problems
 
 AZIMUTHS = {"E": 0.0, "NE": 45.0, "N": 90.0, "NW": 135.0, "W": 180.0, "SW": 225.0, "S": 270.0, "SE": 315.0}
@@ -33,13 +34,15 @@ def check_direction(problems: Problems, value: Any) -> bool:
     if isinstance(value, str):
         valid = value in AZIMUTHS
     else:
-        number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        valid = number and bool(abs(value) < LARGEST_AZIMUTH)  # False for NaN
+        valid = is_real(value) and bool(abs(value) < LARGEST_AZIMUTH)  # False for NaN
     return problems.require(valid, "direction", EXPECTED, value)
 
 
 def check_directions(problems: Problems, value: Any) -> bool:
     """Check for one direction or a sequence of them, in which each occurs once."""
+    if not is_single(value) and not isinstance(value, (list, tuple, np.ndarray)):
+        problems.add("direction", f"{EXPECTED}, or a list of them", value)
+        return False
     values = [value] if is_single(value) else list(value)
     if not values:
         problems.add("direction", EXPECTED, "an empty sequence")

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import plain
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._compass import (
     check_direction,
     check_directions,
@@ -270,11 +271,13 @@ def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) ->
         check_directions(problems, direction),
         problems.numbers("shear", shear, at_least=0),
     ]
-    if not all(valid):
+    if not valid[2]:
         return False
     values, counts = np.unique(float_array(shear), return_counts=True)
     repeated = ", ".join(f"{value:g} m" for value in values[counts > 1][:5])
     once = problems.require(not repeated, "shear", "every shear once", f"{repeated} several times")
+    if not all(valid):
+        return False
     greatest, inside = float(values[-1]), True
     for item in read_directions(direction):
         travel = crack.layout.travel(item.unit)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import NONE, Problems, float_array
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._friction import (
     ERROR,

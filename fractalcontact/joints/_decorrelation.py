@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._compass import (
     COMPASS,
     Direction,
@@ -41,7 +42,8 @@ ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a smaller residual from
 
 def _check(problems: Problems, *, crack: Any, direction: Any, shear: Any) -> None:
     if shear is not None:
-        if check_sliding(problems, crack, shear, direction):
+        check_sliding(problems, crack, shear, direction)
+        if problems.numbers("shear", shear, at_least=0):
             shears = float_array(shear)
             ascending = shears[0] == 0 and shears.size > 1 and bool((np.diff(shears) > 0).all())
             problems.require(ascending, "shear", "at least two shears, ascending from 0", shear)

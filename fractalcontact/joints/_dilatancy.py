@@ -10,11 +10,12 @@ import numpy as np
 import xarray as xr
 
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
+from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._closure import (
     Pressing,
     ShearedContact,
@@ -46,11 +47,9 @@ def _check(
     normal_stiffness: Any,
     bulk: Any,
     keep: Any,
-    progress: Any,
     **solver: Any,
 ) -> None:
     check_sliding(problems, crack, shear, direction)
-    problems.boolean("progress", progress)
     if normal_force is None:
         unused = {"keep": keep, "normal_stiffness": normal_stiffness, "bulk": bulk, **solver}
         _check_defaults(problems, unused)
@@ -67,7 +66,7 @@ def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
         default = parameters[name].default
         unused = value is default or (isinstance(value, type(default)) and value == default)
         if name == "keep":
-            unused = value is None or (np.ndim(value) > 0 and len(value) == 0)
+            unused = value is None or number_of_entries(value) == 0
         problems.require(unused, name, "nothing without normal_force", value)
 
 

@@ -11,9 +11,10 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from fractalcontact.base.grid import read_grid
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.polynomial import detrended, slopes
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._compass import LARGEST_AZIMUTH, read_direction
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -9,9 +9,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import quantity_text
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -192,7 +193,7 @@ def _angle(lift: xr.DataArray, smoothing: float | None) -> xr.DataArray:
 
 def _strength(angle: xr.DataArray, pressure: xr.DataArray) -> xr.DataArray:
     tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < LOCKED_ANGLE).values)))
-    return (tangent * pressure).transpose(*[dim for dim in angle.dims if dim != "step"], "step")
+    return (tangent * pressure).transpose(..., "step", missing_dims="ignore")
 
 
 def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
@@ -346,9 +347,12 @@ def check_dilatancy(
     is_form = problems.choice("form", form, FORMS)
     problems.number("smoothing", smoothing, above=0, optional=True)
     problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
+    problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
     expected = "the Dataset of fractalcontact.joints.dilatancy"
     if not isinstance(dilatancy, xr.Dataset):
         problems.add("dilatancy", expected, f"an object of type {type(dilatancy).__name__}")
+        return False
+    if not problems.result("dilatancy", dilatancy):
         return False
     name = _dilatancy_name(dilatancy)
     needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])

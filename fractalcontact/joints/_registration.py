@@ -37,9 +37,7 @@ TILES = 6  # along each axis, left out one by one for the standard errors
 RANK = 1e-9  # relative; below it a shift or rotation does not change the match
 
 
-def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, tilt: Any) -> None:
-    problems.boolean("rotation", rotation)
-    problems.boolean("tilt", tilt)
+def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any) -> None:
     valid = [
         problems.surface(name, face, finite=False, smallest=SMALLEST)
         for name, face in (("lower", lower), ("upper", upper))
@@ -57,7 +55,7 @@ def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, tilt: A
         problems.require(bool(np.isfinite(values).any()), argument, "heights", NONE)
     ratio = grid.spacing[0] / grid.spacing[1]
     # a rotation in cells is one in the plane only where the cells are square
-    square = not rotation or abs(ratio - 1.0) <= UNIFORM
+    square = not (problems.boolean("rotation", rotation) and rotation) or abs(ratio - 1.0) <= UNIFORM
     problems.require(square, "rotation", "False where spacings differ", f"a ratio of {ratio:g}")
 
 

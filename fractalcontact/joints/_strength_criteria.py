@@ -91,7 +91,7 @@ def barton_choubey_strength(
     1.0
     """
     with Problems("fractalcontact.joints.barton_choubey_strength") as problems:
-        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), above=0, at_most=LARGEST)
+        problems.numbers("nominal_pressure", nominal_pressure, above=0, at_most=LARGEST, any_shape=True)
         problems.number("roughness", roughness, at_least=0, at_most=20)
         problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
         problems.number("residual_angle", residual_angle, at_least=0, below=90)
@@ -249,7 +249,7 @@ def bandis_closure(
     50.0
     """
     with Problems("fractalcontact.joints.bandis_closure") as problems:
-        problems.numbers("nominal_pressure", np.ravel(nominal_pressure), at_least=0, at_most=LARGEST)
+        problems.numbers("nominal_pressure", nominal_pressure, at_least=0, at_most=LARGEST, any_shape=True)
         problems.number("initial_stiffness", initial_stiffness, above=0, at_most=LARGEST)
         problems.number("greatest_closure", greatest_closure, above=0, at_most=LARGEST)
     kni, vm = float(initial_stiffness), float(greatest_closure)
@@ -294,7 +294,7 @@ def self_weight_strength(length: float | Array, *, unit_weight: float, friction_
     240
     """
     with Problems("fractalcontact.joints.self_weight_strength") as problems:
-        problems.numbers("length", np.ravel(length), above=0, at_most=LARGEST)
+        problems.numbers("length", length, above=0, at_most=LARGEST, any_shape=True)
         problems.number("unit_weight", unit_weight, above=0, at_most=LARGEST)
         problems.number("friction_angle", friction_angle, at_least=0, below=90)
     tangent = np.tan(np.radians(float(friction_angle)))
@@ -341,7 +341,8 @@ def size_effect(scale: float, *, contact_dimension: float, roughness_dimension: 
     """
     with Problems("fractalcontact.joints.size_effect") as problems:
         problems.number("scale", scale, above=0, at_least=1 / LARGEST, at_most=LARGEST)
-        if problems.number("contact_dimension", contact_dimension, at_least=0, at_most=2):
-            problems.number("roughness_dimension", roughness_dimension, at_least=contact_dimension, at_most=2)
+        is_number = problems.number("contact_dimension", contact_dimension, at_least=0, at_most=2)
+        lowest = float(contact_dimension) if is_number else 0.0
+        problems.number("roughness_dimension", roughness_dimension, at_least=lowest, at_most=2)
     ratio, d_s, d_r = float(scale), float(contact_dimension), float(roughness_dimension)
     return SizeEffect(ratio ** (d_s - 2.0), ratio ** (d_s - d_r), ratio ** (d_s - 1.0))

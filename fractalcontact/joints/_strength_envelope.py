@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import LARGEST_JRC, SAMPLE_LENGTH, roughness_coefficient

@@ -45,6 +45,7 @@ def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic:
     if problems.choices("axis", axis, ("x", "y")):
         problems.require(len(word_tuple(axis)) > 0, "axis", "at least one of 'x', 'y'", axis)
     problems.number("viscosity", viscosity, above=0, optional=True)
+    problems.boolean("periodic", periodic, optional=True)
     if not problems.surface("gap", gap, leading=True, smallest=1):
         return
     check_leading(gap, RESULTS, problems, "gap")

@@ -90,7 +90,7 @@ def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
     if isinstance(measured, xr.DataTree) and measured.children:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
-        groups = {"": as_dataset(measured, "error_against_time")}
+        groups = {"": as_dataset(measured, "error_against_time", "measured")}
     needed = ("error", "run_time", "memory", "on_pareto_front", "benchmark", "error_meaning")
     benchmarks = {}
     for prefix, data in groups.items():
@@ -164,7 +164,7 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
     >>> print(upper.get_title(loc="left"), "|", lower.get_xlabel())
     fbm, n = 128 | true Hurst exponent
     """
-    data = as_dataset(bench, "estimator_errors")
+    data = as_dataset(bench, "estimator_errors", "bench")
     require_variables(data, "estimator_errors", ("error_ratio", "interval_coverage"), "bench")
     cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
     sheet = _style.figure_or_new(figure, (2.3 * len(cases) + 1.6, 5.2))

@@ -11,7 +11,7 @@ from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import draw_size_curves, path_panels
-from fractalcontact.plotting._inputs import as_dataset, result_of, table
+from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
@@ -171,6 +171,8 @@ def local_slopes(
     box size (mm) | local dimension
     """
     data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
+    scale = next((name for name in ("box_size", "radius") if name in data.variables), "box_size")
+    require_dims(data, "local_slopes", {"local_slope": scale, scale: scale})
     if "null_count" in data or "null_mass" in data:
         curve, sign = ("null_count", -1.0) if "null_count" in data else ("null_mass", 1.0)
         slope = sign * local_slope(data["box_size"].values, data[curve].values)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import nearest, result_of, table
 from fractalcontact.plotting._paths import shear_words
@@ -69,7 +70,7 @@ def closure_laws(
     closure (µm) | normal force $F$ (N)
     """
     figure, ax = _style.axes_or_new(ax)
-    data = result_of(closure, "closure_laws", ("closure", "normal_force"), ("shear", "step"))
+    data = result_of(closure, "closure_laws", ("closure", "normal_force"), ("shear", "step"), "closure")
     inner_name = "interface_closure" if "interface_closure" in data else "closure"
     force = table(data, "normal_force", ("shear", "step"))
     total = table(data, "closure", ("shear", "step"))
@@ -81,9 +82,13 @@ def closure_laws(
         if inner_name != "closure":
             ax.plot(length(total[i]), newton(force[i]), color=colour, marker=dot, **TOTAL_LINE)
         ax.plot(length(inner[i]), newton(force[i]), color=colour, marker=dot)
+    with Problems("fc.plotting.closure_laws") as problems:
+        last = force.shape[1] - 1
+        problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
     if len(marked) and len(force):
         row = 0 if shear is None or len(force) == 1 else nearest(data["shear"], shear)
-        mark_points(ax, length(inner[row, list(marked)]), newton(force[row, list(marked)]), colours[row])
+        steps = [int(step) for step in marked]
+        mark_points(ax, length(inner[row, steps]), newton(force[row, steps]), colours[row])
     ax.set_xlabel(length.label("closure"))
     ax.set_ylabel(axis_label(data["normal_force"], newton))
     _start_at_zero(ax, total, force)
@@ -143,6 +148,9 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
     """
     figure, ax = _style.axes_or_new(ax)
     data = result_of(result, "contact_area", ("contact_fraction", against), ("shear", "step"))
+    with Problems("fc.plotting.contact_area") as problems:
+        own = data[against].dims
+        problems.require(set(own) <= {"shear", "step"}, "against", "a variable of every step", own)
     loads = table(data, against, ("shear", "step"))
     raw = table(data, "contact_fraction", ("shear", "step"))
     scale, percent = scale_of(data[against]), scale_of(data["contact_fraction"])

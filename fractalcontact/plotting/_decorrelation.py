@@ -52,7 +52,7 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     """
     figure, ax = _style.axes_or_new(ax)
     names = ("correlation", "decorrelation_length", "shear")
-    data = result_of(memory, "correlation", names, ("direction", "shear"))
+    data = result_of(memory, "correlation", names, ("direction", "shear"), "memory")
     values = table(data, "correlation", ("direction", "shear"))
     along = scale_of(data["shear"])
     lengths = data.isel(shear=0)
@@ -105,7 +105,7 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     shear displacement $v$ (mm) | dimension of the delta-surface
     """
     figure, ax = _style.axes_or_new(ax)
-    data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",))
+    data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",), "dimension")
     along = scale_of(data["shear"])
     entries = []
     for i, name in enumerate(DIMENSIONS):

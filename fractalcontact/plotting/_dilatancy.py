@@ -56,7 +56,9 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
     shear displacement $v$ (µm) | rigid dilatancy $\delta_\mathrm{r}$ (µm)
     """
     figure, ax = _style.axes_or_new(ax)
-    data = result_of(dilatancy, "rigid_dilatancy", ("rigid_dilatancy", "shear"), ("direction", "shear"))
+    data = result_of(
+        dilatancy, "rigid_dilatancy", ("rigid_dilatancy", "shear"), ("direction", "shear"), "dilatancy"
+    )
     opening = table(data, "rigid_dilatancy", ("direction", "shear"))
     shear = np.atleast_1d(data["shear"].values).astype(float)
     across, along = scale_of(data["rigid_dilatancy"]), scale_of(data["shear"])
@@ -125,8 +127,8 @@ def elastic_dilatancy(
     dilatancy $\delta$ (µm) | 3 curves
     """
     figure, ax = _style.axes_or_new(ax)
-    selected = limit_shear(select_direction(dilatancy, direction, "elastic_dilatancy"), reach)
-    data = result_of(selected, "elastic_dilatancy", ("dilatancy", "shear"), ("shear", "step"))
+    selected = limit_shear(select_direction(dilatancy, direction, "elastic_dilatancy", "dilatancy"), reach)
+    data = result_of(selected, "elastic_dilatancy", ("dilatancy", "shear"), ("shear", "step"), "dilatancy")
     shear = np.atleast_1d(data["shear"].values).astype(float)
     opening = table(data, "dilatancy", ("shear", "step"))
     rigid = table(data, "rigid_dilatancy", ("shear",)) if "rigid_dilatancy" in data else None

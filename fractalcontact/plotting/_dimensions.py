@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
+from fractalcontact.plotting._inputs import as_dataset, require_variables, result_of, table, words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
@@ -89,20 +89,29 @@ def dimension_curves(
     return _style.root_figure(sheet)
 
 
+ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
+
+
 def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
     datasets: dict[str, xr.Dataset] = {}
     if isinstance(curves, xr.DataTree) and curves.children:
         datasets = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
         estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
     elif isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset | xr.DataTree):
-        datasets = {str(name): as_dataset(curve, "dimension_curves") for name, curve in curves.items()}
+        datasets = {
+            str(name): as_dataset(curve, "dimension_curves", "curves") for name, curve in curves.items()
+        }
     else:
-        dataset = as_dataset(curves, "dimension_curves")
+        dataset = as_dataset(curves, "dimension_curves", "curves")
         datasets = {curve_of(dataset)[1]: dataset}
     datasets = {name: curve for name, curve in datasets.items() if curve_of(curve)[1]}
     with Problems("fc.plotting.dimension_curves") as problems:
         problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
-    return datasets, None if estimates is None else as_dataset(estimates, "dimension_curves")
+    if estimates is None:
+        return datasets, None
+    estimates = as_dataset(estimates, "dimension_curves", "estimates")
+    require_variables(estimates, "dimension_curves", ESTIMATES, "estimates")
+    return datasets, estimates
 
 
 def curve_of(curve: xr.Dataset) -> tuple[str, str]:
@@ -126,7 +135,9 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     for ax in (upper, lower):
         _style.style_axes(ax)
     scale, value = curve_of(curve)
-    curve = result_of(curve, "dimension_curves", (scale, value), ())
+    curve = result_of(curve, "dimension_curves", (scale, value), (), "curves")
+    with Problems("fc.plotting.dimension_curves") as problems:
+        problems.require(curve[scale].ndim == 1, "curves", f"{scale} along one dim", curve[scale].dims)
     dim = curve[scale].dims[0]
     x, y = np.asarray(curve[scale].values, float), table(curve, value, (dim,))
     along, across = scale_of(curve[scale]), scale_of(curve[value])
@@ -237,7 +248,9 @@ def dimensions(
     >>> print([label.get_text() for label in ax.get_yticklabels()], "|", ax.get_xlabel())
     ['default', 'variogram'] | fractal dimension $\Delta$
     """
-    data = result_of(estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",))
+    data = result_of(
+        estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",), "estimates"
+    )
     names = words(data["method"])
     figure, ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
     value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))

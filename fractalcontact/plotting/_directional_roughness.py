@@ -67,7 +67,7 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
         order = np.append(order, order[0])
     for name, (label, style) in CURVES.items():
         polar.plot(np.radians(azimuth[order]), data[name].values[order], label=label, **style)
-    greatest = max(float(data[name].max()) for name in CURVES)
+    greatest = float(np.nan_to_num([float(data[name].max()) for name in CURVES]).max())
     polar.set_ylim(0.0, 1.12 * greatest or 1.0)
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
     polar.yaxis.set_major_formatter("{x:g}°")

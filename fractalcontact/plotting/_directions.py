@@ -15,9 +15,9 @@ JUMP = 4.0  # ratio of successive shears at which the evenly sampled part of a c
 NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 
-def select_direction(data: Any, direction: str | None, where: str) -> xr.Dataset:
+def select_direction(data: Any, direction: str | None, where: str, argument: str = "result") -> xr.Dataset:
     """Return the part of a result that belongs to a direction (None: everything)."""
-    dataset = as_dataset(data, where)
+    dataset = as_dataset(data, where, argument)
     if direction is None or "direction" not in dataset.coords:
         return dataset
     names = words(dataset["direction"])

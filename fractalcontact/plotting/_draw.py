@@ -12,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.netcdf import unfinished
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
+from fractalcontact.base.validation import Problems
 from fractalcontact.plotting._area_dimension import area_dimension
 from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
 from fractalcontact.plotting._closure import closure_laws, contact_area
@@ -86,6 +87,11 @@ def draw(
     ...     print([path.name for path in fc.plotting.draw(tree, folder)])
     ['dimensions.png']
     """
+    with Problems("fc.plotting.draw") as problems:
+        problems.tree("tree", tree)
+        problems.path("folder", folder, what="the path of a folder")
+        problems.boolean("progress", progress)
+        problems.boolean("paper", paper)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.schema import CORE_DIMS
+from fractalcontact.base.validation import NONE, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
+MAPS = ("height", "state", "slip_state", "label")
 PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
 
-def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) -> xr.Dataset:
+def result_of(
+    data: Any, where: str, names: Sequence[str], dims: Sequence[str], argument: str = "result"
+) -> xr.Dataset:
     """Return a result in which every dim of `dims` exists and no other path dim is left.
 
     A missing dim is added with length one; another path dim of length one is dropped.
@@ -29,17 +32,19 @@ def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) 
         Variables that must be present.
     dims : sequence of str
         Dims that the figure runs over (`shear`, `step` ...).
+    argument : str
+        Name of the argument, for the message.
 
     Raises
     ------
     InvalidInput
         A variable is missing, or another path dim is longer than one.
     """
-    dataset = as_dataset(data, where)
+    dataset = as_dataset(data, where, argument)
     with Problems(f"fc.plotting.{where}") as problems:
         for name in names:
             problems.require(
-                name in dataset.variables, "result", f"the variable {name!r}", list(dataset.variables)
+                name in dataset.variables, argument, f"the variable {name!r}", list(dataset.variables)
             )
         extra = [
             dim
@@ -50,22 +55,33 @@ def result_of(data: Any, where: str, names: Sequence[str], dims: Sequence[str]) 
         ]
         for dim in extra:
             problems.require(
-                dataset.sizes[dim] == 1, "result", f"one {dim}; choose with .sel or .isel", dataset.sizes[dim]
+                dataset.sizes[dim] == 1, argument, f"one {dim}; choose with .sel or .isel", dataset.sizes[dim]
             )
     dataset = dataset.isel(dict.fromkeys(extra, 0))
     return dataset.expand_dims([dim for dim in dims if dim not in dataset.dims])
 
 
-def as_dataset(data: Any, where: str) -> xr.Dataset:
-    """Return a Dataset, the Dataset of a tree's node, or a DataArray as a Dataset."""
-    if isinstance(data, xr.Dataset):
-        return data
+def as_dataset(data: Any, where: str, argument: str = "result") -> xr.Dataset:
+    """Return the valid Dataset of a result, of a tree's node or of a DataArray; (y, x) are its last dims."""
     if isinstance(data, xr.DataTree):
-        return data.to_dataset()
+        data = data.to_dataset()
     if isinstance(data, xr.DataArray):
-        return data.to_dataset(name="height" if data.name is None else str(data.name))
-    expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
-    raise InvalidInput(f"fc.plotting.{where}", [f"result: expected {expected}, got {type(data).__name__}"])
+        is_own = data.name in data.coords
+        data = (
+            data.coords.to_dataset()
+            if is_own
+            else data.rename("height" if data.name in (None, "") else data.name).to_dataset()
+        )
+    with Problems(f"fc.plotting.{where}") as problems:
+        expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
+        if problems.require(isinstance(data, xr.Dataset), argument, expected, type(data).__name__):
+            problems.result(argument, data)
+            for name in MAPS:
+                own = data[name].dims if name in data.variables else CORE_DIMS
+                problems.require(set(CORE_DIMS) <= set(own), f"{argument}.{name}", "dims (..., y, x)", own)
+    first = [dim for dim in PATH_DIMS if dim in data.dims]
+    result: xr.Dataset = data.transpose(*first, ..., *(dim for dim in CORE_DIMS if dim in data.dims))
+    return result
 
 
 def require_variables(dataset: xr.Dataset, where: str, names: Sequence[str], argument: str) -> None:
@@ -77,9 +93,23 @@ def require_variables(dataset: xr.Dataset, where: str, names: Sequence[str], arg
             )
 
 
+def require_dims(dataset: xr.Dataset, where: str, dims: Mapping[str, str], argument: str = "result") -> None:
+    """Raise InvalidInput unless each of the variables has its dim."""
+    with Problems(f"fc.plotting.{where}") as problems:
+        for name, dim in dims.items():
+            if problems.require(name in dataset.variables, argument, f"the variable {name!r}", NONE):
+                own = dataset[name].dims
+                problems.require(dim in own, f"{argument}.{name}", f"the dim {dim}", own)
+
+
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     """Return a variable as an array with exactly `dims`, repeated along those it does not have."""
     variable = data[name]
+    others = {dim: variable.sizes[dim] for dim in variable.dims if dim not in dims}
+    with Problems("fc.plotting") as problems:
+        for dim, size in others.items():
+            problems.require(size == 1, f"result.{name}", f"one {dim}; choose with .sel or .isel", size)
+    variable = variable.isel(dict.fromkeys(others, 0))
     for dim in dims:
         if dim not in variable.dims:
             variable = variable.expand_dims({dim: data.sizes[dim]})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import draw_size_curves
-from fractalcontact.plotting._inputs import result_of
+from fractalcontact.plotting._inputs import require_dims, result_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -56,4 +56,5 @@ def lacunarity(
     box size (mm) | lacunarity $\Lambda$
     """
     data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
+    require_dims(data, "lacunarity", {"lacunarity": "box_size"})
     return draw_size_curves(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")

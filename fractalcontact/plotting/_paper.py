@@ -93,7 +93,8 @@ def paper_figure(tree: xr.DataTree, number: int) -> Figure:
     height (µm)
     """
     with Problems("fc.plotting.paper_figure") as problems:
-        if problems.integer("number", number, at_least=1, at_most=5):
+        is_number = problems.integer("number", number, at_least=1, at_most=5)
+        if problems.tree("tree", tree) and is_number:
             groups = " and ".join(GROUPS[number])
             problems.require(has_figure(tree, number), "tree", f"data for figure {number} in {groups}", NONE)
     drawing = {1: _surfaces, 2: _scheme, 3: _closure, 4: _domains, 5: _dilatancy}[number]

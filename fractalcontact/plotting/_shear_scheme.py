@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.units import quantity_text, scale_for
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._directions import direction_name
 from fractalcontact.plotting._inputs import extent_of, result_of, words
@@ -85,8 +86,8 @@ def sliding_scheme(
     >>> print(section.get_title(loc="left"))
     section along the sliding direction, East
     """
-    lower, step = plane_of(surface, "sliding_scheme", "height"), shear_step_of(delta)
-    facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height")
+    lower, step = plane_of(surface, "sliding_scheme", "height", "surface"), shear_step_of(delta)
+    facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height", "upper")
     sheet = _style.figure_or_new(figure, (_style.WIDTH + 0.8, 3.0))
     left, right = sheet.subplots(1, 2, width_ratios=(1.0, 1.9))
     _draw_plan(left, lower, step)
@@ -99,13 +100,15 @@ def sliding_scheme(
 
 def shear_step_of(delta: Any) -> ShearStep:
     """Return the delta-surface of the largest shear with its shear and direction."""
-    data = result_of(delta, "sliding_scheme", ("height",), ("shear",))
+    data = result_of(delta, "sliding_scheme", ("height",), ("shear",), "delta")
     last = int(np.argmax(np.atleast_1d(data["shear"].values))) if "shear" in data.coords else 0
     plane = data.isel(shear=last)
     direction = words(plane["direction"])[0] if "direction" in plane.coords else ""
     azimuth = float(plane["azimuth"]) if "azimuth" in plane.coords else AZIMUTHS.get(direction, 0.0)
     shear = float(plane["shear"]) if "shear" in plane.coords else 0.0
-    return ShearStep(plane_of(plane["height"], "sliding_scheme", "height"), shear, direction, azimuth)
+    return ShearStep(
+        plane_of(plane["height"], "sliding_scheme", "height", "delta"), shear, direction, azimuth
+    )
 
 
 def _draw_plan(ax: Axes, lower: xr.DataArray, step: ShearStep) -> None:
@@ -153,6 +156,9 @@ def _draw_section(
     _, upper_height = line_through(facing, centre, step.unit)
     x, y = centre[:, None] + step.unit[:, None] * position
     inside = (x > left) & (x < right) & (y > bottom) & (y < top)
+    with Problems("fc.plotting.sliding_scheme") as problems:
+        heights = [np.isfinite(values).any() for values in (lower_height, upper_height[inside])]
+        problems.require(all(heights), "surface", "heights where delta lies", NONE)
     upper_height, upper_position = upper_height[inside], position[inside] + step.shear
     span = max(float(np.nanmax(lower_height) - np.nanmin(lower_height)), 1e-9 * float(np.ptp(position)))
     low = float(np.nanmin(lower_height)) - 0.5 * span

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
+
+from fractalcontact.base.numbers import number_of_entries
+from fractalcontact.base.validation import Problems
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,16 +81,49 @@ RC: dict[Any, Any] = {
 
 
 def styled(function: Callable[P, R]) -> Callable[P, R]:
-    """Draw with the settings `RC` and restore the caller's settings afterwards."""
+    """Check the options by their declared types, and draw with the settings `RC`, which are restored."""
+    signature = inspect.signature(function)
+    where = f"fc.plotting.{function.__name__}"
 
     @functools.wraps(function)
     def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
         import matplotlib
 
+        with Problems(where) as problems:
+            for name, value in signature.bind(*arguments, **options).arguments.items():
+                _check_option(problems, name, value, str(signature.parameters[name].annotation))
         with matplotlib.rc_context(RC):
             return function(*arguments, **options)
 
     return wrapper
+
+
+def _check_option(problems: Problems, name: str, value: Any, declared: str) -> None:
+    """Check the value of an option whose annotation is one of a few; data are checked where they are read."""
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+
+    words = declared.split(" | ")
+    optional = "None" in words
+    if words[0] == "Axes":
+        problems.require(value is None or isinstance(value, Axes), name, "an Axes, or None", value)
+    elif words[0] == "Figure":
+        expected = "a Figure or SubFigure, or None"
+        problems.require(value is None or isinstance(value, FigureBase), name, expected, value)
+    elif words[0] == "bool":
+        problems.boolean(name, value)
+    elif words[0] == "str":
+        problems.require(isinstance(value, str) or (optional and value is None), name, "words", value)
+    elif words[0] == "int":
+        problems.integer(name, value, at_least=1)
+    elif words[0] == "float":
+        problems.number(name, value, optional=optional)
+    elif words[0].startswith(("Sequence[", "tuple[")) and not (optional and value is None):
+        pair = words[0].startswith("tuple[")
+        expected = "two numbers" if pair else "a sequence of numbers"
+        size = number_of_entries(value)
+        if problems.require(size is not None and (size == 2 or not pair), name, expected, value) and size:
+            problems.numbers(name, value)
 
 
 def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL) -> tuple[Figure, Axes]:

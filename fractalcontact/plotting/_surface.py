@@ -57,13 +57,14 @@ def surface(
     >>> [ax.get_ylabel() for ax in figure.axes]
     ['$y$ (mm)', 'height (mm)']
     """
-    plane = plane_of(surface, "surface", "height")
+    plane = plane_of(surface, "surface", "height", "surface")
+    outline = None if block is None else _block_extent(block)
     figure, ax = _style.axes_or_new(ax, SIZE)
     length, height = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
     mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height)
-    if block is not None:
-        draw_outline(ax, extent_of(block), length)
+    if outline is not None:
+        draw_outline(ax, outline, length)
     _maps.colour_bar(ax, mappable, axis_label(plane, height))
     label_axes(ax, plane, length)
     ax.set_title(title)
@@ -100,7 +101,7 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
     >>> print(figure.axes[1].get_ylabel())
     contact pressure (MPa)
     """
-    plane = plane_of(data, "field", "")
+    plane = plane_of(data, "field", "", "data")
     figure, ax = _style.axes_or_new(ax, SIZE)
     length, shown = plane_scale(plane), scale_of(plane)
     mappable = _maps.field(
@@ -112,18 +113,27 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
     return figure
 
 
-def plane_of(data: Any, where: str, name: str) -> xr.DataArray:
+def _block_extent(block: Any) -> tuple[float, float, float, float]:
+    with Problems("fc.plotting.surface") as problems:
+        if problems.require(isinstance(block, xr.DataArray), "block", "a DataArray with x and y", block):
+            problems.grid("block", block)
+    return extent_of(block)
+
+
+def plane_of(data: Any, where: str, name: str, argument: str = "result") -> xr.DataArray:
     """Return the one plane (y, x) in `data`: the variable `name`, or the first one."""
-    dataset = as_dataset(data, where)
+    dataset = as_dataset(data, where, argument)
     variable = name if name in dataset.data_vars else next(iter(dataset.data_vars), "")
     with Problems(f"fc.plotting.{where}") as problems:
-        if problems.require(bool(variable), "result", "a variable with dims (y, x)", NONE):
+        if problems.require(bool(variable), argument, "a variable with dims (y, x)", NONE):
             plane = dataset[variable]
-            problems.require({"y", "x"} <= set(plane.dims), str(variable), "dims (y, x)", plane.dims)
+            place = f"{argument}.{variable}"
+            problems.require({"y", "x"} <= set(plane.dims), place, "dims (y, x)", plane.dims)
+            problems.require(plane.dtype.kind in "biuf", place, "real numbers", f"type {plane.dtype}")
             for dim in plane.dims:
                 if dim not in ("y", "x"):
                     size = plane.sizes[dim]
-                    problems.require(size == 1, str(variable), f"one {dim}; choose with .sel or .isel", size)
+                    problems.require(size == 1, place, f"one {dim}; choose with .sel or .isel", size)
     plane = dataset[variable]
     return plane.squeeze([dim for dim in plane.dims if dim not in ("y", "x")]).transpose("y", "x")
 

@@ -140,8 +140,9 @@ def joint_options(scene: Scene, name: str) -> dict[str, Any]:
     stage = STAGES[f"joints/{name}"]
     options = scene.stage_options(stage)
     options.pop("block", None)  # an argument of the crack
-    if name in ONE_LOAD:
-        load = scene.joint.loads(name, [key for key in LOADS if key in stage.arguments()])[0]
+    loads = scene.joint.loads(name, [key for key in LOADS if key in stage.arguments()])
+    if name in ONE_LOAD and loads:
+        load = loads[0]
         options = {key: value for key, value in options.items() if key not in LOADS or key == load}
     if name == "elimination":
         options["method"] = name

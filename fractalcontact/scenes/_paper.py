@@ -8,6 +8,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from fractalcontact.base.tables import table
+from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _paper_findings as findings
 from fractalcontact.scenes._caveats import member_count, of_member
 from fractalcontact.scenes._contents import note
@@ -58,6 +59,8 @@ def paper_table(tree: xr.DataTree) -> str:
     >>> [line[-2:] for line in lines if "about 2 mm" in line]
     ['no']
     """
+    with Problems("fractalcontact.scenes.paper_table") as problems:
+        problems.tree("tree", tree)
     if "joints" not in tree.children:
         return ""
     members = member_count(tree)

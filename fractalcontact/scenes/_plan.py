@@ -123,6 +123,8 @@ def plan(scene: Scene) -> Plan:
     surfaces - input
     joints/rigid_dilatancy - rigid_dilatancy is wanted
     """
+    with Problems("fractalcontact.scenes.plan") as problems:
+        problems.require(isinstance(scene, Scene), "scene", "a Scene, from fractalcontact.scenes.load", scene)
     scene, choices = choose(scene)
     return Plan(scene.name, stages_of(scene), choices)
 

@@ -12,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import table
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
+from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count
 from fractalcontact.scenes._contents import note, reasons, stage_table
 from fractalcontact.scenes._paper import paper_table
@@ -46,6 +47,8 @@ def summary(tree: xr.DataTree) -> str:
     -----------------  -------  -----------  ------------
     E                  10 mm    1.15 mm      +0.0264
     """
+    with Problems("fractalcontact.scenes.summary") as problems:
+        problems.tree("tree", tree)
     members = member_count(tree)
     sections = [
         str(tree.attrs.get("title", tree.name or "result")),

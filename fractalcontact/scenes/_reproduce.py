@@ -75,13 +75,14 @@ def reproduce(
     with Problems(WHERE) as problems:
         is_path = problems.path("folder", folder)
         expected = "a result with the attribute `provenance` of this package"
+        problems.integer("member", member, at_least=0, optional=True)
         attributes = getattr(result, "attrs", None)
         is_result = isinstance(attributes, Mapping) and bool(provenance_of(result))  # type: ignore[arg-type]
         if problems.require(is_result, "result", expected, type(result).__name__) and is_path:
             entry = provenance_of(result)  # type: ignore[arg-type]
             count = member_count(entry)
             if count is None:
-                problems.require(member in (None, 0), "member", "None for a single result", member)
+                problems.integer("member", member, at_least=0, at_most=0, optional=True)
             else:
                 problems.integer("member", member, at_least=0, at_most=count - 1)
     source = _Source(Path(folder))

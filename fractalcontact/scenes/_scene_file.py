@@ -6,7 +6,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,8 @@ LARGEST_FILE = 1 << 20  # bytes
 LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
 NOT_IN_KEYS = re.compile(r"[^\w\s.\"'-]")
 KEY_PART = re.compile(r"[\w\"']\s*\.")
+DEEPEST = 8  # levels of tables and lists; a scene has four
+TOO_DEEP = "tables or lists are nested too deeply: expected a table, its sub-tables and lists in them"
 COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
 
 # bounds of the arguments that several stages share: one number, or one or several
@@ -97,16 +99,42 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
     source = _find(Path(path))
     try:
         tables = tomllib.loads(_text(source))
+    except OSError as error:
+        raise UnreadableFile(f"scene {source.name}", [f"it cannot be read: {error.strerror}"]) from error
     except RecursionError:
-        reason = "not a TOML file: lists or tables are nested too deeply"
-        raise UnreadableFile(f"scene {source.name}", [reason]) from None
+        raise UnreadableFile(f"scene {source.name}", [TOO_DEEP]) from None
     except ValueError as error:  # not TOML or not UTF-8, too large, or a number of more than 4300 digits
         raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
-    problems = Problems(f"scene {source.stem}")
-    tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
-    scene = Scene(source.stem, tables, source.resolve().parent)
+    return check_tables(Scene(source.stem, tables, source.resolve().parent))
+
+
+def _is_too_deep(value: Any) -> bool:
+    """Return whether tables and lists are nested deeper than any scene needs."""
+    level = [value]
+    for _ in range(DEEPEST):
+        inner = [item.values() if isinstance(item, dict) else item for item in level]
+        level = [item for items in inner for item in items if isinstance(item, (dict, list))]
+        if not level:
+            return False
+    return True
+
+
+def check_tables(scene: Scene) -> tuple[Scene, Problems]:
+    """Return a scene with its ranges expanded, and the problems of its tables.
+
+    In place of what is no table it has an empty one, so that the problems of the others are listed too.
+    """
+    problems = Problems(f"scene {scene.name}")
+    if _is_too_deep(scene.tables):
+        raise InvalidInput(problems.where, [TOO_DEEP])
+    tables = {key: _expand_ranges(value, key, problems) for key, value in scene.tables.items()}
+    for name in TABLES:
+        if not isinstance(tables.get(name, {}), dict):
+            problems.add(name, "a table", tables[name])
+            tables[name] = {}
+    scene = replace(scene, tables=tables)
     _check(scene, problems)
-    if not problems.messages:
+    if not any(argument.startswith("want") for argument in problems.arguments):
         check_loads(scene, problems)
     return scene, problems
 
@@ -175,11 +203,6 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
 def _check(scene: Scene, problems: Problems) -> None:
     _check_keys(scene.tables, (*SETTINGS, *TABLES), "", problems)
     _check_settings(scene.tables, problems)
-    not_tables = [name for name in TABLES if not isinstance(scene.tables.get(name, {}), dict)]
-    for name in not_tables:
-        problems.add(name, "a table", scene.tables[name])
-    if not_tables:
-        raise InvalidInput(problems.where, problems.messages)
     _check_surface(scene.table("surface"), "surface", problems)
     if "upper" in scene.tables:
         _check_surface(scene.table("upper"), "upper", problems)
@@ -191,6 +214,7 @@ def _check(scene: Scene, problems: Problems) -> None:
         keys = [key for key in arguments_of("dimensions.estimate")[0] if key != "methods"]  # from [want]
         _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
     if "joint" in scene.tables:
+        problems.boolean("joint.register", scene.table("joint").get("register", False))
         _check_stages(scene.table("joint"), "joint", _joint_keys(), JOINT_STAGES, problems)
     if "domains" in scene.tables:
         _check_stages(scene.table("domains"), "domains", (), DOMAIN_STAGES, problems)
@@ -205,6 +229,8 @@ def _check_settings(tables: Table, problems: Problems) -> None:
     if "budget" in tables:
         problems.number("budget", tables["budget"], above=0)
     problems.boolean("paper", tables.get("paper", False))
+    title = tables.get("title", "")
+    problems.require(isinstance(title, str), "title", "words", title)
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
@@ -218,14 +244,21 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
             _check_keys(table, (*keys, "generate", "level"), name, problems)
             for key in sorted(required - set(table)):
                 problems.add(f"{name}.{key}", f"a value for {generator}", NONE)
+            if "shape" in table:  # one number would make a profile, and studies are of surfaces
+                shape = table["shape"]
+                is_pair = isinstance(shape, list) and len(shape) == 2
+                problems.require(is_pair, f"{name}.shape", "[ny, nx]", shape)
         if "members" in table:
             problems.integer(f"{name}.members", table["members"], at_least=1)
     else:
         _check_keys(table, READING, name, problems)
         if sources == ["read"]:
-            problems.require(isinstance(table["read"], str), f"{name}.read", "a path", table["read"])
+            problems.path(f"{name}.read", table["read"])
         else:
             problems.choice(f"{name}.sample", table["sample"], SAMPLES)
+    for flag in ("despike", "fill"):
+        problems.boolean(f"{name}.{flag}", table.get(flag, False))
+    problems.integer(f"{name}.level", table.get("level"), at_least=0, optional=True)
     _check_numbers(table, name, problems)
 
 

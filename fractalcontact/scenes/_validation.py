@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
@@ -31,12 +34,20 @@ from fractalcontact.scenes._parts import map_reader
 from fractalcontact.scenes._plan import Stage, stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scene import Scene, SurfaceTable
-from fractalcontact.scenes._scene_file import parse
-from fractalcontact.scenes._stages import JOINT_STAGES, PARTIAL_SLIP, STAGES, public_function
+from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
+from fractalcontact.scenes._stages import (
+    FIGURES,
+    JOINT_STAGES,
+    PARTIAL_SLIP,
+    STAGES,
+    arguments_of,
+    public_function,
+)
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
 
+INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
 LARGE = 1 << 18  # points of a generated surface that is not made twice
 
 
@@ -72,18 +83,33 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     with Problems("fractalcontact.scenes.validate") as problems:
         expected = "a Scene or the path of a TOML file"
         problems.require(isinstance(scene, (Scene, str, os.PathLike)), "scene", expected, scene)
-    if isinstance(scene, Scene):
-        problems = Problems(f"scene {scene.name}")
-    else:
-        scene, problems = parse(scene)
+    scene, problems = check_tables(scene) if isinstance(scene, Scene) else parse(scene)
     with problems:
+        if not _is_valid(problems, "material"):
+            known = {key: table for key, table in scene.tables.items() if key != "material"}
+            scene = replace(scene, tables=known)
         surfaces = _validate_surfaces(scene, problems)
-        if _is_valid(problems, "want", "material", "joint.block"):
-            _validate_crack(scene, surfaces, problems)
-        if not problems.messages:
-            _validate_calls(scene, surfaces, problems)
+        if _is_valid(problems, "want"):
+            _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
     warn(implausible_input(scene, surfaces["surface"]))
     return scene
+
+
+@contextmanager
+def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
+    """Collect the problems of a call, but for its inputs and for values that the tables were told of.
+
+    An input that could not be made is passed as None, so that the other arguments are checked all the same.
+    """
+    try:
+        yield
+    except InvalidInput as error:
+        for line in error.problems:
+            argument = line.partition(":")[0].partition(".")[0]
+            if argument not in INPUTS and not any(
+                f"{table}.{argument}" in problems.arguments for table in tables
+            ):
+                problems.note(f"{tables[0] or place}.{argument}", f"{place}: {line}")
 
 
 def _is_valid(problems: Problems, *keys: str) -> bool:
@@ -96,11 +122,13 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
     """Return the valid surfaces of the scene; of an ensemble one."""
     surfaces = {}
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
-        is_read = name == "surface" or (_is_valid(problems, "want") and scene.want.joints)
-        if table is not None and is_read and _is_valid(problems, name):
+        if table is None or (name == "upper" and not (_is_valid(problems, "want") and scene.want.joints)):
+            continue
+        if table.generate in GENERATORS:
+            with _collected(problems, name, name):
+                _validate_call(f"surfaces.{table.generate}", **generator_options(table))
+        if _is_valid(problems, name):
             with problems.collect(f"{name}: "):
-                if table.generate is not None:
-                    _validate_call(f"surfaces.{table.generate}", **generator_options(table))
                 flat = _flat_surface(table)
                 surfaces[name] = read_surface(table, scene.folder) if flat is None else flat
     return surfaces
@@ -126,23 +154,27 @@ def _zeros(
     return label(zeros)
 
 
-def _validate_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
-    """Check the block and the shears, which must not push it off its face."""
+def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> Crack | None:
+    """Return the crack of the scene, None without one; its shears must not push the block off its face."""
     joint_presses = bool(scene.want.domains) and not scene.is_pressed
     slides = any(not STAGES[f"joints/{name}"].takes_surface for name in scene.want.joints)
-    if not (slides or joint_presses):
-        return
+    if not (slides or joint_presses) or not _is_valid(problems, "material", "joint.block"):
+        return None
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
-        return
+        return None
+    crack = None
     with problems.collect("joint: "):
         crack = _crack(scene, surfaces)
-        for stage in stages_of(scene) if _is_valid(problems, "joint") else ():
+        for stage in stages_of(scene):
             name = stage.name.partition("/")[2]
             if stage.name.startswith("joints/") and name in JOINT_STAGES:
                 options = scene.stage_options(stage.row, ("shear", "direction"))
-                if "shear" in options:
-                    sliding = _crack(scene, surfaces, name) if name == "elimination" else crack
+                keys = [f"joint{part}.{key}" for part in ("", f".{name}") for key in options]
+                if "shear" in options and _is_valid(problems, *keys):
+                    own = name == "elimination" and _is_valid(problems, "joint.elimination.block")
+                    sliding = _crack(scene, surfaces, name) if own else crack
                     _validate_travel(sliding, options, stage, problems)
+    return crack
 
 
 def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], name: str = "") -> Crack:
@@ -162,40 +194,59 @@ def _validate_travel(crack: Crack, options: dict[str, Any], stage: Stage, proble
             problems.add(f"{stage.name}: shear", f"at most {travel:g} m towards {direction}", longest)
 
 
-def _validate_calls(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> None:
+def _validate_calls(
+    scene: Scene, surfaces: dict[str, xr.DataArray], crack: Crack | None, problems: Problems
+) -> None:
     """Validate every call of the study; zeros replace the result of an earlier stage."""
-    surface = surfaces["surface"]
-    is_flat = _flat_surface(scene.surface) is not None  # which loads are possible depends on the heights
-    crack = None
+    surface = surfaces.get("surface")
+    # which loads are possible depends on the heights
+    is_flat = surface is not None and _flat_surface(scene.surface) is not None
     for stage in stages_of(scene):
+        if stage.name == FIGURES:
+            continue
         name = stage.name.partition("/")[2]
-        with problems.collect(f"{stage.name}: "):
+        tables = (stage.row.table, stage.row.table.partition(".")[0])
+        with _collected(problems, stage.name, *tables):
             if stage.name == "dimensions":
-                options = dict(scene.table("dimensions"))
-                _validate_call(stage.row.function, surface, list(scene.want.dimensions), **options)
+                options = scene.stage_options(stage.row) | {"methods": list(scene.want.dimensions)}
+                _validate_call(stage.row.function, surface, **options)
             elif stage.name == "contact" and not is_flat:
-                _validate_call(stage.row.function, surface, keep=stage.keep, **contact_options(scene))
+                options = _contact_options(scene)
+                _validate_call(stage.row.function, surface, keep=stage.keep, **options)
             elif stage.name == PARTIAL_SLIP and not is_flat:
-                _validate_call(stage.row.function, surface, keep=stage.keep, **slip_options(scene))
+                options = {"contact_modulus": None} | slip_options(scene)
+                _validate_call(stage.row.function, surface, keep=stage.keep, **options)
             elif stage.reads_map:
-                reader = map_reader(stage, scene)
-                maps = _empty_maps(scene, surface, float if reader.variable == "gap" else bool)
+                reader, maps = map_reader(stage, scene), None
+                if surface is not None and (scene.is_pressed or crack is not None):
+                    maps = _empty_maps(scene, surface, float if reader.variable == "gap" else bool)
                 _validate_call(reader.function, maps, **reader.options)
             elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
-                if not stage.row.takes_surface and (scene.joint.register or (is_flat and name in PRESSING)):
-                    continue
                 if stage.row.takes_surface:
                     _validate_call(stage.row.function, surface, **joint_options(scene, name))
                     continue
-                if crack is None:
-                    crack = _crack(scene, surfaces)
-                pressed = _crack(scene, surfaces, name) if name == "elimination" else crack
+                if scene.joint.register is True or (is_flat and name in PRESSING):
+                    continue
+                own = name == "elimination" and crack is not None
+                own = own and _is_valid(problems, "joint.elimination.block")
+                pressed = _crack(scene, surfaces, name) if own else crack
                 options = joint_options(scene, name) | ({"keep": stage.keep} if stage.row.keeps else {})
                 _validate_call(stage.row.function, pressed, **options)
 
 
+def _contact_options(scene: Scene) -> dict[str, Any]:
+    """Return the known arguments of the press; the modulus is open where the material is not valid."""
+    allowed = arguments_of("contact.press")[0]
+    options = {key: value for key, value in contact_options(scene).items() if key in allowed}
+    return {"contact_modulus": None} | options
+
+
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
-    public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
+    """Validate a call that has all arguments it needs; what is missing was noted before."""
+    allowed, required = arguments_of(name)
+    options = {key: value for key, value in options.items() if key in allowed or key in ("keep", "methods")}
+    if required <= set(options):
+        public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 
 
 def _empty_maps(scene: Scene, surface: xr.DataArray, dtype: type) -> xr.DataArray:

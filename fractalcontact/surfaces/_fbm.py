@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.process import physical_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
@@ -35,7 +34,7 @@ def _check(
     members: Any,
     rng: Any,
 ) -> None:
-    valid_plane = check_plane(problems, shape, spacing)
+    valid_plane = check_plane(problems, shape, spacing, members=members)
     valid_hurst = problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
     check_length(problems, "rms_increment", rms_increment)
     check_length(problems, "lag", lag, optional=True)
@@ -141,17 +140,9 @@ def _check_memory(
     problems: Problems, shape: tuple[int, int], spacing: tuple[float, float], hurst: float
 ) -> None:
     """Note a problem where the torus does not fit into the memory of this machine."""
-    memory = _physical_memory()
+    memory = physical_memory()
     torus = torus_shape(shape, spacing, hurst)
     needed = 8.0 * (0.5 * torus[0] * torus[1] + shape[0] * torus[1] + shape[0] * shape[1])
     if needed > memory:
         size = f"{torus[0]} x {torus[1]} points, {needed / 2**30:.3g} GiB"
         problems.add("shape / spacing", f"a torus that fits into {memory / 2**30:.3g} GiB of memory", size)
-
-
-def _physical_memory() -> float:
-    """Return the memory of this machine in bytes; infinity where the system does not report it."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return math.inf

@@ -9,10 +9,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
+from fractalcontact.surfaces._grid_input import axis_spacing, check_memory, check_spacing, surface_array
 
 
 def check_heights(problems: Problems, heights: Any) -> int | None:
@@ -23,6 +24,8 @@ def check_heights(problems: Problems, heights: Any) -> int | None:
     values = _real_array(heights)
     if values is None:
         problems.add("heights", "an array of real numbers", heights)
+        return None
+    if not _is_lazy(values) and not check_memory(problems, "heights", values.shape):
         return None
     before = len(problems.messages)
     axes = _plane_axes(heights, values.ndim)
@@ -54,11 +57,8 @@ def _check(problems: Problems, *, heights: Any, spacing: Any, periodic: Any, uni
     axes = check_heights(problems, heights)
     check_spacing(problems, spacing, axes)
     problems.choice("units", units, UNITS)
-    try:
-        flags = np.asarray(periodic)
-        valid = flags.dtype == np.bool_ and flags.shape in ((), (axes or 2,))
-    except ValueError:  # rows of unequal length
-        valid = False
+    flags = as_array(periodic)
+    valid = flags is not None and flags.dtype == np.bool_ and flags.shape in ((), (axes or 2,))
     expected = "True or False" + (", or (y, x)" if axes != 1 else "")
     problems.require(valid, "periodic", expected, periodic)
 
@@ -127,7 +127,7 @@ def _real_array(heights: Any) -> Any:
     values = heights.data if isinstance(heights, xr.DataArray) else heights
     try:
         values = values if _is_lazy(values) else np.ma.asanyarray(values)
-    except (TypeError, ValueError):
+    except Exception:  # rows of unequal length, or whatever the conversion of a foreign object raises
         return None
     return values if values.dtype.kind in "fiu" else None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,16 +10,19 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import plane_coords
-from fractalcontact.base.validation import Problems, float_array, number_of_axes
+from fractalcontact.base.numbers import float_array, is_real, number_of_axes
+from fractalcontact.base.process import physical_memory
+from fractalcontact.base.validation import LARGEST_INTEGER, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LONGEST = 1e100  # m: squares and cubes of it can be represented
+COPIES = 2  # of the heights: the result and one work array
 
 
 def check_shape(problems: Problems, shape: Any, *, smallest: int = 3, profile: bool = True) -> bool:
     """Check for (ny, nx), or for the length of a profile where `profile` allows one."""
-    sizes = (shape,) if isinstance(shape, (int, np.integer)) else shape
+    sizes = (shape,) if is_real(shape) else shape
     is_sequence = isinstance(sizes, (Sequence, np.ndarray)) and not isinstance(sizes, (str, bytes))
     if not is_sequence or number_of_axes(sizes) != 1 or len(sizes) not in ((1, 2) if profile else (2,)):
         problems.add("shape", "(ny, nx)" + (" or the length of a profile" if profile else ""), shape)
@@ -45,11 +49,25 @@ def check_spacing(problems: Problems, spacing: Any, axes: int | None = None) -> 
     return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)
 
 
-def check_plane(problems: Problems, shape: Any, spacing: Any, *, profile: bool = True) -> bool:
-    """Check shape and spacing of a new surface together."""
+def check_plane(
+    problems: Problems, shape: Any, spacing: Any, *, profile: bool = True, members: Any = None
+) -> bool:
+    """Check shape and spacing of new surfaces together, and whether they fit into memory."""
     valid_shape = check_shape(problems, shape, profile=profile)
     axes = np.size(shape) if valid_shape else None
+    if valid_shape:
+        is_count = is_real(members) and 0 < members <= LARGEST_INTEGER
+        count = members if is_count else 1  # `check_ensemble` tells any other
+        valid_shape = check_memory(problems, "shape", (count, *axis_sizes(shape)))
     return check_spacing(problems, spacing, axes) and valid_shape
+
+
+def check_memory(problems: Problems, argument: str, sizes: Sequence[int]) -> bool:
+    """Check that heights of these sizes, and the work arrays of the same size, fit into memory."""
+    memory, needed = physical_memory(), COPIES * 8.0 * math.prod(float(size) for size in sizes)
+    expected = f"an array that fits into {memory / 2**30:.3g} GiB of memory"
+    got = f"{' x '.join(f'{size:g}' for size in sizes if size != 1)} points, {needed / 2**30:.3g} GiB"
+    return problems.require(needed <= memory, argument, expected, got)
 
 
 def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import check_unpacked, file_suffix, open_bytes
 
@@ -178,11 +179,7 @@ def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
     names = [str(entry.name) for entry in channels]
     if isinstance(channel, str) and channel in names:
         return channels[names.index(channel)]
-    if (
-        isinstance(channel, (int, np.integer))
-        and not isinstance(channel, bool)
-        and 0 <= channel < len(channels)
-    ):
+    if is_real(channel) and isinstance(channel, (int, np.integer)) and 0 <= channel < len(channels):
         return channels[channel]
     allowed = ", ".join(f"{number} = {label!r}" for number, label in enumerate(names))
     raise UnreadableFile(WHERE, [f"channel: expected one of {allowed}, got {channel!r}"])

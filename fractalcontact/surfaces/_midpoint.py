@@ -33,14 +33,12 @@ def _check(
     spacing: Any,
     hurst: Any,
     rms_increment: Any,
-    additions: Any,
     members: Any,
     rng: Any,
 ) -> None:
-    check_plane(problems, shape, spacing, profile=False)
+    check_plane(problems, shape, spacing, profile=False, members=members)
     problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
     check_length(problems, "rms_increment", rms_increment)
-    problems.boolean("additions", additions)
     check_ensemble(problems, members, rng)
 
 

@@ -17,6 +17,7 @@ from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.numbers import is_real
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
@@ -95,12 +96,14 @@ def _check(
     if spacing is not None:
         check_spacing(problems, spacing)
     problems.choice("units", units, UNITS, optional=True)
-    problems.choice("first_row", first_row, ("bottom", "top"), optional=True)
-    if not problems.path("path", path):
+    is_row = problems.choice("first_row", first_row, ("bottom", "top"), optional=True)
+    is_number = is_real(channel) and isinstance(channel, (int, np.integer))
+    is_channel = channel is None or isinstance(channel, str) or is_number
+    problems.require(is_channel, "channel", "the name or the number of a channel", channel)
+    if not problems.file("path", path):
         return
     source = Path(path)
-    problems.require(source.is_file(), "path", "an existing file", source.name)
-    if file_suffix(source) in NETCDF:
+    if is_row and file_suffix(source) in NETCDF:
         expected = "'bottom' for a NetCDF file, which has its y"
         problems.require(first_row in (None, "bottom"), "first_row", expected, first_row)
         problems.require(

@@ -11,10 +11,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
-from fractalcontact.base.validation import NONE, Problems, float_array, given_option
+from fractalcontact.base.validation import NONE, Problems, given_option
 from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
@@ -45,7 +46,7 @@ def _check(
     rng: Any,
 ) -> None:
     before = len(problems.messages)
-    valid_plane = check_plane(problems, shape, spacing)
+    valid_plane = check_plane(problems, shape, spacing, members=members)
     axes = np.size(shape) if valid_plane else 2
     valid_hurst = problems.numbers("hurst", hurst, at_least=0.01, at_most=1.0) and problems.require(
         np.size(hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else ""), hurst

@@ -5,12 +5,8 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.validation import (
-    Problems,
-    float_array,
-    given_option,
-    word_tuple,
-)
+from fractalcontact.base.numbers import float_array
+from fractalcontact.base.validation import Problems, given_option, word_tuple
 
 
 def problems_of(check):

@@ -1,0 +1,64 @@
+"""Numbers among the arguments of a user: what counts as one, and arrays of them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+def is_real(value: Any) -> bool:
+    """Return whether a value is one real number; a truth value or a time difference is none."""
+    real = isinstance(value, (int, float, np.integer, np.floating))
+    return real and not isinstance(value, (bool, np.timedelta64))
+
+
+def as_array(value: Any) -> Array | None:
+    """Return an array of the value's own type; None where NumPy makes none of it."""
+    if type(value).__module__.startswith("xarray") and not hasattr(value, "dtype"):  # a Dataset or DataTree
+        return None
+    try:
+        return np.asarray(value)
+    except Exception:  # rows of unequal length, or whatever the conversion of a foreign object raises
+        return None
+
+
+def number_of_axes(value: Any) -> int | None:
+    """Return the number of axes, 0 for a scalar; None for a ragged sequence, or for no array at all."""
+    values = as_array(value)
+    return None if values is None else values.ndim
+
+
+def number_of_entries(value: Any) -> int | None:
+    """Return the number of entries of a sequence or array; None where it has no length."""
+    try:
+        return len(value)
+    except Exception:
+        return None
+
+
+def real_numbers(value: Any) -> Array | None:
+    """Return real numbers as an array of at least one axis, None for anything else.
+
+    Words, dates, time differences, truth values and masked entries are none, though NumPy converts them.
+    """
+    values = as_array(value)
+    if values is None or np.ma.is_masked(value):
+        return None
+    if values.dtype.kind == "O" and all(type(item) in (int, float) for item in values.flat):
+        with suppress(OverflowError):  # integers beyond 64 bits
+            return np.atleast_1d(values.astype(np.float64))
+    return float_array(values) if values.dtype.kind in "iuf" else None
+
+
+def python_number(value: Any) -> Any:
+    """Return a NumPy number as one of Python, whose arithmetic does not overflow; all else as it is."""
+    return value.item() if isinstance(value, (np.floating, np.integer)) and is_real(value) else value
+
+
+def float_array(value: Any) -> Array:
+    """Return one or several numbers that passed `Problems.numbers` as a 1-D float64 array."""
+    return np.atleast_1d(np.asarray(value, dtype=np.float64))

@@ -1,0 +1,329 @@
+"""Public functions with one valid call each, and calls with some of their arguments damaged."""
+
+import functools
+import importlib
+import inspect
+import signal
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from fuzz_values import damaged, wrong_value
+
+import fractalcontact as fc
+from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
+
+SPACING = 1e-4
+PLACE = Path(tempfile.gettempdir()) / "fractalcontact_fuzz"
+
+
+@functools.cache
+def rough(n=24):
+    return fc.surfaces.fbm((n, n), SPACING, hurst=0.7, rms_increment=5e-6, rng=11)
+
+
+@functools.cache
+def periodic(n=24):
+    return fc.surfaces.spectral((n, n), SPACING, hurst=0.8, rms_height=1e-5, rng=12)
+
+
+@functools.cache
+def crack():
+    return fc.joints.Crack(rough(), young=30e9, poisson=0.2, block=1.6e-3)
+
+
+@functools.cache
+def pressed():
+    maps = ("state", "pressure", "gap")
+    return fc.contact.press(periodic(), contact_modulus=1e9, nominal_pressure=[1e6, 1e7], keep=maps)
+
+
+@functools.cache
+def closed():
+    loads = [1.0, 3.0, 10.0, 30.0]
+    return fc.joints.closure(crack(), shear=[1e-4], normal_force=loads, keep=("state", "gap", "pressure"))
+
+
+@functools.cache
+def slid():
+    shears = [0.0, 1e-4, 2e-4, 3e-4]
+    return fc.joints.dilatancy(crack(), shear=shears, direction=["E", "W"], normal_force=[1.0, 10.0])
+
+
+@functools.cache
+def study():
+    return fc.scenes.run("rigid_sliding", progress=False)
+
+
+@functools.cache
+def rubbed():
+    return fc.joints.friction(slid())
+
+
+@functools.cache
+def islands():
+    return fc.domains.islands(pressed()["state"])
+
+
+@functools.cache
+def lacunarity():
+    return fc.domains.lacunarity(pressed()["state"])
+
+
+@functools.cache
+def boxes():
+    return fc.domains.box_dimension(pressed()["state"])
+
+
+@functools.cache
+def flow():
+    return fc.joints.transmissivity(pressed()["gap"])
+
+
+@functools.cache
+def estimates():
+    return fc.dimensions.estimate(rough(), ["variogram", "spectrum"])
+
+
+@functools.cache
+def curve():
+    return fc.dimensions.variogram(rough())
+
+
+@functools.cache
+def roses():
+    return fc.joints.directional_roughness(rough())
+
+
+@functools.cache
+def envelope():
+    loads = {"nominal_pressure": [1e5, 1e6], "wall_strength": 1e8, "basic_friction_angle": 30}
+    return fc.joints.strength_envelope(rough(), **loads)
+
+
+@functools.cache
+def memory():
+    return fc.joints.decorrelation_length(crack())
+
+
+@functools.cache
+def delta():
+    return fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4])
+
+
+@functools.cache
+def slipped():
+    return fc.contact.partial_slip(**CALLS["contact.partial_slip"]())
+
+
+@functools.cache
+def file(name):
+    PLACE.mkdir(exist_ok=True)
+    return fc.save(rough(), PLACE / f"{name}.nc")
+
+
+GENERATOR = {"shape": (8, 8), "spacing": SPACING, "hurst": 0.5, "rng": 1}
+PRESS = {"contact_modulus": 1e9, "nominal_pressure": 1e4}
+
+CALLS = {
+    "surfaces.SelfAffine": lambda: {"hurst": 0.8, "long_cutoff": 1e-3, "rolloff": 1e-4, "short_cutoff": 1e-5},
+    "surfaces.fbm": lambda: GENERATOR | {"rms_increment": 1e-6},
+    "surfaces.spectral": lambda: GENERATOR | {"rms_height": 1e-6},
+    "surfaces.midpoint": lambda: GENERATOR | {"rms_increment": 1e-6},
+    "surfaces.weierstrass": lambda: GENERATOR | {"rms_height": 1e-6},
+    "surfaces.from_array": lambda: {"heights": rough().values, "spacing": SPACING},
+    "surfaces.read": lambda: {"path": file("surface")},
+    "surfaces.sample": lambda: {"name": "concrete_crack"},
+    "surfaces.level": lambda: {"surface": rough()},
+    "surfaces.fill": lambda: {"surface": rough().where(rough().x > 2e-4)},
+    "surfaces.despike": lambda: {"surface": rough()},
+    "surfaces.describe": lambda: {"surface": rough()},
+    **{
+        f"dimensions.{name}": lambda: {"surface": rough()}
+        for name in ("covering", "cube_counts", "directions", "madogram", "roughness_length", "variation")
+    },
+    "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "whittle"]},
+    "dimensions.second_variogram": lambda: {"surface": rough()},
+    "dimensions.spectrum": lambda: {"surface": periodic()},
+    "dimensions.variogram": lambda: {"surface": rough()},
+    "contact.ContactOptions": dict,
+    "contact.LoadPath": lambda: {"control": "closure", "values": (1e-6,)},
+    "contact.effective_modulus": lambda: {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
+    "contact.flat_stiffness": lambda: {"shape": (8, 8), "spacing": SPACING, "contact_modulus": 1e9},
+    "contact.press": lambda: PRESS | {"surface": periodic()},
+    "contact.partial_slip": lambda: PRESS
+    | {"surface": periodic(), "poisson": 0.2, "friction_coefficient": 0.5, "tangential_force": 0.01},
+    "joints.Crack": lambda: {"lower": rough(), "upper": rough() + 1e-5, "young": 1e10, "poisson": 0.2},
+    "joints.bandis_closure": lambda: {
+        "nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4,
+    },
+    "joints.bandis_constants": lambda: {"roughness": 10, "wall_strength": 1e8, "aperture": 1e-4},
+    "joints.barton_bandis_scaled": lambda: {"roughness": 10, "wall_strength": 1e8, "length": 1.0},
+    "joints.barton_choubey_strength": lambda: {
+        "nominal_pressure": 1e6, "roughness": 10, "wall_strength": 1e8, "residual_angle": 30,
+    },
+    "joints.closure": lambda: {"crack": crack(), "shear": [1e-4], "normal_force": [1.0, 10.0]},
+    "joints.closure_laws": lambda: {"closure": closed()},
+    "joints.cyclic_shear": lambda: {"dilatancy": slid(), "path": [0.0, 3e-4, -3e-4, 0.0]},
+    "joints.decorrelation_length": lambda: {"crack": crack()},
+    "joints.delta_dimension": lambda: {"crack": crack(), "shear": [1e-4]},
+    "joints.delta_surface": lambda: {"crack": crack(), "shear": [1e-4], "direction": "W"},
+    "joints.dilatancy": lambda: {"crack": crack(), "shear": [0.0, 1e-4]},
+    "joints.directional_roughness": lambda: {"surface": rough()},
+    "joints.friction": lambda: {"dilatancy": slid()},
+    "joints.register": lambda: {"lower": rough(), "upper": rough() + 1e-5},
+    "joints.roughness_coefficient": lambda: {"surface": rough(), "lag": 4e-4},
+    "joints.self_weight_strength": lambda: {"length": 1.0, "unit_weight": 1e4, "friction_angle": 30},
+    "joints.size_effect": lambda: {"scale": 2.0, "contact_dimension": 1.5},
+    "joints.strength_envelope": lambda: {
+        "surface": rough(), "nominal_pressure": [1e5, 1e6], "wall_strength": 1e8, "basic_friction_angle": 30,
+    },
+    "joints.transmissivity": lambda: {"gap": pressed()["gap"]},
+    **{
+        f"domains.{name}": lambda: {"mask": pressed()["state"]}
+        for name in (
+            "boundary_dimension", "box_counts", "box_dimension", "correlation_dimension", "describe",
+            "evolution", "generalised_dimensions", "islands", "lacunarity", "lineage", "minkowski_dimension",
+            "percolation",
+        )
+    },
+    "domains.area_dimension": lambda: {"masks": [pressed()["state"], pressed()["state"][..., ::2, ::2]]},
+    "domains.read_mask": lambda: {"path": "nowhere.png", "spacing": SPACING},
+    "save": lambda: {"result": rough(), "path": PLACE / "saved.nc"},
+    "open": lambda: {"path": file("opened")},
+    "scenes.load": lambda: {"path": "pressed_surface"},
+    "scenes.plan": lambda: {"scene": "rigid_sliding"},
+    "scenes.validate": lambda: {"scene": "rigid_sliding"},
+    "scenes.contents": lambda: {"path": file("contents")},
+    "scenes.summary": lambda: {"tree": study()},
+    "scenes.paper_table": lambda: {"tree": study()},
+    "scenes.reproduce": lambda: {"result": rough()},
+    "plotting.surface": lambda: {"surface": rough(), "block": rough()[:8, :8]},
+    "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
+    "plotting.contact_domains": lambda: {"result": pressed()},
+    "plotting.contact_area": lambda: {"result": closed()},
+    "plotting.closure_laws": lambda: {"closure": closed()},
+    "plotting.rigid_dilatancy": lambda: {"dilatancy": slid()},
+    "plotting.elastic_dilatancy": lambda: {"dilatancy": slid(), "direction": "E"},
+    "plotting.friction": lambda: {"result": rubbed(), "direction": "E"},
+    "plotting.islands": lambda: {"result": islands()},
+    "plotting.island_map": lambda: {"result": islands().isel(step=0)},
+    "plotting.lacunarity": lambda: {"result": lacunarity()},
+    "plotting.box_dimension": lambda: {"result": boxes()},
+    "plotting.local_slopes": lambda: {"result": boxes()},
+    "plotting.hydraulic_aperture": lambda: {"result": flow()},
+    "plotting.dimensions": lambda: {"estimates": estimates()},
+    "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
+    "plotting.directional_roughness": lambda: {"result": roses()},
+    "plotting.strength_envelope": lambda: {"result": envelope()},
+    "plotting.correlation": lambda: {"memory": memory()},
+    "plotting.delta_dimension": lambda: {"dimension": delta()},
+    "plotting.slip_domains": lambda: {"result": slipped()},
+    "plotting.sliding_scheme": lambda: {
+        "surface": rough(), "delta": fc.joints.delta_surface(crack(), [1e-4], "W"),
+    },
+    "plotting.paper_figure": lambda: {"tree": study(), "number": 3},
+    "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
+    "accuracy.summary": lambda: {"results": xr.Dataset()},
+    "accuracy.measure": lambda: {"parts": "nothing", "budget": 1.0},
+    "accuracy.extremes": lambda: {"names": "nothing"},
+    "accuracy.estimators": lambda: {"hurst": 0.5, "sizes": 8, "families": "nothing", "members": 2},
+}  # fmt: skip
+
+# these are refused as they stand, because they would take minutes or need a file
+REFUSED = ("accuracy.measure", "accuracy.extremes", "accuracy.estimators", "domains.read_mask")
+# a damaged argument of this kind is never accepted where it lies on a grid
+LABELLED = ("surface", "mask", "lower", "upper", "gap")
+
+
+def function_of(name):
+    """Return a public function by its name, as `surfaces.fbm`."""
+    *subpackage, word = name.split(".")
+    module = importlib.import_module(".".join(["fractalcontact", *subpackage])) if subpackage else fc
+    return getattr(module, word)
+
+
+def damaged_call(pick, names=None):
+    """Return the name of a function, its arguments, and what was done to each damaged one."""
+    name = pick(sorted(names or CALLS))
+    arguments = dict(CALLS[name]())
+    parameters = list(inspect.signature(function_of(name)).parameters)
+    done = {}
+    for _ in range(pick([1, 1, 1, 1, 2, 3])):
+        argument = pick(parameters)
+        if argument in done:
+            continue
+        value = arguments.get(argument)
+        if isinstance(value, (xr.DataArray, xr.Dataset)) and pick([True, True, False]):
+            done[argument], arguments[argument] = damaged(value, pick)
+        elif isinstance(value, list) and value and pick([True, False]):
+            what, entry = wrong_value(pick)
+            done[argument] = f"a list with {what}"
+            arguments[argument] = [*value, entry]
+        else:
+            done[argument], arguments[argument] = wrong_value(pick)
+    return name, arguments, done
+
+
+class TooSlow(BaseException):
+    """A call that takes longer than its limit."""
+
+
+def _stop(*_):
+    raise TooSlow
+
+
+def fault_of(call, *, seconds=20, names=()):
+    """Return what is wrong with a call: None for a clear error or a result without infinite numbers."""
+    before = signal.signal(signal.SIGALRM, _stop)
+    signal.alarm(seconds)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.simplefilter("ignore", FractalContactWarning)
+            warnings.filterwarnings("ignore", message=".*linear elasticity is an approximation")
+            result = call()
+    except InvalidInput as error:
+        return _unnamed(error, names)
+    except FractalContactError:
+        return None
+    except TooSlow:
+        return f"longer than {seconds} s"
+    except Exception as error:
+        return f"{type(error).__name__}: {str(error)[:200]}"
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+    return _infinite(result)
+
+
+def _unnamed(error, names):
+    text = str(error)
+    if names and not any(name in text for name in names):
+        return f"the error names none of {', '.join(names)}: {text[:200]}"
+    return None
+
+
+def _infinite(result):
+    if isinstance(result, xr.Dataset):
+        numbers = {
+            str(name): np.isinf(variable.values).any()
+            for name, variable in result.variables.items()
+            if variable.dtype.kind == "f"
+        }
+        wrong = [name for name, is_infinite in numbers.items() if is_infinite]
+        if wrong:
+            return f"infinite {', '.join(wrong)}"
+    if isinstance(result, float) and np.isinf(result):
+        return "infinite"
+    return None
+
+
+def silently_accepted(done, arguments):
+    """Return what must have been refused: coordinates or heights that are no numbers, for example."""
+    for argument, what in done.items():
+        if argument in LABELLED and what.isupper():
+            return f"{argument}: {what.lower()} accepted"
+    return None
