@@ -227,13 +227,11 @@ CALLS = {
     "plotting.paper_figure": lambda: {"tree": study(), "number": 3},
     "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
     "accuracy.summary": lambda: {"results": xr.Dataset()},
-    "accuracy.measure": lambda: {"parts": "nothing", "budget": 1.0},
-    "accuracy.extremes": lambda: {"names": "nothing"},
     "accuracy.estimators": lambda: {"hurst": 0.5, "sizes": 8, "families": "nothing", "members": 2},
 }  # fmt: skip
 
-# these are refused as they stand, because they would take minutes or need a file
-REFUSED = ("accuracy.measure", "accuracy.extremes", "accuracy.estimators", "domains.read_mask")
+# these are refused as they stand, because they would take long or need a file
+REFUSED = ("accuracy.estimators", "domains.read_mask")
 # a damaged argument of this kind is never accepted where it lies on a grid
 LABELLED = ("surface", "mask", "lower", "upper", "gap")
 

@@ -163,8 +163,9 @@ class Scene:
     def want(self) -> WantTable:
         """The wanted results."""
         table = self.table("want")
-        figures, datasheet = (bool(table.get(key, False)) for key in ("figures", "datasheet"))
-        words = {key: self.wanted(key) for key in table if key not in ("figures", "datasheet")}
+        figures, datasheet = (table.get(key, False) is True for key in ("figures", "datasheet"))
+        own = [key for key in WANT_KEYS if key in table and key not in ("figures", "datasheet")]
+        words = {key: self.wanted(key) for key in own}
         if datasheet:
             words["joints"] = tuple(dict.fromkeys((*words.get("joints", ()), *DATASHEET)))
         return WantTable(**words, figures=figures, datasheet=datasheet)
@@ -182,7 +183,9 @@ class Scene:
     def wanted(self, subpackage: str) -> tuple[str, ...]:
         """Return the words that `[want]` gives for a subpackage."""
         words = self.table("want").get(subpackage, ())
-        return (words,) if isinstance(words, str) else tuple(words)
+        return (
+            (words,) if isinstance(words, str) else tuple(words) if isinstance(words, (list, tuple)) else ()
+        )
 
     def stage_options(self, stage: StageType, keys: Iterable[str] | None = None) -> dict[str, Any]:
         """Return the arguments that the scene gives to a stage.

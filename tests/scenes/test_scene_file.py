@@ -178,7 +178,7 @@ def test_problem_of_a_table_is_listed_once(write):
     with pytest.raises(InvalidInput) as caught:
         fc.scenes.validate(write(text))
     listed = [problem.partition(": expected")[0] for problem in caught.value.problems]
-    assert listed == ["surface.hirst", "material.young"]
+    assert listed == ["surface.hirst", "material.young", "surface: hurst"]
 
 
 @pytest.mark.parametrize("function", [fc.scenes.run, fc.scenes.validate])

@@ -1,0 +1,155 @@
+"""Public calls with damaged arguments: a clear error that names the argument, or a right answer.
+
+Half a minute with the other tests; `pytest -m fuzz -n2` takes about an hour. A failure prints the seed of its
+run (`--hypothesis-seed`) and the smallest call; keep it in KEPT.
+"""
+
+import random
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from fuzz_calls import (
+    CALLS,
+    REFUSED,
+    closed,
+    damaged_call,
+    fault_of,
+    function_of,
+    periodic,
+    pressed,
+    rough,
+    silently_accepted,
+    slid,
+)
+from fuzz_values import VALUES
+from hypothesis import HealthCheck, given, settings, strategies
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+
+QUICK, LONG = 400, 60_000
+SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
+
+
+# errors of these name what the argument stands for, or the first argument, which is refused as it stands
+UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure")
+
+
+def check(pick):
+    name, arguments, done = damaged_call(pick)
+    answers = []
+    named = () if name in UNNAMED else tuple(done)
+
+    def call():
+        answers.append(function_of(name)(**arguments))
+        return answers[0]
+
+    fault = fault_of(call, names=named)
+    plt.close("all")
+    if answers and fault is None:
+        fault = silently_accepted(done, arguments)
+    assert fault is None, f"{name}({done}): {fault}"
+
+
+@settings(max_examples=QUICK, **SETTINGS)
+@given(strategies.data())
+def test_damaged_call(data):
+    check(lambda options: data.draw(strategies.sampled_from(options)))
+
+
+@pytest.mark.fuzz
+@settings(max_examples=LONG, **SETTINGS)
+@given(strategies.data())
+def test_damaged_calls_for_an_hour(data):
+    check(lambda options: data.draw(strategies.sampled_from(options)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_random_calls(seed):
+    stream = random.Random(seed)
+    for _ in range(100):
+        check(stream.choice)
+
+
+def with_coordinate(array, dim, values):
+    return array.assign_coords({dim: values})
+
+
+def with_attribute(array, dim, key, value):
+    result = array.copy()
+    (result if dim is None else result[dim]).attrs[key] = value
+    return result
+
+
+NUMBERS = np.arange(24)
+# found by fuzzing: name, argument, value, and what the error names
+KEPT = {
+    "words as coordinates": ("surfaces.describe", "surface", lambda: with_coordinate(
+        rough(), "x", [f"c{k}" for k in NUMBERS]), "surface.x"),
+    "dates as coordinates": ("dimensions.variogram", "surface", lambda: with_coordinate(
+        rough(), "y", np.datetime64("2026-01-01", "ns") + NUMBERS), "surface.y"),
+    "time differences as coordinates": ("contact.press", "surface", lambda: with_coordinate(
+        periodic(), "x", NUMBERS.astype("timedelta64[ns]")), "surface.x"),
+    "complex coordinates": ("domains.box_counts", "mask", lambda: with_coordinate(
+        pressed()["state"], "y", NUMBERS * 1j), "mask.y"),
+    "period 0": ("surfaces.level", "surface", lambda: with_attribute(rough(), "x", "period", 0.0),
+                 "surface.x.period"),
+    "a word as period": ("surfaces.fill", "surface", lambda: with_attribute(rough(), "x", "period", "x"),
+                         "surface.x.period"),
+    "units in a list": ("joints.Crack", "lower", lambda: with_attribute(
+        rough(), None, "units", np.array(["m", "mm"])), "lower.units"),
+    "millimetres": ("joints.transmissivity", "gap", lambda: with_attribute(
+        pressed()["gap"], "x", "units", "mm"), "gap.x.units"),
+    "heights in time": ("surfaces.despike", "surface", lambda: rough().astype("timedelta64[ns]"), "surface"),
+    "infinite heights": ("joints.register", "lower", lambda: rough().where(rough() > 0, np.inf), "lower"),
+    "no planes": ("surfaces.describe", "surface", lambda: rough().expand_dims(member=[]), "surface.member"),
+    "a Dataset as a number": ("contact.effective_modulus", "poisson", xr.Dataset, "poisson"),
+    "a date as a number": ("surfaces.fbm", "lag", lambda: np.datetime64("2026-01-01"), "lag"),
+    "words that are numbers": ("joints.dilatancy", "shear", lambda: ["1e-4"], "shear"),
+    "a list in itself": ("joints.size_effect", "scale", VALUES["itself"], "scale"),
+    "ragged loads": ("joints.bandis_closure", "nominal_pressure", VALUES["ragged"], "nominal_pressure"),
+    "masked loads": ("contact.press", "nominal_pressure", VALUES["masked array"], "nominal_pressure"),
+    "members beyond memory": ("surfaces.midpoint", "members", lambda: 10**12, "shape"),
+    "a surface beyond memory": ("surfaces.spectral", "shape", lambda: (10**7, 10**7), "shape"),
+    "an array beyond memory": ("surfaces.from_array", "heights", lambda: np.broadcast_to(1.0, (10**6, 10**6)),
+                               "heights"),
+    "a word as a flag": ("contact.press", "progress", lambda: "no", "progress"),
+    "a number as a path": ("open", "path", lambda: 3, "path"),
+    "a long name": ("save", "path", lambda: "x" * 300 + ".nc", "path"),
+    "a number as a scene": ("scenes.plan", "scene", lambda: 3, "scene"),
+    "a list as axes": ("plotting.contact_area", "ax", list, "ax"),
+    "another unit in a figure": ("plotting.rigid_dilatancy", "dilatancy", lambda: slid().assign(
+        shear=slid()["shear"].assign_attrs(units="mm")), "dilatancy.shear.units"),
+    "descending in a figure": ("plotting.surface", "surface", lambda: rough()[:, ::-1], "surface.x"),
+    "no steps in a figure": ("plotting.closure_laws", "closure", lambda: closed().isel(step=slice(0)),
+                             "closure.step"),
+    "azimuth in time": ("joints.cyclic_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", KEPT)
+def test_kept_case_gives_a_clear_error(case):
+    name, argument, make, named = KEPT[case]
+    with pytest.raises(InvalidInput) as caught:
+        function_of(name)(**{**CALLS[name](), argument: make()})
+    assert any(line.startswith(f"{named}:") for line in caught.value.problems), caught.value
+
+
+def test_transposed_field_is_drawn_like_the_field():
+    gap = pressed()["gap"].isel(step=0)
+    images = [fc.plotting.field(plane).axes[0].images[0].get_array() for plane in (gap, gap.transpose())]
+    assert np.array_equal(*images)
+
+
+def test_small_numpy_types_do_not_overflow():
+    surface = rough().where(rough().x > 2e-4)
+    assert np.array_equal(fc.surfaces.fill(surface, at_most=np.int8(1)), fc.surfaces.fill(surface, at_most=1))
+
+
+def test_several_wrong_arguments_are_all_listed():
+    with pytest.raises(InvalidInput) as caught:
+        fc.domains.box_counts(rough().values, "x", periodic="no", valid=3, cover="y")
+    named = {line.partition(":")[0] for line in caught.value.problems}
+    assert named == {"mask", "sizes", "periodic", "valid", "cover"}
