@@ -102,7 +102,7 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
     except OSError as error:
         raise UnreadableFile(f"scene {source.name}", [f"it cannot be read: {error.strerror}"]) from error
     except RecursionError:
-        raise UnreadableFile(f"scene {source.name}", [TOO_DEEP]) from None
+        raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {TOO_DEEP}"]) from None
     except ValueError as error:  # not TOML or not UTF-8, too large, or a number of more than 4300 digits
         raise UnreadableFile(f"scene {source.name}", [f"not a TOML file: {error}"]) from error
     return check_tables(Scene(source.stem, tables, source.resolve().parent))
