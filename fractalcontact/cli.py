@@ -1,7 +1,7 @@
 """The command `fractalcontact`: run a scene, answer a question, measure accuracy, show what a file has.
 
-Exit codes: 0 success, 2 invalid input (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT
-finishes the current task and keeps the results; a second SIGINT stops at once.
+Exit codes: 0 success, 1 too little memory, 2 invalid input (nothing was written), 130 or 143 stopped by
+SIGINT or SIGTERM. SIGINT finishes the current task and keeps the results; a second SIGINT stops at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
-WRONG_INPUT, STOPPED = 2, 128
+FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
 QUESTIONS = {
     "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
     "contact": "contact of a scan with a flat under growing pressure",
@@ -43,6 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Stopped as stop:
         print(stop, file=sys.stderr)
         return STOPPED + stop.number
+    except MemoryError as error:
+        print(f"fractalcontact: the memory of this machine does not suffice ({error})", file=sys.stderr)
+        return FAILED
     except BrokenPipeError:
         sys.stderr.close()
         return 0

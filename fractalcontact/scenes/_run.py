@@ -162,7 +162,7 @@ def _assemble(
     provenance.stamp(
         root,
         "fractalcontact.scenes.run",
-        {"scene": dict(scene.tables)},
+        {"scene": _without_folders(scene.tables)},
         title=str(scene.tables.get("title", scene.name)),
         references=PAPER if scene.paper else OWN_REFERENCES,
         stages={
@@ -180,6 +180,16 @@ def _assemble(
     if missing:
         tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
     return tree
+
+
+def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a scene; of a file outside its folder the name alone."""
+    plain = dict(tables)
+    for name in ("surface", "upper"):
+        read = plain.get(name, {}).get("read")
+        if isinstance(read, str) and (Path(read).is_absolute() or read.startswith("~")):
+            plain[name] = {**plain[name], "read": Path(read).name}
+    return plain
 
 
 def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:

@@ -280,3 +280,24 @@ def test_total_of_the_summary_is_the_time_of_the_whole_run(study):
     lines = {line.split("  ")[0]: line.split()[-1] for line in fc.scenes.summary(study).splitlines() if line}
     assert float(lines["total"]) >= float(lines["all stages"]) > 0
     assert float(lines["total"]) == pytest.approx(provenance_of(study)["run_time"], abs=0.006)
+
+
+def test_provenance_of_a_study_has_no_folder(tmp_path):
+    surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    path = fc.save(surface, tmp_path / "scan.nc")
+    scene = tmp_path / "study.toml"
+    scene.write_text(f'[surface]\nread = "{path}"\n[want]\nsurfaces = ["describe"]\n', encoding="utf-8")
+    tree = fc.scenes.run(scene, progress=False)
+    assert str(tmp_path) not in tree.attrs["provenance"]
+    assert '"scan.nc"' in tree.attrs["provenance"]
+
+
+def test_command_says_that_memory_does_not_suffice(monkeypatch, capsys):
+    from fractalcontact import cli
+
+    def exhausted(*_, **__):
+        raise MemoryError("Unable to allocate 298 GiB")
+
+    monkeypatch.setattr(fc.scenes, "validate", exhausted)
+    assert cli.main(["run", "rigid_sliding", "--plan"]) == 1
+    assert "memory of this machine does not suffice (Unable to allocate 298 GiB)" in capsys.readouterr().err
