@@ -104,6 +104,9 @@ CALLS = {
     "scenes.reproduce": lambda _: fc.scenes.reproduce(study()[0]["joints/closure"].to_dataset()),
     "scenes.run": run,
     "scenes.summary": lambda _: fc.scenes.summary(study()[0]),
+    "scenes.template": lambda folder: fc.scenes.template(
+        "roughness", fc.save(labels.rough(), folder / "scan.nc"), folder=folder
+    ),
     "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
     "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
     "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
