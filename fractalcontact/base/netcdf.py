@@ -25,8 +25,8 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
-from fractalcontact.base.packing import require_unpacked, unpacked_limit
 from fractalcontact.base.schema import CONVENTIONS, encoded
+from fractalcontact.base.unpacked_size import require_unpacked, unpacked_limit
 from fractalcontact.base.validation import Problems
 
 SAVE = "fractalcontact.save"
