@@ -94,6 +94,9 @@ CALLS = {
         tangential_force=[2.0, 4.0, -2.0],
         keep=("slip_state", "traction_x", "traction_y", "slip_x", "slip_y"),
     ),
+    "contact.theories": lambda: fc.contact.theories(
+        periodic(), contact_modulus=1e9, nominal_pressure=[1e6, 1e7]
+    ),
     "joints.delta_surface": lambda: fc.joints.delta_surface(crack(), [1e-4, 2e-4], "W"),
     "joints.area_dimension": lambda: fc.joints.area_dimension(
         crack(), shear=[1e-4], factors=[1, 2], normal_force=[1.0, 10.0]

@@ -216,6 +216,10 @@ QUANTITIES: dict[str, Quantity] = {
     "traction_y": Quantity("Pa", "tangential traction on the surface along y"),
     "slip_x": Quantity("m", "slip of the upper body over the surface along x"),
     "slip_y": Quantity("m", "slip of the upper body over the surface along y"),
+    "theory": Quantity(None, "theory of rough contact"),
+    "m0": Quantity("m2", "mean square height"),
+    "m2": Quantity("1", "mean square slope of the profiles of an isotropic surface"),
+    "m4": Quantity("m-2", "mean square second derivative of the profiles of an isotropic surface"),
     # joints
     "bulk_closure": Quantity("m", "closure of the flat block under the same force"),
     "interface_closure": Quantity("m", "closure without that of the flat block"),

@@ -4,6 +4,7 @@ from ._options import ContactOptions as ContactOptions
 from ._options import LoadPath as LoadPath
 from ._partial_slip import partial_slip as partial_slip
 from ._press import press as press
+from ._theories import theories as theories
 
 __all__ = [
     "ContactOptions",
@@ -12,4 +13,5 @@ __all__ = [
     "flat_stiffness",
     "partial_slip",
     "press",
+    "theories",
 ]

@@ -10,13 +10,15 @@ import xarray as xr
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import nearest, result_of, table
+from fractalcontact.plotting._inputs import nearest, result_of, table, words
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from fractalcontact.base.units import Scale
 
 RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
@@ -108,7 +110,9 @@ def closure_laws(
 
 
 @_style.styled
-def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None = None) -> Figure:
+def contact_area(
+    result: Any, *, against: str = "normal_force", theory: Any = None, ax: Axes | None = None
+) -> Figure:
     """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
 
     Solid lines show the area corrected for the perimeter, thin dashed lines the count of cells in contact,
@@ -121,6 +125,8 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
         corrected_contact_fraction and normal_force (N) over (shear, step), or over one of them.
     against : str
         Variable on the x axis: normal_force, nominal_pressure or closure.
+    theory : Dataset, optional
+        From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
     ax : Axes, optional
         Draw here; otherwise on a new figure.
 
@@ -165,19 +171,31 @@ def contact_area(result: Any, *, against: str = "normal_force", ax: Axes | None 
             ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)
     ax.set_xlabel(axis_label(data[against], scale))
     ax.set_ylabel(percent.label("real / nominal contact area"))
+    entries = [] if theory is None else _draw_theories(ax, theory, against, scale, percent)
     _start_at_zero(ax, loads, raw)
     _shear_legend(ax, data, colours)
     if corrected:
-        _style.side_legend(
-            ax,
-            [
-                _style.legend_line("corrected for\nthe perimeter"),
-                _style.legend_line("cell count", **RAW_LINE),
-            ],
-            title="contact area",
-            low=True,
-        )
+        lines = [
+            _style.legend_line("corrected for\nthe perimeter"),
+            _style.legend_line("cell count", **RAW_LINE),
+        ]
+        entries = lines + entries
+    if entries:
+        _style.side_legend(ax, entries, title="contact area", low=True)
     return figure
+
+
+def _draw_theories(ax: Axes, theory: Any, against: str, scale: Scale, percent: Scale) -> list[Any]:
+    """Draw the contact fraction of each theory; return the entries of the legend."""
+    data = result_of(theory, "contact_area", ("contact_fraction", "theory", against), ("theory", "step"))
+    loads, areas = table(data, against, ("step",)), table(data, "contact_fraction", ("theory", "step"))
+    entries = []
+    for i, name in enumerate(words(data["theory"])):
+        style: dict[str, Any] = {"ls": "-.", "lw": 1.0, "color": _style.CYCLE[(i + 1) % len(_style.CYCLE)]}
+        ax.plot(scale(loads), percent(areas[i]), **style)
+        authors = ", ".join(part.capitalize() for part in name.split("_"))
+        entries.append(_style.legend_line(authors.replace(", ", ",\n"), **style))
+    return entries
 
 
 def _shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:

@@ -5,6 +5,7 @@ import plotting_synthetic as synthetic
 import pytest
 from plotting_figures import drawn, holds, render
 
+import fractalcontact as fc
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
 
@@ -77,3 +78,18 @@ def test_missing_variables_are_listed():
         plotting.box_dimension([1, 2, 3])
     with pytest.raises(InvalidInput, match="one of 'E', 'N', 'W', 'S', got 'Q'"):
         plotting.elastic_dilatancy(synthetic.dilatancy(), direction="Q")
+
+
+def test_theories_beside_the_contact_area():
+    surface = fc.surfaces.spectral((32, 32), 1e-4, hurst=0.8, rms_slope=0.1, rng=1)
+    given = {"contact_modulus": 1e9, "nominal_pressure": [1e5, 5e5, 1e6]}
+    pressed, theory = fc.contact.press(surface, **given), fc.contact.theories(surface, **given)
+    for against in ("nominal_pressure", "normal_force"):
+        ax = plotting.contact_area(pressed, against=against, theory=theory).axes[0]
+        for name in theory.theory:
+            expected = theory.contact_fraction.sel(theory=name)
+            assert holds(drawn(ax), expected[against], expected)
+    named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
+    assert "Bush,\nGibson,\nThomas" in named
+    with pytest.raises(InvalidInput, match="'closure'"):
+        plotting.contact_area(pressed, against="closure", theory=theory)

@@ -1,0 +1,189 @@
+"""Theories of rough contact: closed forms, the published integrals by other quadrature, and the solver."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
+
+MODULUS = 2e9
+SIDE, CELLS = 1e-3, 64
+X = SIDE / CELLS * np.arange(CELLS)
+
+
+def waves(*numbers_and_amplitudes):
+    """Return a periodic surface of waves along x."""
+    heights = sum(a * np.cos(2 * math.pi * n * X / SIDE) for n, a in numbers_and_amplitudes)
+    return fc.surfaces.from_array(np.tile(heights, (CELLS, 1)), SIDE / CELLS, periodic=True)
+
+
+def rough(**options):
+    given = {"hurst": 0.8, "rms_slope": 0.1, "short_cutoff": 8e-5, "rolloff": 5e-4, "rng": 3}
+    return fc.surfaces.spectral((CELLS, CELLS), SIDE / CELLS, **(given | options))
+
+
+def theories(surface, pressure, modulus=MODULUS):
+    return fc.contact.theories(surface, contact_modulus=modulus, nominal_pressure=pressure)
+
+
+def test_moments_of_one_wave():
+    result, q, a = theories(waves((4, 1e-6)), 1e6), 2 * math.pi * 4 / SIDE, 1e-6
+    assert float(result.m0) == pytest.approx(a**2 / 2)
+    assert float(result.m2) == pytest.approx(a**2 * q**2 / 4)
+    assert float(result.m4) == pytest.approx(3 / 16 * a**2 * q**4)
+
+
+def test_area_of_persson_and_of_bush_gibson_thomas():
+    slope = 1e-6 * 2 * math.pi * 4 / SIDE / math.sqrt(2)
+    pressure = np.array([0.0, 0.01, 0.015, 0.5, 3.0]) * MODULUS * slope
+    area = theories(waves((4, 1e-6)), pressure)["contact_fraction"]
+    expected = [
+        0.0,
+        0.015957,
+        0.023931,
+        0.682689,
+        1.0,
+    ]  # erf(sqrt(2) p/(E* g)) from tables: erf(.7071) = .682689
+    np.testing.assert_allclose(area.sel(theory="persson"), expected, atol=2e-6)
+    expected = [0.0, 0.0250663, 0.0375994, math.nan, math.nan]  # sqrt(2 pi) = 2.50663; beyond .05 not held
+    np.testing.assert_allclose(area.sel(theory="bush_gibson_thomas"), expected, atol=2e-7)
+    assert "bush_gibson_thomas hold up to" in area.attrs["reason"]
+
+
+@pytest.mark.parametrize("separation", [1.5, 2.5, 4.0])
+def test_greenwood_williamson_by_quadrature(separation):
+    surface = rough()
+    moments = theories(surface, 1.0)
+    m0, m2, m4 = (float(moments[name]) for name in ("m0", "m2", "m4"))
+    nayak = m0 * m4 / m2**2
+    density, radius = m4 / (6 * math.pi * math.sqrt(3) * m2), 3 * math.sqrt(math.pi) / (8 * math.sqrt(m4))
+    spread = math.sqrt((1 - 0.8968 / nayak) * m0)
+
+    def summits(order, d):
+        def deformed(z):
+            return (z - d) ** order * math.exp(-0.5 * (z / spread) ** 2) / (spread * math.sqrt(2 * math.pi))
+
+        return integrate.quad(deformed, d, d + 9 * spread, epsrel=1e-10, epsabs=0)[0]
+
+    d = separation * spread
+    pressure = 4 / 3 * density * MODULUS * math.sqrt(radius) * summits(1.5, d)
+    found = theories(surface, pressure).sel(theory="greenwood_williamson").isel(step=0)
+    assert float(found.contact_fraction) == pytest.approx(
+        math.pi * density * radius * summits(1, d), rel=1e-6
+    )
+    assert float(found.mean_gap) == pytest.approx(d + 4 * math.sqrt(m0 / (math.pi * nayak)), rel=1e-6)
+    stiffness = 2 * density * MODULUS * math.sqrt(radius) * summits(0.5, d)
+    assert float(found.interface_stiffness) == pytest.approx(stiffness, rel=1e-6)
+
+
+def published_gap(bands, relative_pressure):
+    """Return the double integral of Yang and Persson (2008) over narrow bands (q, mean square height)."""
+    width, total, below = 1e-4, 0.0, 0.0
+    for q, height in bands:
+        density = height / (2 * math.pi * q * q * width)  # C of Persson: m0 = 2 pi int q C dq
+
+        def weight(k, q=q, density=density, below=below):
+            return (math.pi * (density * (k**4 - q**4) / 4) + below) ** -0.5
+
+        def at(k, density=density, weight=weight):
+            w = weight(k)
+
+            def over(log_p):
+                x = w * math.exp(log_p)
+                return (0.45 + 1.65 * math.erf(x) ** 2) * math.exp(-(x**2))
+
+            low = math.log(relative_pressure)
+            high = max(low, math.log(7 / w))
+            inner = integrate.quad(over, low, high, epsabs=1e-12, limit=200)[0]
+            return k**2 * density * w * inner
+
+        # k = q (1 + width x^2) takes away the root of the weight at the edge of the first band
+        total += integrate.quad(
+            lambda x, q=q, at=at: at(q * (1 + width * x * x)) * 2 * q * width * x, 1e-9, 1, epsrel=1e-6
+        )[0]
+        below += math.pi * density * q**4 * ((1 + width) ** 4 - 1) / 4
+    return math.sqrt(math.pi) * total
+
+
+@pytest.mark.parametrize("share", [1e-4, 1e-2, 0.2, 1.0])
+def test_gap_of_persson_by_its_published_integral(share):
+    bands = [(2 * math.pi * n / SIDE, a**2 / 2) for n, a in ((2, 2e-6), (7, 1e-6))]
+    slope = math.sqrt(sum(q**2 * height for q, height in bands))
+    found = theories(waves((2, 2e-6), (7, 1e-6)), share * MODULUS * slope).sel(theory="persson")
+    assert float(found.mean_gap[0]) == pytest.approx(published_gap(bands, share * slope), rel=1e-3)
+
+
+def test_small_loads_of_persson_are_exponential():
+    """One wave: p ~ exp(-u/u0) with u0 = gamma sqrt(2/pi) h_rms, and a stiffness p/u0."""
+    pressure = np.array([1.0, math.e, 1e3])
+    found = theories(waves((4, 1e-6)), pressure).sel(theory="persson")
+    u0 = 0.45 * math.sqrt(2 / math.pi) * 1e-6 / math.sqrt(2)
+    assert float(found.mean_gap[0] - found.mean_gap[1]) == pytest.approx(u0, rel=1e-6)
+    np.testing.assert_allclose(found.interface_stiffness[:2], pressure[:2] / u0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("theory", ["persson", "greenwood_williamson"])
+def test_stiffness_is_the_derivative_of_the_pressure_by_the_gap(theory):
+    pressure = 2e5 * np.array([0.999, 1.0, 1.001])
+    found = theories(rough(), pressure).sel(theory=theory)
+    slope = -(pressure[2] - pressure[0]) / float(found.mean_gap[2] - found.mean_gap[0])
+    assert float(found.interface_stiffness[1]) == pytest.approx(slope, rel=1e-5)
+
+
+def test_persson_agrees_with_the_solver():
+    pressure = np.array([0.05, 0.2, 0.5]) * MODULUS * 0.1
+    surface = rough()
+    pressed = fc.contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure)
+    found = theories(surface, pressure).sel(theory="persson")
+    height = float(np.sqrt(found.m0))
+    assert np.abs(found.mean_gap - pressed.mean_gap).max() < 0.1 * height
+    ratio = found.contact_fraction / pressed.corrected_contact_fraction
+    assert ratio.min() > 0.7
+    assert ratio.max() < 1.02
+
+
+def test_scales():
+    """Heights and lengths by one factor: the same areas; the gap grows by it and the stiffness falls."""
+    surface, factor = rough(), 1e3
+    larger = fc.surfaces.from_array(factor * surface.values, factor * SIDE / CELLS, periodic=True)
+    one, other = theories(surface, [1e5, 1e7]), theories(larger, [1e6, 1e8], 10 * MODULUS)
+    np.testing.assert_allclose(other.contact_fraction, one.contact_fraction, rtol=1e-9)
+    np.testing.assert_allclose(other.mean_gap, factor * one.mean_gap, rtol=1e-9)
+    np.testing.assert_allclose(other.interface_stiffness, 10 / factor * one.interface_stiffness, rtol=1e-9)
+
+
+def test_free_surface_is_levelled_and_tapered():
+    """A tilt changes nothing; over shifts by quarters the tapers add up to one: nearly the true moments."""
+    periodic, step = rough(rolloff=1e-4), SIDE / CELLS
+    free = fc.surfaces.from_array(periodic.values, step)
+    tilted = fc.surfaces.from_array(periodic.values + 0.3 * X, step)
+    shifts = [(i, j) for i in range(0, CELLS, CELLS // 4) for j in range(0, CELLS, CELLS // 4)]
+    rolled = [theories(fc.surfaces.from_array(np.roll(free.values, s, (0, 1)), step), 1e6) for s in shifts]
+    for name in ("m0", "m2", "m4"):
+        assert float(theories(tilted, 1e6)[name]) == pytest.approx(float(theories(free, 1e6)[name]), rel=1e-9)
+        mean = np.mean([float(result[name]) for result in rolled])
+        assert mean == pytest.approx(float(theories(periodic, 1e6)[name]), rel=0.05)
+
+
+def test_no_pressure_complete_contact_and_flat_surface():
+    result = theories(rough(), [0.0, 1e12])
+    assert result["contact_fraction"].sel(theory="persson").values.tolist() == [0.0, 1.0]
+    assert result["interface_stiffness"].isel(step=0).values[:2].tolist() == [0.0, 0.0]
+    assert np.isnan(result["mean_gap"].isel(step=0)).all()
+    assert float(result["mean_gap"].sel(theory="persson")[1]) == pytest.approx(0.0, abs=1e-20)
+    assert np.isnan(result["interface_stiffness"].isel(step=1)).all()
+    assert "complete contact" in result["interface_stiffness"].attrs["reason"]
+    flat = theories(waves((4, 0.0)), 1e6)
+    assert np.isnan(flat["contact_fraction"]).all()
+    assert "flat" in flat["contact_fraction"].attrs["reason"]
+    assert float(flat["m2"]) == 0.0
+
+
+def test_all_problems_are_listed():
+    with pytest.raises(InvalidInput) as caught:
+        fc.contact.theories(waves((4, 1e-6)), contact_modulus=0, nominal_pressure=-1.0)
+    assert "contact_modulus" in str(caught.value)
+    assert "nominal_pressure" in str(caught.value)
