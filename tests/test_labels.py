@@ -135,7 +135,7 @@ CALLS = {
     "joints.strength_envelope": lambda: fc.joints.strength_envelope(
         rough(), nominal_pressure=[1e5, 1e6], wall_strength=1e8, basic_friction_angle=30
     ),
-    "joints.transmissivity": lambda: fc.joints.transmissivity(gap()),
+    "joints.transmissivity": lambda: fc.joints.transmissivity(gap(), keep=("pressure", "flux")),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
     "domains.area_dimension": lambda: fc.domains.area_dimension(
         [state(), state().isel(x=slice(None, None, 2), y=slice(None, None, 2))]

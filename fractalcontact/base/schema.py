@@ -311,6 +311,9 @@ QUANTITIES: dict[str, Quantity] = {
     "open_fraction": Quantity("1", "open over nominal area"),
     "overlap_fraction": Quantity("1", "area where the faces overlap over nominal area"),
     "flow_conductance": Quantity("m3 Pa-1 s-1", "flow per width and pressure gradient"),
+    "relative_pressure": Quantity("1", "fluid pressure over its drop along the axis"),
+    "flux_x": Quantity("m3", "flow per width along x, times viscosity over the mean pressure gradient"),
+    "flux_y": Quantity("m3", "flow per width along y, times viscosity over the mean pressure gradient"),
     # domains
     "box_size": Quantity("1", "edge of the box in cells"),
     "box_length": Quantity("m", "edge of the box"),

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import fractalcontact as fc
-from fractalcontact.joints import _transmissivity
+from fractalcontact.joints import _flow_network
 
 # relative amplitude, hydraulic over mean aperture across and along the crests
 SINUSOIDS = [(0.3, 0.910952, 1.043114), (0.6, 0.652413, 1.154800)]
@@ -285,7 +285,7 @@ def test_leading_dims_and_labels(make_face):
 def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
     gap = rough((96, 96), 0) + 0.5
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_transmissivity, "LARGEST_DIRECT", 10)
+    monkeypatch.setattr(_flow_network, "LARGEST_DIRECT", 10)
     pytest.importorskip("pyamg")
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=2e-8)
@@ -302,7 +302,7 @@ def test_multigrid_at_high_contrast(make_face, monkeypatch, contrast):
     pytest.importorskip("pyamg")
     gap = np.cbrt(np.where(np.random.default_rng(5).random((120, 120)) < 0.45, 1.0, contrast))
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_transmissivity, "LARGEST_DIRECT", 10)
+    monkeypatch.setattr(_flow_network, "LARGEST_DIRECT", 10)
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-7)
 
@@ -364,7 +364,7 @@ def test_transmissivity_over_load_and_shear(make_face, rough):
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (False, True), (True, True)])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (2, 40), (33, 7), (40, 40)])
 def test_order_of_elimination_takes_every_cell_once(shape, wraps):
-    order = _transmissivity.nested_dissection(shape, wraps)
+    order = _flow_network.nested_dissection(shape, wraps)
     assert sorted(order.tolist()) == list(range(shape[0] * shape[1]))
 
 
@@ -372,7 +372,7 @@ def test_order_of_elimination_takes_every_cell_once(shape, wraps):
 def test_order_of_elimination_fills_in_little(wraps):
     """The bound of George (1973), 31/4 n^2 log2(n) for n x n cells; row by row it would be n^3."""
     n = 48
-    order = _transmissivity.nested_dissection((n, n), wraps)
+    order = _flow_network.nested_dissection((n, n), wraps)
     line = sparse.diags_array([1.0, 1.0], offsets=[-1, 1], shape=(n, n)).tolil()
     line[0, -1] = line[-1, 0] = float(wraps[0])
     links = sparse.kron(line, sparse.eye_array(n)) + sparse.kron(sparse.eye_array(n), line)
@@ -381,3 +381,34 @@ def test_order_of_elimination_fills_in_little(wraps):
         matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     ).L.nnz
     assert filled < 31 / 4 * n**2 * np.log2(n) / (1 if wraps[0] else 2)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_flux_conserves_mass_and_its_mean_is_the_transmissivity(make_face, rough, periodic):
+    gap = np.maximum(rough((13, 20), seed=3) + 1.5, 0.0)
+    result = flow(make_face, gap, (1.0, 3.0), periodic=periodic, keep=("pressure", "flux"))
+    for axis, other in (("x", "y"), ("y", "x")):
+        one = result.sel(axis=axis)
+        assert one.percolates
+        through = one[f"flux_{axis}"].sum(other)
+        np.testing.assert_allclose(through, one.transmissivity * one.sizes[other], rtol=1e-9)
+        assert (one.flux_x.where(one.relative_pressure.isnull(), 0.0) == 0).all()
+
+
+def test_pressure_and_flux_of_layers_in_series(make_face):
+    gap = np.broadcast_to(np.cbrt([1.0, 1.0, 3.0, 3.0]), (3, 4))
+    result = flow(make_face, gap, (1.0, 5.0), keep=("pressure", "flux"))
+    # resistances 1, 1, 1/3, 1/3 of 8/3 in all, to the centre of each cell
+    exact = 1 - np.array([0.5, 1.5, 2 + 1 / 6, 2 + 1 / 2]) / (8 / 3)
+    np.testing.assert_allclose(result.relative_pressure.sel(axis="x"), np.tile(exact, (3, 1)), rtol=1e-12)
+    np.testing.assert_allclose(result.flux_x.sel(axis="x"), 1.5 / 12, rtol=1e-12)
+    np.testing.assert_allclose(result.flux_y.sel(axis="y"), gap**3 / 12, rtol=1e-12)
+    np.testing.assert_allclose(result.flux_y.sel(axis="x"), 0.0, atol=1e-15)
+    assert "flux_x" not in flow(make_face, gap, keep="pressure")
+
+
+def test_unmeasured_apertures_are_told_what_to_do(make_face):
+    gap = np.ones((4, 4))
+    gap[1, 2] = np.nan
+    with pytest.raises(ValueError, match=r"gap\.fillna\(0\)"):
+        flow(make_face, gap)
