@@ -83,6 +83,7 @@ FUNCTIONS = {
     ),
     "directional_roughness": fc.joints.directional_roughness,
     "transmissivity": lambda z: fc.joints.transmissivity(z - z.min()),
+    "uplift": lambda z: fc.joints.uplift(z - z.min(), upstream_pressure=1e5),
 }
 
 
@@ -103,7 +104,9 @@ def test_unknown_coordinates_change_nothing(name, tmp_path):
     fc.save(result, tmp_path / "result.nc")
 
 
-@pytest.mark.parametrize("name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity"])
+@pytest.mark.parametrize(
+    "name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity", "uplift"]
+)
 def test_coordinate_of_a_user_dim_is_kept(name, tmp_path):
     stack = (
         rough(members=2).rename(member="depth").assign_coords(depth=[0.5, 2.0], owner=("depth", ["p", "q"]))
@@ -116,7 +119,9 @@ def test_coordinate_of_a_user_dim_is_kept(name, tmp_path):
     xr.testing.assert_identical(fc.open(fc.save(result, tmp_path / "stack.nc")), result)
 
 
-@pytest.mark.parametrize("name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity"])
+@pytest.mark.parametrize(
+    "name", ["describe", "level", "fill", "estimate", "variogram", "transmissivity", "uplift"]
+)
 def test_multi_index_is_dropped(name):
     stack = rough(members=4).rename(member="case").drop_vars("case")
     stack = stack.assign_coords(a=("case", [0, 0, 1, 1]), b=("case", [0, 1, 0, 1])).set_index(case=["a", "b"])
@@ -136,6 +141,7 @@ def test_multi_index_is_dropped(name):
         ("variogram", "lag"),
         ("cube_counts", "vertical_scale"),
         ("transmissivity", "axis"),
+        ("uplift", "diagram"),
     ],
 )
 def test_dim_named_like_a_result_is_refused(name, dim):

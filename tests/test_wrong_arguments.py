@@ -82,6 +82,9 @@ CALLS = {
         "residual_friction_angle": 30, "length": 0.1, "damage_coefficient": 1.5, "normal_stiffness": 1e9,
     },
     "joints.transmissivity": {"gap": SURFACE - SURFACE.min()},
+    "joints.uplift": {
+        "gap": SURFACE - SURFACE.min(), "upstream_pressure": 1e5, "normal_stiffness": 1e10,
+    },
     "joints.bandis_closure": {"nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4},
     "joints.bandis_constants": {"roughness": 10, "wall_strength": 1e8, "aperture": 1e-4},
     "joints.barton_bandis_scaled": {"roughness": 10, "wall_strength": 1e8, "length": 1.0},

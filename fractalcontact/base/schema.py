@@ -74,6 +74,7 @@ _SCALE_POSITION = {
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_FACET = {"comment": "NaN where no facet faces the shear"}
+_NO_WATER = {"comment": "NaN where no water comes from an edge or a drain"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
 QUANTITIES: dict[str, Quantity] = {
@@ -314,6 +315,14 @@ QUANTITIES: dict[str, Quantity] = {
     "relative_pressure": Quantity("1", "fluid pressure over its drop along the axis"),
     "flux_x": Quantity("m3", "flow per width along x, times viscosity over the mean pressure gradient"),
     "flux_y": Quantity("m3", "flow per width along y, times viscosity over the mean pressure gradient"),
+    "diagram": Quantity(None, "distribution of the uplift: of the joint, or assumed by guidelines"),
+    "fluid_pressure": Quantity("Pa", "water pressure in the joint", _NO_WATER),
+    "uplift_profile": Quantity("Pa", "uplift per area along the flow, mean across it"),
+    "uplift_force": Quantity("N", "uplift force"),
+    "mean_uplift": Quantity("Pa", "uplift force over the nominal area"),
+    "uplift_arm": Quantity("m", "distance of the line of action of the uplift from the upstream edge"),
+    "wet_fraction": Quantity("1", "area under water pressure over nominal area"),
+    "isolated_fraction": Quantity("1", "open area that no water reaches over nominal area"),
     # domains
     "box_size": Quantity("1", "edge of the box in cells"),
     "box_length": Quantity("m", "edge of the box"),

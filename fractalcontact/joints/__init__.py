@@ -13,6 +13,7 @@ self_weight           shear strength against the size of the structure that load
 cyclic_shear          shear stress along a path of shear that reverses
 decorrelation_length  the shear at which the facing heights have decorrelated
 transmissivity        the flow through the open part of the joint
+uplift                the force of the water in the joint, and its line of action
 register              two measured faces brought into mated position, before all others
 
 For comparison with practice: the `roughness_coefficient` (JRC) and the `directional_roughness` of a surface,

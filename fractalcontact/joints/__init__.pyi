@@ -24,6 +24,7 @@ from ._strength_criteria import self_weight_strength as self_weight_strength
 from ._strength_criteria import size_effect as size_effect
 from ._strength_envelope import strength_envelope as strength_envelope
 from ._transmissivity import transmissivity as transmissivity
+from ._uplift import uplift as uplift
 
 __all__ = [
     "Crack",
@@ -52,4 +53,5 @@ __all__ = [
     "size_effect",
     "strength_envelope",
     "transmissivity",
+    "uplift",
 ]

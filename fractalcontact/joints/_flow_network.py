@@ -174,6 +174,12 @@ def spanning_cells(network: Network) -> Array:
     return np.isin(labels.ravel(), both)
 
 
+def held_cells(network: Network, held: Held) -> Array:
+    """Return which cells belong to an open cluster that reaches a cell whose pressure is held."""
+    labels = _clusters(network, np.ones(network.i.size, bool))
+    return np.isin(labels, labels[held.conductance.ravel() > 0])
+
+
 def winding_cells(network: Network) -> Array:
     """Return which cells belong to an open cluster that meets its own image one or more periods away."""
     from scipy.sparse import coo_array
@@ -353,12 +359,11 @@ def cell_flows(network: Network, pressure: Array, inside: Array) -> tuple[Array,
     p, chosen = pressure.ravel(), inside[network.i]
     drop = p[network.i] - p[network.j] + network.jump
     half = 0.5 * network.conductance * drop * chosen
-    along, across = (
-        (np.bincount(network.i, half * part, p.size) + np.bincount(network.j, half * part, p.size)).reshape(
-            network.shape
-        )
-        for part in (network.along, ~network.along)
-    )
+    parts = []
+    for part in (half * network.along, half * ~network.along):
+        flow: Array = np.bincount(network.i, part, p.size) + np.bincount(network.j, part, p.size)
+        parts.append(flow.reshape(network.shape))
+    along, across = parts
     plane = inside.reshape(network.shape)
     along[:, 0] += 0.5 * network.inlet * (1.0 - pressure[:, 0]) * plane[:, 0]
     along[:, -1] += 0.5 * network.outlet * pressure[:, -1] * plane[:, -1]

@@ -1,0 +1,146 @@
+"""Uplift against closed forms, the diagrams of guidelines, and invariances."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+HEAD = 490.5e3  # Pa, 50 m of water
+
+
+def uplift(make_face, gap, spacing=1.0, *, periodic=False, **options):
+    return fc.joints.uplift(
+        make_face(gap, spacing, periodic=periodic), **{"upstream_pressure": HEAD} | options
+    )
+
+
+def test_linear_diagram_of_a_dam_of_40_m(make_face):
+    result = uplift(make_face, np.full((3, 40), 1e-4), (1 / 3, 1.0))  # 50 m of water, a strip of 1 m
+    np.testing.assert_allclose(result.uplift_force, 9.81e6, rtol=1e-9)
+    np.testing.assert_allclose(result.uplift_arm, 40 / 3, rtol=1e-9)
+    np.testing.assert_allclose(result.mean_uplift, HEAD / 2, rtol=1e-9)
+    assert result.diagram.values.tolist() == ["joint", "linear"]
+    assert result.wet_fraction == 1
+    assert result.isolated_fraction == 0
+
+
+def test_bilinear_diagram_with_a_third_at_the_drains(make_face):
+    line = [(4.0 - 1e-9, y) for y in (0.5, 1.5, 2.5)]
+    result = uplift(make_face, np.full((3, 400), 1e-4), (1.0, 0.1), drains=line, drain_pressure=HEAD / 3)
+    per_metre = result.uplift_force / 3
+    # by hand: 4.251 MN/m; the line of cells is half a cell from the stated 4 m
+    np.testing.assert_allclose(per_metre.sel(diagram="bilinear"), 4.251e6, rtol=5e-3)
+    np.testing.assert_allclose(per_metre.sel(diagram="joint"), per_metre.sel(diagram="bilinear"), rtol=1e-4)
+    arms = result.uplift_arm
+    np.testing.assert_allclose(arms.sel(diagram="joint"), arms.sel(diagram="bilinear"), rtol=1e-4)
+
+
+def test_open_crack_carries_the_full_head(make_face):
+    gap = np.where(np.arange(40) < 10, 1e-2, 1e-5) * np.ones((2, 1))
+    result = uplift(make_face, gap)
+    np.testing.assert_allclose(result.uplift_force.sel(diagram="joint") / 2, 12.2625e6, rtol=1e-6)
+
+
+def test_step_in_aperture(make_face):
+    gap = np.repeat([2e-4, 1e-4], 10) * np.ones((2, 1))
+    profile = uplift(make_face, gap).uplift_profile.sel(diagram="joint") / HEAD
+    middle = 0.5 * (
+        profile[9] + 0.5 * (profile[9] - profile[8]) + profile[10] - 0.5 * (profile[11] - profile[10])
+    )
+    np.testing.assert_allclose(middle, 8 / 9, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("ratio", "mean"), [(1.5, 0.596923), (2, 0.653333), (3, 0.71), (10, 0.777858)])
+def test_water_opens_a_smooth_joint(make_face, ratio, mean):
+    """The aperture w0 + c p: its fourth power is linear along the flow."""
+    stiffness = HEAD / ((ratio - 1) * 1e-4)
+    result = uplift(make_face, np.full((2, 800), 1e-4), 0.05, normal_stiffness=stiffness)
+    np.testing.assert_allclose(
+        result.mean_uplift.sel(diagram="joint") / HEAD, mean, atol=2e-6 if ratio < 10 else 1e-4
+    )
+    along = (np.arange(800) + 0.5) / 800
+    exact = ((ratio**4 + (1 - ratio**4) * along) ** 0.25 - 1) / (ratio - 1)
+    upper = slice(0, 760)  # at the lower edge the aperture halves within a few cells
+    np.testing.assert_allclose(result.fluid_pressure[0, upper] / HEAD, exact[upper], atol=5e-4)
+
+
+def test_tailwater_adds_its_pressure(make_face, rough):
+    gap = np.maximum(rough((12, 16), seed=4) + 1.5, 0.0) * 1e-4
+    dry = uplift(make_face, gap)
+    both = uplift(make_face, gap, upstream_pressure=HEAD + 1e5, downstream_pressure=1e5)
+    np.testing.assert_allclose(both.fluid_pressure, dry.fluid_pressure + 1e5, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("edge", "turn"), [("E", lambda g: g[:, ::-1]), ("S", lambda g: g.T),
+                                            ("N", lambda g: g.T[::-1])])  # fmt: skip
+def test_every_edge_is_the_same_plane_turned(make_face, rough, edge, turn):
+    gap = np.maximum(rough((12, 16), seed=4) + 1.2, 0.0) * 1e-4
+    west = uplift(make_face, gap)
+    other = uplift(make_face, turn(gap), upstream=edge)
+    np.testing.assert_allclose(other.fluid_pressure, turn(west.fluid_pressure.values), rtol=1e-9)
+    np.testing.assert_allclose(other.uplift_arm, west.uplift_arm, rtol=1e-9)
+    np.testing.assert_allclose(other.uplift_force, west.uplift_force, rtol=1e-9)
+
+
+def test_pressure_agrees_with_the_transmissivity(make_face, rough):
+    gap = np.maximum(rough((12, 16), seed=4) + 1.5, 0.0) * 1e-4
+    flow = fc.joints.transmissivity(make_face(gap, 1.0), axis="x", keep="pressure")
+    through = flow.relative_pressure.squeeze("axis")
+    pressure = uplift(make_face, gap).fluid_pressure / HEAD
+    assert through.notnull().any()
+    np.testing.assert_allclose(pressure.where(through.notnull()), through, rtol=1e-9)
+
+
+def test_water_behind_a_barrier_stands_at_full_head(make_face):
+    gap = np.full((5, 9), 1e-4)
+    gap[:, 4] = 0.0  # contact from side to side
+    gap[1:4, 6:9] = 0.0
+    gap[2, 7] = 1e-4  # a pocket that no water reaches
+    result = uplift(make_face, gap, downstream_pressure=1e5)
+    pressure = result.fluid_pressure.values
+    np.testing.assert_allclose(pressure[:, :4], HEAD, rtol=1e-12)
+    np.testing.assert_allclose(pressure[:, 5], 1e5, rtol=1e-12)
+    assert np.isnan(pressure[:, 4]).all()
+    assert np.isnan(pressure[2, 7])
+    np.testing.assert_allclose(result.isolated_fraction, 1 / 45)
+    np.testing.assert_allclose(
+        result.uplift_force.sel(diagram="joint"), np.nansum(pressure), rtol=1e-12
+    )  # cells of 1 m2; contact carries none
+
+
+def test_one_drain_is_a_well_of_a_fifth_of_the_spacing(make_face):
+    """The closed form of a well in the middle of a long strip between two edges of the same head."""
+    n = 41
+    result = uplift(make_face, np.full((161, n), 1e-4), drains=[(20.5, 80.5)],
+                    downstream_pressure=HEAD * (1 - 1e-9), drain_pressure=0.0)  # fmt: skip
+    distance = np.arange(5, 18)
+    exact = 1 - np.log(np.tan(np.pi * distance / (2 * n))) / np.log(np.tan(np.pi * 0.2 / (2 * n)))
+    np.testing.assert_allclose(result.fluid_pressure[80, 20 + distance] / HEAD, exact, atol=2e-3)
+
+
+def test_drain_of_a_diameter_holds_all_its_cells(make_face):
+    result = uplift(make_face, np.full((21, 21), 1e-4), drains=[(10.5, 10.5)], drain_diameter=4.1)
+    held = np.abs(result.fluid_pressure.values) < 1e-5 * HEAD
+    y, x = np.indices((21, 21)) - 10
+    np.testing.assert_array_equal(held, np.hypot(y, x) <= 2.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"drains": [(5.0, 99.0)]}, "drains: expected points"),
+        ({"drains": [1.0, 2.0, 3.0]}, "drains: expected points"),
+        ({"downstream_pressure": 2 * HEAD}, "less than upstream_pressure"),
+        ({"upstream": "NE"}, "upstream"),
+    ],
+)
+def test_wrong_arguments_are_named(make_face, options, message):
+    with pytest.raises(ValueError, match=message):
+        uplift(make_face, np.full((9, 9), 1e-4), **options)
+
+
+def test_unmeasured_apertures_are_told_what_to_do(make_face):
+    gap = np.ones((4, 4))
+    gap[1, 2] = np.nan
+    with pytest.raises(ValueError, match=r"gap\.fillna\(0\)"):
+        uplift(make_face, gap)
