@@ -144,7 +144,7 @@ CALLS = {
         f"dimensions.{name}": lambda: {"surface": rough()}
         for name in ("covering", "cube_counts", "directions", "madogram", "roughness_length", "variation")
     },
-    "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "whittle"]},
+    "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "likelihood"]},
     "dimensions.second_variogram": lambda: {"surface": rough()},
     "dimensions.spectrum": lambda: {"surface": periodic()},
     "dimensions.variogram": lambda: {"surface": rough()},
@@ -298,6 +298,7 @@ def fault_of(call, *, seconds=20, names=()):
 
 
 def _unnamed(error, names):
+    """Return a complaint unless the error names one of the arguments (a value may be refused for another)."""
     text = str(error)
     if names and not any(name in text for name in names):
         return f"the error names none of {', '.join(names)}: {text[:200]}"

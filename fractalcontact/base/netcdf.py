@@ -155,9 +155,11 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     if chunks is not None:
         if importlib.util.find_spec("dask") is None:
             raise MissingExtra("chunks", "dask", "dask")
-        if not (chunks == "auto" or _is_size(chunks) or _are_sizes(chunks)):
+        with Problems(where) as problems:
+            is_auto = isinstance(chunks, str) and chunks == "auto"
             expected = "'auto', a size of blocks, or a mapping of dims to sizes"
-            raise InvalidInput(where, [f"chunks: expected {expected}, got {chunks!r}"])
+            are_sizes = is_auto or _is_size(chunks) or _are_sizes(chunks)
+            problems.require(are_sizes, "chunks", expected, chunks)
     try:
         tree = xr.DataTree.from_dict(_read(source) if chunks is None else _opened(source, chunks))
     except UnreadableFile:
@@ -276,7 +278,8 @@ def _is_size(size: object) -> bool:
 
 def _are_sizes(chunks: object) -> bool:
     return isinstance(chunks, Mapping) and all(
-        isinstance(dim, str) and (size == "auto" or _is_size(size)) for dim, size in chunks.items()
+        isinstance(dim, str) and (size in ("auto",) if isinstance(size, str) else _is_size(size))
+        for dim, size in chunks.items()
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import result_of, words
+from fractalcontact.plotting._inputs import require_dims, result_of, words
 from fractalcontact.plotting._units import axis_label
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     """
     figure, ax = _style.axes_or_new(ax)
     data = result_of(result, "strength_envelope", ("shear_strength", "in_range", "criterion"), ("criterion",))
+    require_dims(data, "strength_envelope", {"shear_strength": "nominal_pressure"})
     data = data.sortby("nominal_pressure")
     pressure = data["nominal_pressure"]
     strength = data["shear_strength"].transpose("criterion", "nominal_pressure")
@@ -73,7 +74,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
         entries.append(_style.legend_line("out of range", **OUTSIDE_LINE))
     if tests is not None:
         names = ("peak_shear_strength", "residual_shear_strength", "nominal_pressure")
-        found = result_of(tests, "strength_envelope", names, ("nominal_pressure",))
+        found = result_of(tests, "strength_envelope", names, ("nominal_pressure",), "tests")
         for name, marker in (("peak_shear_strength", "o"), ("residual_shear_strength", "x")):
             style: dict[str, Any] = {"ls": "", "marker": marker, "color": _style.BLACK, "zorder": 3}
             ax.plot(scale(found["nominal_pressure"]), scale(found[name]), clip_on=False, **style)

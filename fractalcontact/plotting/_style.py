@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from fractalcontact.base.numbers import number_of_entries
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.numbers import is_real, number_of_entries
+from fractalcontact.base.validation import Problems, Words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,11 +117,12 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
     elif words[0] == "int":
         problems.integer(name, value, at_least=1)
     elif words[0] == "float":
-        problems.number(name, value, optional=optional)
+        plain = is_real(value) or value is None  # a labelled number would carry its dims into the figure
+        problems.number(name, value if plain else Words(type(value).__name__), optional=optional)
     elif words[0].startswith(("Sequence[", "tuple[")) and not (optional and value is None):
         pair = words[0].startswith("tuple[")
         expected = "two numbers" if pair else "a sequence of numbers"
-        size = number_of_entries(value)
+        size = number_of_entries(value) if isinstance(value, (list, tuple, np.ndarray)) else None
         if problems.require(size is not None and (size == 2 or not pair), name, expected, value) and size:
             problems.numbers(name, value)
 

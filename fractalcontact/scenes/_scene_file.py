@@ -249,7 +249,7 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
                 is_pair = isinstance(shape, list) and len(shape) == 2
                 problems.require(is_pair, f"{name}.shape", "[ny, nx]", shape)
         if "members" in table:
-            problems.integer(f"{name}.members", table["members"], at_least=1)
+            problems.integer(f"{name}.members", table["members"], at_least=1, at_most=LONGEST_RANGE)
     else:
         _check_keys(table, READING, name, problems)
         if sources == ["read"]:

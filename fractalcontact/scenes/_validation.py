@@ -6,6 +6,7 @@ function that it will call is given the arguments of that call.
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from collections.abc import Iterator, Sequence
@@ -244,7 +245,9 @@ def _contact_options(scene: Scene) -> dict[str, Any]:
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
     """Validate a call that has all arguments it needs; what is missing was noted before."""
     allowed, required = arguments_of(name)
-    options = {key: value for key, value in options.items() if key in allowed or key in ("keep", "methods")}
+    if "keep" in options and "keep" not in inspect.signature(public_function(name)).parameters:
+        del options["keep"]  # an unknown key, which was noted before
+    options = {key: value for key, value in options.items() if key in (*allowed, "keep")}
     if required <= set(options):
         public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 

@@ -40,7 +40,7 @@ def check(pick):
     assert found is None, f"{done}: {found}"
 
 
-@settings(max_examples=QUICK, **SETTINGS)
+@settings(max_examples=QUICK, derandomize=True, **SETTINGS)
 @given(strategies.data())
 def test_damaged_scene(data):
     check(lambda options: data.draw(strategies.sampled_from(options)))
