@@ -203,12 +203,15 @@ def _run(options: argparse.Namespace) -> int:
         problems.integer("--workers", options.workers, at_least=0, at_most=most_workers())
     tree = scenes.run(options.scene, out=options.out, progress=not options.quiet, workers=options.workers)
     if not options.quiet:
+        from fractalcontact.base.tables import screen_width
+
         print(scenes.summary(tree))
         figures = len(list(Path(options.out).glob("*.png")))
         size = (Path(options.out) / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""
         files = f"{RESULT} ({size / 1e6:.2g} MB), report.html"
-        print(f"\nwritten to {options.out}: {files}{drawn}{_memory()}")
+        written = f"written to {options.out}: {files}{drawn}{_memory()}"
+        print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
     return 0
 
 

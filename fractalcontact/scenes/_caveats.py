@@ -151,6 +151,66 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
         )
 
 
+def peak_remarks(tree: xr.DataTree, friction: xr.Dataset) -> Iterator[str]:
+    """Yield how the peaks depend on their distance, and what the kinematic form leaves out of them."""
+    comment = friction["peak_friction_angle"].attrs.get("comment")
+    if comment:
+        change = _strength_over_half(friction)
+        strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
+        yield f"The peak friction angle {comment}.{strength}"
+    elastic = group_of(tree, "joints/elastic_dilatancy")
+    if elastic is None or "elastic_energy" not in elastic or _form(friction) != "kinematic":
+        return
+    known = friction["peak_friction_angle"].notnull()
+    if not known.any():
+        return
+    angle = _energy_peak(elastic, friction)
+    more, locked = (angle - friction["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
+    more = more[np.isfinite(more)]
+    found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
+    found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
+    yield (
+        "It is that of the kinematic form, which leaves out the elastic energy that the faces store while "
+        f'they slide: form = "energy" {" and ".join(found)}.'
+    )
+
+
+def _strength_over_half(friction: xr.Dataset) -> float | None:
+    """Return the greatest relative change of the strength between the two shortest distances."""
+    strengths = friction["secant_shear_strength"].sortby("distance").transpose("distance", ...).values
+    if len(strengths) < 2:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = np.abs(strengths[0] / strengths[1] - 1.0)
+    return float(change[np.isfinite(change)].max()) if np.isfinite(change).any() else None
+
+
+def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
+    """Return the peak friction angle of the energy form over the same distance, of every member."""
+    from fractalcontact import joints
+
+    distance = float(friction["peak_distance"].max())
+    members = range(elastic.sizes[MEMBER]) if MEMBER in elastic.dims else [None]
+    peaks = [
+        joints.friction(
+            elastic if number is None else elastic.isel({MEMBER: number}),
+            basic_friction_angle=float(friction["basic_friction_angle"].mean()),
+            form="energy",
+            distance=distance,
+        )["peak_friction_angle"]
+        for number in members
+    ]
+    return peaks[0] if members == [None] else xr.concat(peaks, MEMBER)
+
+
+def _form(friction: xr.Dataset) -> str:
+    """Return the form of the friction angle that a result states."""
+    try:
+        return str(json.loads(friction.attrs["provenance"])["parameters"]["form"])
+    except (KeyError, TypeError, ValueError):
+        return ""
+
+
 def _material(tree: xr.DataTree) -> dict[str, Any]:
     """Return the table of the material in the scene of a study, empty where there is none."""
     try:

@@ -71,7 +71,8 @@ def paper_table(tree: xr.DataTree) -> str:
         found = [claim.test(study) or Finding("", NOT_TESTED) for study in studies]
         rows.append((claim.section, claim.claim, found[0].result, _verdict(found)))
     remark = (
-        "The paper states orders of magnitude and trends; neither its surface nor its modulus is published."
+        "The paper states orders of magnitude and trends; neither its surface nor its modulus is published. "
+        "fractalcontact.scenes.paper_criteria() states when each verdict is yes."
     )
     return "\n".join([table(rows), note(remark)])
 
@@ -238,6 +239,12 @@ CLAIMS = (
         "no correlation left at 8 mm",
         "decorrelation length below 8 mm, and correlation below 1/e at 8 mm",
         findings.decorrelation,
+    ),
+    Claim(
+        "4",
+        "delta_r: a marked anisotropy",
+        "at the greatest shear the four directions differ by more than 25 % of the greatest delta_r",
+        findings.anisotropy,
     ),
     Claim("4", "delta_r about 2 mm at .8 mm (W, N)", "tolerance 25 %", findings.steep_rise),
     Claim(

@@ -52,6 +52,8 @@ DIFFERENT = 0.1  # dimension of a domain that differs from others
 SAME_HEIGHT = 0.25
 SAME_SLOPE = 0.5
 SAME_COEFFICIENT = 0.2
+LOCKED = 90.0  # degree: a friction angle that has no strength
+ANISOTROPIC = 0.25  # least to greatest dilatancy of four directions, as a share of the greatest
 STRONG_FLOW = 10.0
 UNCORRELATED = float(np.exp(-1.0))  # the correlation that defines the decorrelation length
 FEW_ROUNDS = 6
@@ -66,7 +68,8 @@ def face_dimension(tree: xr.DataTree) -> Finding | None:
     dimension = np.asarray(estimates["fractal_dimension"].values, dtype=float)
     low, high = DIMENSION[0] - DIMENSION_TOLERANCE, DIMENSION[1] + DIMENSION_TOLERANCE
     inside = bool(((dimension >= low) & (dimension <= high)).all())  # NaN is not inside
-    return finding(f"{span(dimension)} by {dimension.size} methods", inside)
+    methods = f"{dimension.size} methods" if dimension.size > 1 else "one method"
+    return finding(f"{span(dimension)} by {methods}, tolerance {DIMENSION_TOLERANCE:g}", inside)
 
 
 def _delta_dimension(tree: xr.DataTree) -> tuple[Array, Array] | None:
@@ -335,6 +338,15 @@ def plateau(tree: xr.DataTree) -> Finding | None:
     return finding(f"{values} after .8 mm", bool(flat.all()))
 
 
+def anisotropy(tree: xr.DataTree) -> Finding | None:
+    rigid = read_rigid(tree, FLAT_DIRECTIONS + RISING_DIRECTIONS)
+    if rigid is None or rigid.shear[-1] < FAR * (1 - SAME_POINT):
+        return None
+    last = rigid.dilatancy[:, -1]
+    values = f"{named(rigid.names, last * 1e3, '.2f')} mm at {quantity_text(rigid.shear[-1], 'm')}"
+    return finding(values, bool(np.ptp(last) > ANISOTROPIC * rigid.dilatancy.max()))
+
+
 def _asymptote(rigid: Rigid) -> Array:
     """Return the slopes of straight lines through the second half of the path."""
     half = rigid.shear >= rigid.shear[-1] / 2
@@ -393,11 +405,13 @@ def coefficient(tree: xr.DataTree) -> Finding | None:
     last, first = curve[1][ends]  # type: ignore[index]
     basic = float(elastic["basic_friction_angle"])
     angle = basic + np.degrees(np.arctan2(last - first, PLATEAU))
-    if (angle >= 90).any():
-        return finding(f"up to {angle.max():.0f} degree: the faces lock", False)
+    locked = int((angle >= LOCKED).sum())
+    if locked:
+        return finding(f"none: the faces lock at {locked} of {angle.size} forces", False)
     coefficient = np.tan(np.radians(angle))
     low, high = COEFFICIENTS[0] - SAME_COEFFICIENT, COEFFICIENTS[1] + SAME_COEFFICIENT
-    return finding(listed(coefficient, ".2f"), bool(((coefficient >= low) & (coefficient <= high)).all()))
+    values = f"{listed(coefficient, '.2f')}, tolerance {SAME_COEFFICIENT:g}"
+    return finding(values, bool(((coefficient >= low) & (coefficient <= high)).all()))
 
 
 def leakage(tree: xr.DataTree) -> Finding | None:

@@ -111,7 +111,9 @@ def trend(result: str, values: Array, sign: int) -> Finding | None:
     if len(values) < 2:
         return None
     holds = sign * np.diff(values, axis=0) > 0
-    return finding(f"{result}: {int(holds.sum())} of {holds.size} steps", bool(holds.all()))
+    change, columns = "grows" if sign > 0 else "falls", values.shape[1]
+    over = f" over {columns} pressures" if columns > 1 else ""
+    return finding(f"{result}; {change} in {int(holds.sum())} of {holds.size} steps{over}", bool(holds.all()))
 
 
 def nearest(values: Array, wanted: float) -> int | None:
@@ -133,8 +135,8 @@ def named(names: Iterable[str], values: Iterable[float], form: str) -> str:
 
 
 def span(values: Array) -> str:
-    """Return the least and the greatest value."""
-    return f"{np.nanmin(values):.2f} ... {np.nanmax(values):.2f}"
+    """Return the least and the greatest value, once where both read the same."""
+    return " ... ".join(dict.fromkeys(f"{end:.2f}" for end in (np.nanmin(values), np.nanmax(values))))
 
 
 def quantities(values: Iterable[float], units: str) -> str:

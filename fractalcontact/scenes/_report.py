@@ -13,7 +13,7 @@ from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import table
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count
+from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count, peak_remarks
 from fractalcontact.scenes._contents import note, reasons, stage_table
 from fractalcontact.scenes._paper import paper_table
 
@@ -366,8 +366,7 @@ def _friction(tree: xr.DataTree) -> str:
             values = [amount(state[name]) for name in names] if _finite(strength).size else None
             pressure = amount(towards["nominal_pressure"].isel(step=step))
             rows.append((str(direction), pressure, *(values or ("none: the faces lock", "", ""))))
-    comment = friction["peak_friction_angle"].attrs.get("comment")
-    return "\n".join([table(rows), *([note(f"The peak friction angle {comment}.")] if comment else [])])
+    return "\n".join([table(rows), *(note(remark) for remark in peak_remarks(tree, friction))])
 
 
 def _direct_shear(tree: xr.DataTree) -> str:
@@ -388,7 +387,7 @@ def _contact_set(tree: xr.DataTree) -> str:
     boxes = group_of(tree, "domains/box_dimension")
     if boxes is None:
         return ""
-    rows = [("contact domain, last step", "box dimension", "95 % interval", "random null")]
+    rows = [("contact domain, last step", "box dimension", "95 % interval", "boxes (cells)", "random null")]
     last = boxes.isel(step=-1) if "step" in boxes.dims else boxes
     for shear, state in _at_shears(last):
         low, high = state["ci_low"].mean(), state["ci_high"].mean()
@@ -397,10 +396,17 @@ def _contact_set(tree: xr.DataTree) -> str:
                 f"shear {shear}" if shear else "",
                 plain(state["box_dimension"], 2),
                 f"{plain(low, 2)} ... {plain(high, 2)}" if np.isfinite(low) else "none",
+                _boxes(state),
                 plain(state["null_dimension"], 2),
             )
         )
     return "\n".join([table(rows), note(_counts_beside_null(last))])
+
+
+def _boxes(state: xr.Dataset) -> str:
+    """Return the smallest and the largest box of the fit; dimensions over other boxes are not comparable."""
+    ends = (_finite(state["scale_min"]), _finite(state["scale_max"]))
+    return f"{ends[0].min():g} ... {ends[1].max():g}" if ends[0].size else "-"
 
 
 def _counts_beside_null(boxes: xr.Dataset) -> str:

@@ -219,8 +219,11 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
     if "iterations" in result:
         facts["iterations"] = int(result["iterations"].sum())
     if "standard_error" in result:
-        errors = [f"{float(v):.4f}" for v in result["standard_error"].values.ravel() if np.isfinite(v)]
-        facts["standard error of H"] = " ".join(errors) or "none"
+        by_method = np.atleast_1d(result["standard_error"].values)
+        by_method = by_method.reshape(-1, by_method.shape[-1]).T  # the members of an ensemble come first
+        known = [errors[np.isfinite(errors)] for errors in by_method]
+        ends = [dict.fromkeys(f"{end:.4f}" for end in (e.min(), e.max())) for e in known if e.size]
+        facts["standard error of H"] = " ".join(" to ".join(pair) for pair in ends) or "none"
     if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
         facts["interpolation error (m)"] = float(result["interpolation_error"].max())
     words = json.loads(result.attrs.get("provenance", "{}")).get("achieved_error")

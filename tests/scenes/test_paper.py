@@ -77,6 +77,7 @@ MADE = {
     "smooth": lambda: random_face(rms_height=1e-4, rolloff=8e-3, short_cutoff=4e-3),
     "plane": lambda: 0.03 * SPACING * (np.arange(POINTS) - np.arange(POINTS)[:, None]),
 }
+PRESSURES = (2.5e6, 25e6, 75e6)  # Pa
 SIDES = {"lower": "a", "upper": "b"}
 DATA = "FRACTALCONTACT_DATA"
 
@@ -161,7 +162,7 @@ def test_claim_that_follows_from_the_model_has_no_verdict(falsification):
     for found in falsification.values():
         for claim, (_, verdict) in found.items():
             assert (verdict == "by construction") == CRITERIA[claim].startswith("by construction")
-    assert len(CLAIMS) == 29
+    assert len(CLAIMS) == 30
 
 
 def test_results_of_a_plane(study):
@@ -176,7 +177,50 @@ def test_results_of_a_plane(study):
     assert plane["domain: dimension below 2"] == ("at most 2.00", "no")
     # slope 35 degree downhill: tan(35 degree - atan(.03))
     expected = f"{np.tan(np.radians(35) - np.arctan(0.03)):.2f}"
-    assert plane["codes: coefficient of friction 1.0 to 1.4"][0] == ", ".join([expected] * 3)
+    assert plane["codes: coefficient of friction 1.0 to 1.4"][0] == (
+        ", ".join([expected] * 3) + ", tolerance 0.2"
+    )
+
+
+def test_anisotropy_of_a_plane_and_of_an_egg_box(study):
+    """A plane falls as far W and N as it rises E and S; an egg box is the same towards all four."""
+    claim = "delta_r: a marked anisotropy"
+    assert findings(study("plane"))[claim] == ("W -0.24, N -0.24, E 0.24, S 0.24 mm at 8 mm", "yes")
+    assert findings(study("egg box"))[claim][1] == "no"
+
+
+def test_counted_steps_name_what_they_count(study):
+    """Six lengths at one pressure have 5 steps: the 15 are those over three pressures."""
+    tree = study("smooth").copy()
+    closure = tree["joints/closure"].to_dataset()
+    lengths = closure["interface_closure"]
+    steps = [int(np.abs(closure["nominal_pressure"].values - pressure).argmin()) for pressure in PRESSURES]
+    grown = np.linspace(1e-6, 6e-6, 6)[:, None] * np.ones(lengths.shape)
+    grown[:, steps[0]] = grown[::-1, steps[0]]  # at 2.5 MPa alone they fall
+    closure["interface_closure"] = lengths.copy(data=grown)
+    tree["joints/closure"] = xr.DataTree(closure)
+    result, verdict = findings(tree)["closing stage lengthens with v"]
+    assert result == "1, 2, 3, 4, 5, 6 µm at 75 MPa; grows in 10 of 15 steps over 3 pressures"
+    assert verdict == "no"
+
+
+def test_tolerances_and_single_values_are_stated(study):
+    tree = study("smooth")
+    one = xr.DataTree.from_dict({"/joints": xr.Dataset(), "/dimensions": tree["dimensions"].to_dataset()})
+    one["dimensions"] = xr.DataTree(one["dimensions"].to_dataset().isel(method=[0]))
+    dimension = float(one["dimensions"]["fractal_dimension"][0])
+    result = findings(one)["face: dimension 2.15 to 2.29"][0]
+    assert result == f"{dimension:.2f} by one method, tolerance 0.05"
+    assert "paper_criteria" in paper_table(tree)
+
+
+def test_angle_of_faces_that_lock_is_not_printed(study):
+    tree = study("smooth").copy()
+    elastic = tree["joints/elastic_dilatancy"].to_dataset()
+    elastic["basic_friction_angle"] = elastic["basic_friction_angle"] * 0 + 89.9
+    tree["joints/elastic_dilatancy"] = xr.DataTree(elastic)
+    result, verdict = findings(tree)["codes: coefficient of friction 1.0 to 1.4"]
+    assert (result, verdict) == ("none: the faces lock at 3 of 3 forces", "no")
 
 
 def test_results_are_those_of_the_file(study):

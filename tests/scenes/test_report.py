@@ -46,6 +46,53 @@ def test_loads_of_all_members_have_no_deviation(ensemble):
     assert rows(fc.scenes.summary(ensemble), "closure at shear")[0][1] == "10 N"
 
 
+def test_peak_strength_states_its_distance_and_its_form(ensemble):
+    """The energy form by hand: secants of delta + U/N over the distance, for every member and force."""
+    words = " ".join(fc.scenes.summary(ensemble).split())
+    friction = ensemble["joints/friction"].to_dataset()
+    elastic = ensemble["joints/elastic_dilatancy"].to_dataset()
+    distance, shear = float(friction.peak_distance.max()), elastic.shear.values
+    energy = elastic.dilatancy + elastic.elastic_energy / elastic.normal_force
+    differences = []
+    for member in range(elastic.sizes["member"]):
+        for step in range(elastic.sizes["step"]):
+            peaks = []
+            for curve in (elastic.dilatancy, energy):
+                values = curve.isel(member=member, step=step).transpose("shear", ...).values.ravel()
+                starts = shear[shear <= shear[-1] - distance * (1 - 1e-9)]
+                rises = np.interp(starts + distance, shear, values) - np.interp(starts, shear, values)
+                peaks.append(np.degrees(np.arctan(rises.max() / distance)))
+            differences.append(peaks[1] - peaks[0])
+    expected = f'form = "energy" gives {min(differences):+.1f} to {max(differences):+.1f} degree'
+    assert expected in words
+    assert "+" in expected
+
+
+def test_strength_near_locking_changes_far_more_than_its_angle():
+    """Two straight parts: 88.5 degree over the first 100 µm and 87 over 200 µm, half a step from locking."""
+    shear = np.arange(9) * 1e-4
+    rise = 35.0
+    slopes = np.tan(np.radians(np.array([88.5, 85.0, *([40.0] * 6)]) - rise))
+    climb = xr.DataArray(np.concatenate([[0.0], np.cumsum(slopes) * 1e-4]), dims="shear")
+    surface = fc.surfaces.from_array(np.zeros((16, 32)), 1e-4)
+    crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(8e-4, 8e-4), basic_friction_angle=rise)
+    rigid = fc.joints.dilatancy(crack, shear=shear, direction="E")
+    rigid["rigid_dilatancy"] = rigid["rigid_dilatancy"].copy(data=climb.values[None])
+    friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
+    words = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/friction": friction})).split())
+    over_two = rise + np.degrees(np.arctan(slopes[:2].mean()))
+    change = np.tan(np.radians(88.5)) / np.tan(np.radians(over_two)) - 1
+    assert f"The strength changes by up to {100 * change:.0f} %." in words
+    assert "energy" not in words  # rigid faces store none
+
+
+def test_standard_errors_of_the_members_are_a_span(ensemble):
+    errors = ensemble["dimensions"].standard_error.values[:, 0]
+    ends = dict.fromkeys(f"{end:.4f}" for end in (errors.min(), errors.max()))
+    line = next(line for line in fc.scenes.summary(ensemble).splitlines() if "error of H" in line)
+    assert line.split("standard error of H ")[1].strip() == " to ".join(ends)
+
+
 def test_single_study_names_no_members(ensemble):
     single = ensemble.map_over_datasets(lambda dataset: dataset.isel(member=1, missing_dims="ignore"))
     text = fc.scenes.summary(single)
@@ -88,6 +135,27 @@ def test_command_fits_the_screen(monkeypatch):
     for words in (("run", "--plan", "concrete_crack"), ("methods",)):
         lines = command(*words).stdout.splitlines()
         assert 50 < max(map(len, lines)) <= 72
+
+
+def test_last_line_of_a_run_fits_the_screen(monkeypatch, tmp_path):
+    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
+    done = command("run", "study.toml", "-o", "out")
+    assert done.returncode == 0, done.stderr
+    last = done.stdout[done.stdout.index("written to") :].splitlines()
+    assert max(map(len, last)) <= 60
+    assert "report.html" in " ".join(last)
+
+
+def test_boxes_of_the_dimension_are_named(ensemble):
+    boxes = ensemble["domains/box_dimension"].to_dataset().isel(step=-1)
+    expected = [
+        f"{float(each.scale_min.min()):g} ... {float(each.scale_max.max()):g}"
+        for each in (boxes.isel(shear=0), boxes.isel(shear=-1))
+    ]
+    cells = rows(fc.scenes.summary(ensemble), "contact domain, last step")
+    assert [row[3] for row in (cells[0], cells[-1])] == expected
 
 
 def test_units_follow_the_values():
