@@ -32,6 +32,7 @@ UNRESOLVED = "NaN where the shears do not resolve the distance: a step of shear 
 PEAKS = ("peak_friction_angle", "peak_shear_strength", "secant_friction_angle", "secant_shear_strength")
 PEAK_SHEARS = ("peak_shear", "peak_strength_shear")
 NOT_KNOWN = "depends on the distance in a way that is not known: the shears resolve one distance only"
+LOCKED_OVER_HALF = "is not known over half the distance: the faces lock"
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 ERROR = "that of the dilatancy"
 # a window given as a decimal must not lose a point to rounding, nor one of two equally near points
@@ -304,6 +305,9 @@ def _dependence(secants: xr.DataArray) -> str:
     both = np.isfinite(greatest[resolved[:2]]).all(axis=0)
     if not both.any():
         return NOT_KNOWN
+    both &= (greatest[resolved[:2]] < LOCKED_ANGLE).all(axis=0)
+    if not both.any():
+        return LOCKED_OVER_HALF
     shortest, next_one = greatest[resolved[:2]][:, both]
     change = float(np.abs(shortest - next_one).max())
     shortest_text = quantity_text(float(secants["distance"][resolved[0]]), "m")

@@ -153,6 +153,9 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
 
 def peak_remarks(tree: xr.DataTree, friction: xr.Dataset) -> Iterator[str]:
     """Yield how the peaks depend on their distance, and what the kinematic form leaves out of them."""
+    known = friction["peak_friction_angle"].notnull()
+    if not known.any():
+        return
     comment = friction["peak_friction_angle"].attrs.get("comment")
     if comment:
         change = _strength_over_half(friction)
@@ -160,9 +163,6 @@ def peak_remarks(tree: xr.DataTree, friction: xr.Dataset) -> Iterator[str]:
         yield f"The peak friction angle {comment}.{strength}"
     elastic = group_of(tree, "joints/elastic_dilatancy")
     if elastic is None or "elastic_energy" not in elastic or _form(friction) != "kinematic":
-        return
-    known = friction["peak_friction_angle"].notnull()
-    if not known.any():
         return
     angle = _energy_peak(elastic, friction)
     more, locked = (angle - friction["peak_friction_angle"]).values, int((known & angle.isnull()).sum())

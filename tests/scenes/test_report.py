@@ -86,6 +86,19 @@ def test_strength_near_locking_changes_far_more_than_its_angle():
     assert "energy" not in words  # rigid faces store none
 
 
+def test_nothing_is_said_of_the_peak_of_faces_that_lock():
+    """A wall of slope 10, 84 degree, beside a basic angle of 30: no distance has a friction angle."""
+    surface = fc.surfaces.from_array(10.0 * 1e-4 * np.arange(32.0) * np.ones((16, 1)), 1e-4)
+    crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(8e-4, 8e-4), basic_friction_angle=30)
+    rigid = fc.joints.dilatancy(crack, shear=np.arange(9) * 1e-4, direction="E")
+    friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
+    assert "degree" not in friction["peak_friction_angle"].attrs["comment"]
+    text = fc.scenes.summary(xr.DataTree.from_dict({"joints/friction": friction}))
+    assert "none: the faces lock" in text
+    assert "distance" not in text
+    assert "°" not in text
+
+
 def test_standard_errors_of_the_members_are_a_span(ensemble):
     errors = ensemble["dimensions"].standard_error.values[:, 0]
     ends = dict.fromkeys(f"{end:.4f}" for end in (errors.min(), errors.max()))
