@@ -83,6 +83,11 @@ def flow():
 
 
 @functools.cache
+def watered():
+    return fc.joints.uplift(pressed()["gap"].isel(step=0), upstream_pressure=1e5)
+
+
+@functools.cache
 def estimates():
     return fc.dimensions.estimate(rough(), ["variogram", "spectrum"])
 
@@ -181,6 +186,7 @@ CALLS = {
         "surface": rough(), "nominal_pressure": [1e5, 1e6], "wall_strength": 1e8, "basic_friction_angle": 30,
     },
     "joints.transmissivity": lambda: {"gap": pressed()["gap"]},
+    "joints.uplift": lambda: {"gap": pressed()["gap"], "upstream_pressure": 1e5, "drains": [(8e-4, 8e-4)]},
     **{
         f"domains.{name}": lambda: {"mask": pressed()["state"]}
         for name in (
@@ -214,6 +220,7 @@ CALLS = {
     "plotting.box_dimension": lambda: {"result": boxes()},
     "plotting.local_slopes": lambda: {"result": boxes()},
     "plotting.hydraulic_aperture": lambda: {"result": flow()},
+    "plotting.uplift": lambda: {"result": watered()},
     "plotting.dimensions": lambda: {"estimates": estimates()},
     "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
     "plotting.directional_roughness": lambda: {"result": roses()},

@@ -6,7 +6,7 @@ import numpy as np
 
 FACTORS = {
     "m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Mm": 1e6, "N": 1.0, "kN": 1e3,
-    "Pa": 1.0, "MPa": 1e6, "GPa": 1e9,
+    "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9,
     "%": 0.01, "°": 1.0, "mm²": 1e-6, "m⁴": 1.0, "rad m⁻¹": 1.0, "µm²": 1e-12,
 }  # fmt: skip
 

@@ -29,6 +29,7 @@ from ._strength_envelope import strength_envelope as strength_envelope
 from ._surface import field as field
 from ._surface import surface as surface
 from ._transmissivity import hydraulic_aperture as hydraulic_aperture
+from ._uplift import uplift as uplift
 
 __all__ = [
     "area_dimension",
@@ -62,4 +63,5 @@ __all__ = [
     "slip_loops",
     "strength_envelope",
     "surface",
+    "uplift",
 ]

@@ -1,0 +1,95 @@
+"""Map of the water pressure in a joint, above the diagram of its uplift."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.validation import Problems
+from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting._inputs import extent_of, result_of, words
+from fractalcontact.plotting._surface import label_axes, plane_of, plane_scale
+from fractalcontact.plotting._units import axis_label, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+SIZE = (9.0, 3.6)  # inches
+LINES: dict[str, dict[str, Any]] = {
+    "joint": {"color": _style.BLUE, "ls": "-"},
+    "linear": {"color": _style.INK, "ls": "--", "lw": 1.0},
+    "bilinear": {"color": _style.RED, "ls": "-.", "lw": 1.0},
+}
+
+
+@_style.styled
+def uplift(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+    """Draw the water pressure in a joint and, beside it, the uplift along the flow with its lines of action.
+
+    The diagrams of guidelines are dashed. A triangle on the axis marks each line of action. Contacts and
+    pockets that no water reaches are grey in the map and carry no uplift.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.uplift`, of one gap.
+    figure : Figure or SubFigure, optional
+        Draw here; otherwise a new figure is made.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has several planes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> gap = fc.surfaces.from_array(np.full((8, 16), 1e-4), 1.0)
+    >>> figure = fc.plotting.uplift(fc.joints.uplift(gap, upstream_pressure=490e3))
+    >>> print(figure.axes[1].get_ylabel())
+    uplift (kPa)
+    """
+    data = result_of(result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_arm"), ())
+    plane = plane_of(data[["fluid_pressure"]], "uplift", "fluid_pressure")
+    profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
+                                              and d not in ("diagram", "x", "y")])  # fmt: skip
+    with Problems("fc.plotting.uplift") as problems:
+        problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
+    figure = _style.figure_or_new(figure, SIZE)
+    left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
+    length, pressure = plane_scale(plane), scale_of(plane)
+    extent = extent_of(plane)
+    mappable = _maps.field(left, np.asarray(plane.values, float), extent, length, pressure, positive=False)
+    _maps.colour_bar(left, mappable, axis_label(plane, pressure))
+    label_axes(left, plane, length)
+    _draw_diagrams(right, data, profile, extent, length, pressure)
+    return _style.root_figure(figure)
+
+
+def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, pressure: Any) -> None:
+    """Draw the profile of each diagram and mark its line of action on the axis."""
+    dim = "x" if "x" in profile.dims else "y"
+    start, end = extent[:2] if dim == "x" else extent[2:]
+    linear = profile.sel(diagram="linear").values
+    falls = bool(linear[0] >= linear[-1])  # from the start of the axis
+    _style.style_axes(ax)
+    for name in words(profile["diagram"]):
+        arm = float(data["uplift_arm"].sel(diagram=name))
+        style = LINES[name]
+        ax.plot(length(profile[dim].values), pressure(profile.sel(diagram=name).values), label=name, **style)
+        place = float(length(start + arm if falls else end - arm))
+        ax.plot([place], [0.0], marker="^", color=style["color"], clip_on=False, ls="", ms=6, zorder=3)
+    ax.set_xlim(float(length(start)), float(length(end)))
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel(length.label(f"${dim}$"))
+    ax.set_ylabel(pressure.label("uplift"))
+    lines = [line for line in ax.lines if not line.get_label().startswith("_")]
+    _style.side_legend(
+        ax, [*lines, _style.legend_line("line of action", marker="^", ls="", color=_style.GREY)]
+    )
