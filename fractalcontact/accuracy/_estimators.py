@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import gaussian_filter
 from scipy.stats import binomtest, chi2
 
 from fractalcontact import dimensions, surfaces
@@ -37,10 +38,12 @@ FAMILIES = {
 }
 SPACING, HEIGHT = 1e-4, 1e-6  # m
 BATCH = 1 << 22  # points generated at a time
+MARK, MARK_ANGLE = 7.0, 0.5  # wavelength in spacings and azimuth, radian, of an oblique wave
 MEMBER_POINTS = 25600  # members times points along an edge, unless members are given
 LEVEL = 0.95
 
 DIMS = ("method", "family", "hurst", "size")
+SAME = (*DIMS, "member_count", "blur", "noise", "marks")
 MEASURED = (
     "bias",
     "rms_error",
@@ -63,9 +66,14 @@ def _check(
     families: Any,
     methods: Any,
     members: Any,
+    blur: Any,
+    noise: Any,
+    marks: Any,
     keep: Any,
     **_: Any,
 ) -> None:
+    for name, value in {"blur": blur, "noise": noise, "marks": marks}.items():
+        problems.number(name, value, at_least=0.0)
     problems.numbers("hurst", hurst, at_least=0.01, at_most=0.99)
     has_sizes = problems.numbers("sizes", sizes, at_least=16, integral=True)
     chosen = problems.choices("families", families, FAMILIES)
@@ -93,6 +101,9 @@ def estimators(
     methods: str | Sequence[str] | None = None,
     *,
     members: int | Sequence[int] | None = None,
+    blur: float = 0.0,
+    noise: float = 0.0,
+    marks: float = 0.0,
     rng: streams.RNGLike = None,
     keep: str | os.PathLike[str] | None = None,
     progress: bool = False,
@@ -113,6 +124,12 @@ def estimators(
     members : int or sequence of int, optional
         Surfaces for each exponent and family, one number or one for each size. Default: 25600 over the size
         (400, 100 and 25), which gives a coverage of 95 % to within 1, 2 and 4 %.
+    blur : float
+        Spread, in spacings, of a Gaussian filter of the "fbm" surfaces, which goes on beyond their edges.
+    noise : float
+        Rms height of white noise added to them, over the rms increment before the blur.
+    marks : float
+        Amplitude of an oblique wave of seven spacings added to them, over the same.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Random stream; its entropy is kept in the provenance.
     keep : path-like, optional
@@ -124,7 +141,8 @@ def estimators(
     Returns
     -------
     Dataset over (method, family, hurst, size)
-        bias, rms_error; error_ratio: rms error over the Cramer-Rao bound `least_error`; interval_coverage:
+        bias, rms_error; error_ratio: rms error over the Cramer-Rao bound `least_error`, with blur that of the
+        modes on which its squared transfer function is above one half; interval_coverage:
         share of the 95 % intervals that hold the true exponent (NaN for a method without intervals), both
         with their 95 % interval (_low, _high); interval_share: share of the surfaces with an interval;
         run_time: median of one estimate (s); member_count.
@@ -146,7 +164,8 @@ def estimators(
     kinds = word_tuple(families)
     names = word_tuple(methods) or tuple(dimensions.methods())
     counts = _counts(members, edges)
-    table = _empty_table(names, kinds, exponents, edges, counts)
+    defects = {"blur": float(blur), "noise": float(noise), "marks": float(marks)}
+    table = _empty_table(names, kinds, exponents, edges, counts).assign_coords(defects)
     table, source = _resume(table, keep, rng)
     entropy = streams.record(source)
     places = [(k, h, n) for n in range(len(edges)) for k in range(len(kinds)) for h in range(exponents.size)]
@@ -157,8 +176,8 @@ def estimators(
             continue
         k, h, n = place
         truth, size = float(exponents[h]), edges[n]
-        bound = _bound(kinds[k], truth, size)
-        samples = _sample(kinds[k], truth, size, counts[n], names, stream)
+        bound = _bound(kinds[k], truth, size, defects["blur"])
+        samples = _sample(kinds[k], truth, size, counts[n], names, defects, stream)
         table["least_error"].values[place] = bound
         for row, sample in enumerate(np.moveaxis(samples, -1, 0)):
             for name, value in _scores(truth, bound, *sample).items():
@@ -175,27 +194,49 @@ def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[i
     return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
 
 
-def _bound(family: str, hurst: float, n: int) -> float:
-    return brownian_bound(hurst, n) if family == "fbm" else band_bound((n, n), SHORTEST, float(n))
+def _bound(family: str, hurst: float, n: int, blur: float = 0.0) -> float:
+    if family == "fbm":
+        return brownian_bound(hurst, n, blur)
+    return band_bound((n, n), SHORTEST, float(n))
 
 
-def _surfaces(family: str, hurst: float, n: int, count: int, stream: np.random.Generator) -> xr.DataArray:
-    shape: tuple[int, int] = n, n
+def _surfaces(
+    family: str, hurst: float, n: int, count: int, defects: dict[str, float], stream: np.random.Generator
+) -> xr.DataArray:
     options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
     if family == "fbm":
-        return surfaces.fbm(shape, SPACING, rms_increment=HEIGHT, **options)
+        margin = int(np.ceil(5.0 * defects["blur"]))
+        wide = n + 2 * margin, n + 2 * margin
+        result = surfaces.fbm(wide, SPACING, rms_increment=HEIGHT, **options)
+        if margin:
+            spread = (0.0, defects["blur"], defects["blur"])
+            result = result.copy(data=gaussian_filter(result.values, spread))
+        result = result.isel(y=slice(margin, margin + n), x=slice(margin, margin + n))
+        if defects["noise"]:
+            scatter = stream.standard_normal(result.shape)
+            result = result + defects["noise"] * HEIGHT * scatter
+        if defects["marks"]:
+            waves = 2.0 * np.pi / MARK * (np.cos(MARK_ANGLE) * result.x + np.sin(MARK_ANGLE) * result.y)
+            result = result + defects["marks"] * HEIGHT * np.cos(waves / SPACING).transpose("y", "x")
+        return result
     cutoff = SHORTEST * SPACING
-    return surfaces.spectral(shape, SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
+    return surfaces.spectral((n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
 
 
 def _sample(
-    family: str, hurst: float, n: int, count: int, methods: Sequence[str], stream: np.random.Generator
+    family: str,
+    hurst: float,
+    n: int,
+    count: int,
+    methods: Sequence[str],
+    defects: dict[str, float],
+    stream: np.random.Generator,
 ) -> Array:
     """Return exponent, lower end, upper end and seconds of every estimate, (4, members, methods)."""
     batch = max(1, min(count, BATCH // (n * n)))
     parts = []
     for start in range(0, count, batch):
-        ensemble = _surfaces(family, hurst, n, min(batch, count - start), stream)
+        ensemble = _surfaces(family, hurst, n, min(batch, count - start), defects, stream)
         estimates = dimensions.estimate(ensemble, list(methods))
         parts.append(
             np.stack([estimates[name].values for name in ("hurst", "ci_low", "ci_high", "run_time")])
@@ -297,7 +338,7 @@ def _unfinished(empty: xr.Dataset, file: str | os.PathLike[str] | None) -> xr.Da
         return None
     try:
         table: xr.Dataset = read(file)
-        same = all(np.array_equal(table[name].values, empty[name].values) for name in (*DIMS, "member_count"))
+        same = all(np.array_equal(table[name].values, empty[name].values) for name in SAME)
         stopped = bool(table["least_error"].isnull().any())
     except (UnreadableFile, KeyError, AttributeError, TypeError):
         return None
@@ -310,16 +351,20 @@ BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane
 BOUND_STEP = 1e-4  # of the derivative by H
 
 
-def brownian_bound(hurst: float, n: int) -> float:
+def brownian_bound(hurst: float, n: int, blur: float = 0.0) -> float:
     """Return the bound for n x n points of a fractional Brownian surface of unknown amplitude.
 
     Whittle's information gives sqrt(2 / var(d ln f / dH)) / n for large n: f is the spectral density as
     sampled, with all its aliases, and the variance is over all wavevectors of the grid. At H near 1 a small
-    surface does better by up to a fifth, because no exponent beyond 1 is allowed there.
+    surface does better by up to a fifth, because no exponent beyond 1 is allowed there. With a Gaussian blur
+    of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer function is
+    above one half.
     """
     low, high = max(hurst - BOUND_STEP, 1e-6), hurst + BOUND_STEP
     slope = (np.log(aliased_density(high)) - np.log(aliased_density(low))) / (high - low)
-    return float(np.sqrt(2.0 / np.var(slope)) / n)
+    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
+    inside = blur**2 * (w[:, None] ** 2 + w**2) < np.log(2.0)
+    return float(np.sqrt(2.0 / (np.var(slope[inside]) * inside.mean())) / n)
 
 
 def aliased_density(hurst: float) -> Array:

@@ -5,6 +5,7 @@ methods           names of the methods of `estimate`, with one line each
 directions        exponent by direction, and tests of isotropy
 hurst_map         exponent in windows that move over the surface
 waves             single waves, such as marks of machining
+scaling           exponent by octave of wavelength, and the window that has one exponent
 spectrum          power spectral density, averaged over directions
 variogram         half the mean square increment against the lag
 madogram          half the mean absolute increment against the lag

@@ -3,6 +3,7 @@ from ._cube_counts import cube_counts as cube_counts
 from ._directions import directions as directions
 from ._estimate import estimate as estimate
 from ._hurst_map import hurst_map as hurst_map
+from ._exponent_by_scale import scaling as scaling
 from ._methods import methods as methods
 from ._roughness_length import roughness_length as roughness_length
 from ._spectrum import spectrum as spectrum
@@ -21,6 +22,7 @@ __all__ = [
     "madogram",
     "methods",
     "roughness_length",
+    "scaling",
     "second_variogram",
     "spectrum",
     "variation",

@@ -25,12 +25,11 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions import _whittle
-from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 PROBES = 6
-_FEW_PROBES, _MANY_POINTS = 3, 1 << 18  # probes of a surface of more points
+_FEW_PROBES, _MANY_POINTS = 3, 1 << 17  # probes of a surface of more points
 _FEW_POINTS = 1 << 14
 _SLIGHT = 0.01  # share of missing points for which one probe is enough
 _SMALL = 1 << 16  # modes up to which the covariance of the score takes all probes
@@ -107,26 +106,21 @@ class FreeModes:
             gapped = self.gapped
             gaps = lambda hurst: gapped.excess(hurst)[self.chosen]  # noqa: E731
             white = gapped.white_excess()[self.chosen] if noise else None
-        if not noise:
-            return _whittle.fit_power(self.power, model, start, gaps=gaps)
-        # noise lowers the pilot estimate, so that the search must come from both sides
-        fits = [
-            _whittle.fit_power(self.power, model, hurst, noise=level, gaps=gaps, white_excess=white)
-            for hurst, level in ((0.7, 0.05), (0.3, 0.02))
-        ]
-        # a search that ended outside its range may have left negative powers
-        valid = [fit for fit in fits if fit.converged and fit.total.min() > 0.0]
-        if not valid:
-            return fits[0]
-        return min(valid, key=lambda fit: float(np.sum(np.log(fit.amplitude * fit.total))))
+        return _whittle.fit_from_starts(self.power, model, start, noise, gaps=gaps, white_excess=white)
 
-    def blurred(self) -> BlurredFit | None:
-        """Fit a blurred surface, if no heights are missing."""
-        if self.gapped is not None:
-            return None
-        return fit_blurred(
-            self.power, lambda hurst: expected_power(self.lattice, hurst)[self.chosen], self.order
-        )
+    @property
+    def count(self) -> None:
+        """Return no numbers: every mode stands for itself."""
+
+    @property
+    def number(self) -> float:
+        """Number of modes."""
+        return float(self.power.size)
+
+    def is_uneven(self, inside: Array, hurst: float) -> bool:
+        """Return whether few waves of some modes carry more than their share."""
+        expected = expected_power(self.lattice, hurst)[self.chosen][inside]
+        return _whittle.flatness(self.power[inside] / expected, _whittle.CHI_SQUARE) < -_whittle.UNEVEN
 
     def error(self, fit: _whittle.WhittleFit) -> float:
         """Return the standard error of H, with the correlation of the modes at edges and gaps.

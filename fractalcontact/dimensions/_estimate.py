@@ -51,16 +51,19 @@ _FIELDS = (
     "scale_max",
     "rms_increment",
     "noise_height",
+    "blur_spread",
     "misfit",
 )
 _NAMES = (*_FIELDS, "fractal_dimension", "topothesy", "run_time", "method", "increment_lag")
 
 
-def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any) -> None:
+def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: Any) -> None:
     names = [DEFAULT]
     if methods is not None and problems.choices("methods", methods, ("default", *METHODS)):
         names = [DEFAULT if name == "default" else name for name in word_tuple(methods)]
         problems.require(bool(names), "methods", "at least one name", methods)
+    if psf is not None:
+        problems.number("psf", psf, at_least=0.0)
     is_valid = check_surface(
         problems,
         surface,
@@ -82,6 +85,7 @@ def estimate(
     *,
     scales: tuple[float, float] | None = None,
     noise: bool = False,
+    psf: float | None = None,
 ) -> xr.Dataset:
     """Estimate the Hurst exponent and the fractal dimension of a surface, with a 95 % interval.
 
@@ -95,7 +99,10 @@ def estimate(
         Lengths in m between which to fit: wavelengths, lags, or edges of windows or cubes. Default: the
         window of the method.
     noise : bool
-        Fit white measurement noise too ("likelihood" only).
+        Fit white measurement noise in any case ("likelihood" only). By default where the heights show it.
+    psf : float, optional
+        Standard deviation in m of the Gaussian point spread function of the instrument, 0 for none
+        ("likelihood" with free edges only). By default it is estimated where the heights show a blur.
 
     Returns
     -------
@@ -103,8 +110,9 @@ def estimate(
         `hurst` (limited to 0 ... 1; `fitted_hurst` is not), `fractal_dimension` (3 - hurst, of a profile
         2 - hurst), `standard_error`, `ci_low`, `ci_high` (of hurst; NaN for methods without a validated
         interval), `scale_min`, `scale_max` (m), `rms_increment` over `increment_lag` (m), `topothesy` (m),
-        `noise_height` (m), `misfit` (z of a change of the exponent with scale) and `run_time` (s). Notes,
-        reasons and windows are JSON by method in the attributes `comment` and `reason`.
+        `noise_height`, `blur_spread` (m; NaN where not fitted), `misfit` (z of a change of the exponent
+        with scale) and `run_time` (s). Notes, reasons and windows are JSON by method in the attributes
+        `comment` and `reason`.
 
     Raises
     ------
@@ -135,7 +143,10 @@ def estimate(
     for row, single in enumerate(surfaces):
         for column, name in enumerate(names):
             start = time.perf_counter()
-            record = _ESTIMATORS[DEFAULT if name == "default" else name](single, window, bool(noise))
+            if name in ("default", "likelihood"):
+                record = likelihood(single, window, bool(noise), psf)
+            else:
+                record = _ESTIMATORS[name](single, window, bool(noise))
             if single.finest_scale:
                 record = record.gridded(single.finest_scale)
             estimates.append(record.limited())

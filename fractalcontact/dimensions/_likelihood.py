@@ -11,22 +11,52 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _cosine_modes, _periodic_modes, _profile_likelihood
+from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_modes, _profile_likelihood
+from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
+from fractalcontact.dimensions._exponent_by_scale import Run, free_blocks, longest_run, octaves
 from fractalcontact.dimensions._heterogeneity import heterogeneity
-from fractalcontact.dimensions._increment_moments import increment_moments
+from fractalcontact.dimensions._increment_moments import Moments, increment_moments
 from fractalcontact.dimensions._increments import closed_form
+from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._periodic_modes import PeriodicModes
 from fractalcontact.dimensions._quantisation import quantisation, quantisation_note
-from fractalcontact.dimensions._records import CONSTANT, SIGNIFICANT, Estimate, joined, plane, undefined
+from fractalcontact.dimensions._records import (
+    CONSTANT,
+    NORMAL,
+    SIGNIFICANT,
+    Estimate,
+    joined,
+    plane,
+    undefined,
+)
 from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._transfer_functions import FORMS, NONE
 from fractalcontact.dimensions._waves import without_waves
-from fractalcontact.dimensions._whittle import LEAST_MODES, WhittleFit, fit_interval
+from fractalcontact.dimensions._whittle import (
+    LEAST_MODES,
+    UNEVEN,
+    WhittleFit,
+    allowing_noise,
+    fit_interval,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
+SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 
+_CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
+_BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
+_WEAK = 2.0  # the same from which the interval of a profile allows for blur and noise
+_WEAK_NOISE = 0.05  # of the rms increment: noise that the interval of a surface allows for
+_VAGUE = 1.0  # width of an interval that says nothing
+_LEAST_POINTS = 64  # of a profile whose blur is looked for
+_LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
+_SINGLE = 0.9  # share of the power beyond the longest that these may hold
+_LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
 _ROUNDING = 1e-26  # relative rounding of the mean square in transforms
 _PERIODIC_WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
 _FREE_WINDOW = "all modes that vary along both axes"
+_BLURRED_WINDOW = "the modes that a model of blur and noise fits"
+_RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
 _ASKED = "asked for"
 _SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
@@ -44,75 +74,198 @@ _NEGATIVE_NOISE = (
 )
 
 
-def likelihood(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None = None) -> Estimate:
     """Fit the periodic family where every axis is periodic, otherwise fractional Brownian heights.
 
-    Single waves are removed first.
+    Single waves are removed first. `psf` is the spread of a known point spread function in m.
     """
     if surface.is_constant:
         return undefined(CONSTANT)
     if surface.is_plane:
         return plane()
     surface, wave_note = without_waves(surface)
-    estimate = _fitted(surface, scales, noise)
+    estimate = _fitted(surface, scales, noise, psf)
     return replace(estimate, note=joined(wave_note, estimate.note))
 
 
-def _fitted(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) -> Estimate:
+    """Fit the family of a surface without single waves."""
     if all(surface.grid.periodic) and surface.is_complete:
         return _periodic_surface(surface, scales, noise)
     if surface.finest_scale and scales is None:
-        return replace(likelihood(surface, surface.resolved(scales), noise), window=_RESOLVED_WINDOW)
-    estimate = (
-        _profile(surface, scales, noise) if surface.axes == 1 else _free_surface(surface, scales, noise)
-    )
+        resolved = _fitted(surface, surface.resolved(scales), noise, psf)
+        return replace(resolved, window=_RESOLVED_WINDOW)
+    spread = None if psf is None else psf / surface.spacing[1]
+    family = _profile if surface.axes == 1 else _free_surface
+    estimate = family(surface, scales, noise, spread)
     if not any(surface.grid.periodic) or estimate.reason:
         return estimate
     return replace(estimate, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=_PERIODIC_GAPS)
 
 
-def _free_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
-    """Fit the cosine modes of a surface with free edges."""
+def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
+    """Fit the cosine modes of a surface with free edges; `spread` in spacings is that of a known blur."""
     heights = _cropped(surface.heights)
     if surface.finest_scale:
         heights = _without_small_gaps(heights)
     dx = surface.spacing[1]
-    lattice = _cosine_modes.Lattice.of(heights.shape, (surface.spacing[0] / dx, 1.0))
-    lengths = _cosine_modes.wavelengths(lattice) * dx
-    chosen = _between(lengths, scales)
-    if np.count_nonzero(chosen) < LEAST_MODES:
-        return undefined(f"{np.count_nonzero(chosen)} modes in the window, at least {LEAST_MODES} are needed")
-    pilot = _pilot(heights, lattice.spacing)
-    modes = _cosine_modes.FreeModes.of(heights, lattice, chosen, pilot)
+    pilot = _pilot(heights, surface.plane_spacing)
+    window = None if scales is None else (scales[0] / dx, scales[1] / dx)
+    modes = _modes(heights, surface.plane_spacing, window, pilot)
+    if modes.number < LEAST_MODES:
+        return undefined(f"{modes.number:.0f} modes in the window, at least {LEAST_MODES} are needed")
     centred = heights - np.nanmean(heights)
-    if float(modes.power.sum()) <= _ROUNDING * float(np.nansum(centred * centred)):
+    if float(modes.power.mean()) * modes.number <= _ROUNDING * float(np.nansum(centred * centred)):
         return undefined(
             "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
             "exponent is: estimate profiles, or see `directions`"
         )
-    fit, estimate = fit_interval(modes, pilot, noise)
-    levelled = _without_offsets(heights)
-    stride = _stride(scales, max(surface.spacing))
-    moments = increment_moments([(levelled, len(levelled))], levelled.shape, stride)
-    blocks = heterogeneity(moments, lattice.spacing, fit.hurst)
-    low, high = blocks.widened(fit.hurst, estimate.ci_low, estimate.ci_high)
+    fit = modes.fit(pilot, noise)
+    levelled, stride, hurst = _without_offsets(heights), _stride(scales, max(surface.spacing)), fit.hurst
+    blocks = heterogeneity(_moments(levelled, stride), surface.plane_spacing, hurst)
+    other = None
+    # unequal parts count for fewer modes
+    is_bent = abs(fit.misfit) > SIGNIFICANT * blocks.widening
+    is_bent &= not surface.finest_scale  # gridding has removed short waves, as a blur does
+    # blur and noise together may be as straight as a smooth surface
+    is_odd = is_bent or fit.hurst > 1.0 or modes.scatter(fit) < -UNEVEN or (noise and fit.noise < 0.0)
+    if modes.gapped is None and (spread is not None or (is_odd and not surface.finest_scale)):
+        other, is_even = _with_blur(heights, surface, scales, noise, spread)
+        if other is None and is_even and is_bent and scales is None:
+            other = _longest_run(modes, heights, surface)
+    if other is not None:
+        estimate, stride, hurst = *other, other[0].hurst
+        blocks = heterogeneity(_moments(levelled, stride), surface.plane_spacing, hurst)
+        longest = float(np.fmin(modes.order.max() * dx, estimate.scale_max))
+        estimate = replace(estimate, scale_max=longest, misfit=fit.misfit)
+    else:
+        fit, estimate = fit_interval(modes, pilot, noise, fit)
+        noise_height = float(np.sqrt(max(fit.noise, 0.0))) * surface.unit if noise else np.nan
+        estimate = replace(
+            estimate,
+            scale_min=float(modes.order.min()) * dx,
+            scale_max=float(modes.order.max()) * dx,
+            rms_increment=_rms_increment(fit) * surface.unit,
+            noise_height=noise_height,
+            window=_FREE_WINDOW if scales is None else _ASKED,
+            note=joined(_NEGATIVE_NOISE if noise and fit.noise < 0 else "", estimate.note),
+        )
+        if not noise and modes.gapped is None and abs(fit.misfit) <= SIGNIFICANT:
+            estimate = _allowing_noise(estimate, modes, fit)
+    low, high = blocks.widened(hurst, estimate.ci_low, estimate.ci_high)
     rounding_note = "" if noise else _quantisation_note(heights, estimate.standard_error)
-    if rounding_note:
+    if rounding_note and other is None:
         with_noise = fit_interval(modes, pilot, True)[1]
         low, high = float(np.fmin(low, with_noise.ci_low)), float(np.fmax(high, with_noise.ci_high))
     periodic_note = "a periodic surface with gaps is treated as free" if all(surface.grid.periodic) else ""
-    noise_note = _NEGATIVE_NOISE if noise and fit.noise < 0 else ""
     return replace(
         estimate,
         standard_error=estimate.standard_error * blocks.widening,
         ci_low=low,
         ci_high=high,
-        scale_min=float(lengths[chosen].min()),
-        scale_max=float(lengths[chosen].max()),
-        rms_increment=_rms_increment(fit) * surface.unit,
-        noise_height=float(np.sqrt(max(fit.noise, 0.0))) * surface.unit if noise else np.nan,
-        window=_FREE_WINDOW if scales is None else _ASKED,
-        note=joined(periodic_note, noise_note, estimate.note, blocks.note, rounding_note),
+        note=joined(periodic_note, estimate.note, blocks.note, rounding_note),
+    )
+
+
+def _modes(heights: Array, spacing: tuple[float, float], scales: Scales, pilot: float) -> SurfaceModes:
+    """Return the modes of a surface, those of a large complete one in blocks; `scales` in spacings of x."""
+    if heights.size > _LARGE and np.isfinite(heights.min()):
+        return _mode_blocks.BlockModes.of(heights, spacing, scales)
+    lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
+    chosen = _between(_cosine_modes.wavelengths(lattice), scales)
+    return _cosine_modes.FreeModes.of(heights, lattice, chosen, pilot)
+
+
+def _allowing_noise(estimate: Estimate, modes: SurfaceModes, fit: WhittleFit) -> Estimate:
+    """Widen the interval by the exponents of noise that is too weak to be seen."""
+    if not fit.hurst < 1.0:
+        return estimate
+    interval = estimate.ci_low, estimate.ci_high
+    low, high = allowing_noise(
+        interval, modes.power, fit, (_WEAK_NOISE * _rms_increment(fit)) ** 2, modes.count
+    )
+    return replace(estimate, ci_low=low, ci_high=high)
+
+
+def _with_blur(
+    heights: Array, surface: Surface, scales: Scales, noise: bool, spread: float | None
+) -> tuple[tuple[Estimate, int] | None, bool]:
+    """Return the estimate with blur and noise, and a lag beyond the blur; None where they are not seen.
+
+    The second result is whether no few waves dominate the modes.
+    """
+    frame = _mode_blocks.frame(heights.shape, surface.plane_spacing)
+    power, inside = _cosine_modes.mode_power(heights), _chosen(frame, surface, scales)
+    fit = fit_blurred(power, frame, noise=noise, spread=spread, chosen=inside)
+    if fit is None or not _is_seen(fit, surface.axes, spread):
+        return None, fit is None or fit.is_even
+    estimate = _blurred_estimate(fit, surface, fit.amplitude / max(1.0 - fit.hurst, 1e-9))
+    stride = max(_stride(scales, max(surface.spacing)), round(_BEYOND * fit.spread))
+    return (replace(estimate, window=_BLURRED_WINDOW if scales is None else _ASKED), stride), True
+
+
+def _chosen(frame: _mode_blocks.Frame, surface: Surface, scales: Scales) -> Array:
+    """Return the blocks of modes inside the window."""
+    return _between(2.0 * np.pi / np.sqrt(frame.squares) * surface.spacing[1], scales)
+
+
+def _is_seen(fit: BlurredFit, axes: int, spread: float | None) -> bool:
+    """Return whether blur or noise agrees with the modes better than the surface alone, or is given."""
+    if spread is not None:
+        return True
+    return fit.is_good and fit.gain > _CLEAR[axes] and fit.high - fit.low < _VAGUE
+
+
+def _blurred_estimate(fit: BlurredFit, surface: Surface, amplitude: float) -> Estimate:
+    """Return the estimate of a fit of blur and noise; `amplitude` is half the squared increment, (1 - H)."""
+    has_noise = np.isfinite(fit.noise)
+    parts = []
+    if fit.form != NONE:
+        spread = f" with a spread of {fit.spread:.2g} spacings" if fit.spread > 0.0 else ""
+        parts = [FORMS[fit.form] + spread]
+    parts += ["white noise"] if has_noise else []
+    fractal = fit.hurst < 1.0
+    return Estimate(
+        fit.hurst,
+        fit.standard_error,
+        fit.low if fit.low > _mode_blocks.LOWEST else 0.0,
+        fit.high,
+        scale_min=fit.shortest * surface.spacing[1],
+        rms_increment=float(np.sqrt(2.0 * amplitude)) * surface.unit if fractal else np.nan,
+        noise_height=float(np.sqrt(fit.noise)) * surface.unit if has_noise else np.nan,
+        blur_spread=fit.spread * surface.spacing[1] if fit.form != NONE else np.nan,
+        note=f"the surface shows {' and '.join(parts)}, which is in the model" if parts else "",
+    )
+
+
+def _longest_run(modes: SurfaceModes, heights: Array, surface: Surface) -> tuple[Estimate, int] | None:
+    """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
+
+    None if there is no run, or if few waves dominate it.
+    """
+    run = longest_run(octaves(free_blocks(heights, surface.plane_spacing)))
+    if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
+        return None
+    inside = (modes.order >= run.low * (1 - 1e-9)) & (modes.order <= run.high * (1 + 1e-9))
+    if modes.is_uneven(inside, run.fit.hurst):
+        return None
+    return _run_estimate(run, surface), max(1, round(0.5 * run.low))
+
+
+def _run_estimate(run: Run, surface: Surface) -> Estimate:
+    """Return the estimate of the window of scales that has one exponent."""
+    dx = surface.spacing[1]
+    low, high = run.low * dx, run.high * dx
+    return Estimate(
+        run.fit.hurst,
+        0.5 * (run.fit.high - run.fit.low) / NORMAL,
+        run.fit.low,
+        run.fit.high,
+        scale_min=low,
+        scale_max=high,
+        window=_RUN_WINDOW,
+        note=f"no single exponent holds at all scales: {run.fit.hurst:.2f} is that of waves from {low:.3g} "
+        f"to {high:.3g} m, the longest run of octaves that one exponent fits (see `scaling`)",
     )
 
 
@@ -179,9 +332,14 @@ def _with_rolloff(modes: PeriodicModes) -> tuple[PeriodicModes, WhittleFit, Esti
     return modes, fit, estimate
 
 
-def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
-    """Fit a profile with its exact likelihood."""
+def _profile(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
+    """Fit a profile with its exact likelihood, or with that of its modes where it is blurred."""
     heights, dx = surface.heights[0], surface.spacing[1]
+    weak = np.nan, np.nan
+    if np.isfinite(heights).all() and heights.size >= _LEAST_POINTS and not surface.finest_scale:
+        estimate, weak = _profile_modes(surface, scales, noise, spread)
+        if estimate is not None:
+            return estimate
     stride = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
     heights = heights[::stride]
     largest = _profile_likelihood.CHUNK
@@ -201,6 +359,7 @@ def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     moments = increment_moments([(heights[None], 1)], (heights.size,))
     blocks = heterogeneity(moments, (1.0,), fit.hurst)
     low, high = blocks.widened(fit.hurst, fit.low, fit.high)
+    low, high = float(np.fmin(low, weak[0])), float(np.fmax(high, weak[1]))
     noise_note = ""
     if not noise:
         low, high, noise_note = closed_form(moments, (1.0,)).widened_for_noise(low, high)
@@ -220,6 +379,45 @@ def _profile(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     )
 
 
+def _profile_modes(
+    surface: Surface, scales: Scales, noise: bool, spread: float | None
+) -> tuple[Estimate | None, tuple[float, float]]:
+    """Return the estimate of a profile that is no fractional Brownian one, by its modes; None if it is one.
+
+    The second result is an interval that allows for weak blur or noise; NaN where the modes show none.
+    """
+    heights, dx, none = surface.heights[0], surface.spacing[1], (np.nan, np.nan)
+    frame = _mode_blocks.frame((heights.size,), (1.0,))
+    modes = _mode_blocks.profile_modes(heights) ** 2
+    if (share := _largest_share(modes)) > _SINGLE:
+        reason = f"a single wave holds {100.0 * share:.0f} % of the shorter waves: no fractal"
+        return undefined(reason), none
+    fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=_chosen(frame, surface, scales))
+    if fit is not None and _is_seen(fit, surface.axes, spread):
+        amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
+        estimate = _blurred_estimate(fit, surface, amplitude / max(1.0 - fit.hurst, 1e-9))
+        longest = heights.size * dx if scales is None else scales[1]
+        window = _BLURRED_WINDOW if scales is None else _ASKED
+        return replace(estimate, scale_max=longest, window=window), none
+    record = octaves(free_blocks(heights, (1.0,)))
+    run = longest_run(record)
+    if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
+        return _run_estimate(run, surface), none
+    if fit is None or noise or not (fit.is_good and fit.gain > _WEAK and fit.hurst < 1.0):
+        return None, none
+    return None, (max(fit.low, 0.0), min(fit.high, 1.0))
+
+
+def _largest_share(power: Array) -> float:
+    """Return the share of the shorter waves of a profile that one of them and its neighbours hold."""
+    shorter = power[_LONGEST_MODES:]
+    strongest = int(np.argmax(shorter))
+    if strongest < _NEIGHBOURS or not shorter[strongest] > 0.0:
+        return 0.0
+    inside = slice(strongest - _NEIGHBOURS, strongest + _NEIGHBOURS + 1)
+    return float(shorter[inside].sum() / shorter.sum())
+
+
 def _quantisation_note(heights: Array, error: float) -> str:
     """Return a note where the heights were rounded so coarsely that it matters; empty otherwise."""
     share = quantisation(heights)[1]
@@ -231,6 +429,11 @@ def _without_offsets(heights: Array) -> Array:
     if np.isnan(heights).any():
         return heights
     return np.asarray(heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True) + heights.mean())
+
+
+def _moments(heights: Array, stride: int) -> Moments:
+    """Return the mean square increments of levelled heights and of their blocks."""
+    return increment_moments([(heights, len(heights))], heights.shape, stride)
 
 
 def _stride(scales: Scales, spacing: float) -> int:

@@ -106,9 +106,6 @@ class PeriodicModes:
             weights=self.weights,
         )
 
-    def blurred(self) -> None:
-        """Fit no blur: a cut-off at short waves is part of the model."""
-
     def error(self, fit: _whittle.WhittleFit) -> float:
         """Return the standard error of H; the modes are independent."""
         return fit.standard_error

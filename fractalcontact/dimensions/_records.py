@@ -29,6 +29,8 @@ class Estimate:
         Rms height increment over one x spacing, m.
     noise_height : float
         Rms height of white noise, m.
+    blur_spread : float
+        Standard deviation of the point spread function, m.
     misfit : float
         Goodness of fit: z of the change of the exponent with scale.
     window, reason, note : str
@@ -45,6 +47,7 @@ class Estimate:
     scale_max: float = np.nan
     rms_increment: float = np.nan
     noise_height: float = np.nan
+    blur_spread: float = np.nan
     misfit: float = np.nan
     window: str = ""
     reason: str = ""

@@ -17,8 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fractalcontact.dimensions._blur import BlurredFit
-from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, normal_interval
+from fractalcontact.dimensions._records import NORMAL, SIGNIFICANT, Estimate, normal_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Model = Callable[[float], Array]
@@ -29,7 +28,8 @@ _LARGEST_NODE = 1.97
 _WIDTH = 0.06  # half the distance of the nodes, in ln H: the interpolation error is then 1e-5
 _WIDE = 0.24  # the same while the search is far from its end
 _ROUNDS, _STEPS = 40, 60
-_UNEVEN = 4.0  # -z of the scatter of the modes beyond which the interval is widened
+_PENALTY, _LEVELS = 1.0, 9  # deviance that weak noise costs, and levels of noise tried
+UNEVEN = 4.0  # -z of the scatter of the modes beyond which the interval is widened
 
 # mean logarithm of a squared mode over its expected power, and the variance left once the mean is known
 CHI_SQUARE = (-np.euler_gamma - np.log(2.0), 0.5 * np.pi**2 - 2.0)
@@ -59,18 +59,17 @@ class Modes(Protocol):
     def error(self, fit: WhittleFit) -> float:
         """Return the standard error of H."""
 
-    def blurred(self) -> BlurredFit | None:
-        """Fit the model with the blur of an instrument; None where there is no such fit."""
 
-
-def fit_interval(modes: Modes, start: float, noise: bool) -> tuple[WhittleFit, Estimate]:
-    """Fit modes, and return the estimate with its interval.
+def fit_interval(
+    modes: Modes, start: float, noise: bool, result: WhittleFit | None = None
+) -> tuple[WhittleFit, Estimate]:
+    """Fit modes, and return the estimate with its interval; `result` is the fit if it was made before.
 
     Where the exponent changes with scale more than chance allows, the interval also holds the exponents
     of the longer and of the shorter half of the modes, each fitted alone; where the modes scatter more than
     those of Gaussian heights, those of sectors of azimuth.
     """
-    result = modes.fit(start, noise)
+    result = modes.fit(start, noise) if result is None else result
     error = modes.error(result)
     interval = normal_interval(result.hurst, error)
     notes = [] if result.converged else ["the fit stopped at the limit of its range"]
@@ -81,17 +80,12 @@ def fit_interval(modes: Modes, start: float, noise: bool) -> tuple[WhittleFit, E
         if not noise and (with_noise := modes.fit(start, True)).converged:
             interval = _holding(interval, modes, with_noise)
             noise_note = ", and that of a fit with white noise"
-        if (blurred := modes.blurred()) is not None:
-            low, high = normal_interval(blurred.hurst, blurred.standard_error)
-            interval = min(interval[0], low), max(interval[1], high)
-            noise_note += f", and that of a blurred surface, {blurred.hurst:.2f} with a spread of "
-            noise_note += f"{blurred.spread:.1f} spacings"
         notes.append(
             f"the exponent changes with scale ({result.misfit:+.1f} standard deviations): "
             f"the interval holds that of the longer and of the shorter half of the modes{noise_note}"
         )
     scatter = modes.scatter(result)
-    if scatter < -_UNEVEN:
+    if scatter < -UNEVEN:
         interval = _holding_groups(interval, modes, modes.sector, result.hurst, noise)
         notes.append(
             f"a few waves hold more than their share ({-scatter:.1f} standard deviations): a lay, a step or "
@@ -99,6 +93,28 @@ def fit_interval(modes: Modes, start: float, noise: bool) -> tuple[WhittleFit, E
         )
     low, high = interval
     return result, Estimate(result.hurst, error, low, high, misfit=result.misfit, note="; ".join(notes))
+
+
+def allowing_noise(
+    interval: tuple[float, float], power: Array, fit: WhittleFit, largest: float, weights: Array | None = None
+) -> tuple[float, float]:
+    """Widen the interval of a fit without noise by the exponents that go with weak noise.
+
+    The deviance of a fit with noise of power 0 to `largest` follows from one scoring step. Noise costs a
+    penalty of one, so that surfaces without noise have nearly the interval of their own.
+    """
+    columns = np.stack([*fit.columns, 1.0 / fit.total])
+    halves = 0.5 * columns if weights is None else 0.5 * weights * columns
+    inverse = _inverse(halves @ columns.T)
+    step = inverse @ (halves @ (power / (fit.amplitude * fit.total) - 1.0))
+    if not inverse[2, 2] > 0.0:
+        return interval
+    noise = np.linspace(0.0, largest / fit.amplitude, _LEVELS)
+    excess = ((step[2] - noise) ** 2 - step[2] ** 2) / inverse[2, 2] + _PENALTY
+    left = NORMAL**2 - np.maximum(excess, 0.0)
+    hurst = (fit.hurst + inverse[1, 2] / inverse[2, 2] * noise)[left > 0.0]
+    half = fit.standard_error * np.sqrt(left[left > 0.0])
+    return float(np.min([*hurst - half, interval[0]])), float(np.max([*hurst + half, interval[1]]))
 
 
 def _holding_groups(
@@ -273,6 +289,23 @@ def fit_power(
         misfit=_misfit(columns, power / (amplitude * total) - means[0], half_weights),
         converged=converged,
     )
+
+
+def fit_from_starts(power: Array, model: Model, start: float, noise: bool, **options: Any) -> WhittleFit:
+    """Fit from a pilot estimate; with noise from two starts, of which the better end is returned."""
+    if not noise:
+        return fit_power(power, model, start, **options)
+    # noise lowers the pilot estimate, so that the search must come from both sides
+    fits = [
+        fit_power(power, model, hurst, noise=level, **options) for hurst, level in ((0.7, 0.05), (0.3, 0.02))
+    ]
+    # a search that ended outside its range may have left negative powers
+    valid = [fit for fit in fits if fit.converged and fit.total.min() > 0.0]
+    if not valid:
+        return fits[0]
+    weights = options.get("weights")
+    weight: float | Array = 1.0 if weights is None else weights
+    return min(valid, key=lambda fit: float(np.sum(weight * np.log(fit.amplitude * fit.total))))
 
 
 def _score_steps(

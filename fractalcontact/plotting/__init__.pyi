@@ -15,6 +15,7 @@ from ._dimensions import dimension_curves as dimension_curves
 from ._dimensions import dimensions as dimensions
 from ._directional_roughness import directional_roughness as directional_roughness
 from ._draw import draw as draw
+from ._exponent_by_scale import scaling as scaling
 from ._friction import friction as friction
 from ._islands import island_map as island_map
 from ._islands import islands as islands
@@ -56,6 +57,7 @@ __all__ = [
     "local_slopes",
     "paper_figure",
     "rigid_dilatancy",
+    "scaling",
     "self_weight",
     "shear_curve",
     "sliding_scheme",

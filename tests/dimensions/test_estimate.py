@@ -13,7 +13,7 @@ from fractalcontact.base.results import provenance_of
 
 VARIABLES = {
     "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",
-    "scale_max", "rms_increment", "topothesy", "noise_height", "misfit", "run_time",
+    "scale_max", "rms_increment", "topothesy", "noise_height", "blur_spread", "misfit", "run_time",
 }  # fmt: skip
 NAMES = list(fc.dimensions.methods())
 VALIDATED = ["likelihood", "increments"]
@@ -108,13 +108,11 @@ def test_periodic_surfaces(hurst, cut):
         assert 0.015 < float(result.scale_max[0]) < 0.04
 
 
-def test_crop_of_band_limited_surface_widens_interval():
+def test_crop_of_band_limited_surface_holds_exponent():
     surface = fc.surfaces.spectral((256, 256), 1e-3, hurst=0.8, rms_height=1e-5, rolloff=0.03, rng=24)
     result = estimate_one(surface[:128, :128])
     assert abs(float(result.misfit)) > 3.3
-    note = json.loads(estimate(surface[:128, :128]).hurst.attrs["comment"])["default"]
-    assert "changes with scale" in note
-    assert float(result.ci_high - result.ci_low) > 8 * float(result.standard_error)
+    assert float(result.ci_low) < 0.8 < float(result.ci_high)
 
 
 def test_gaps_cause_no_bias(rough):
@@ -132,10 +130,9 @@ def test_noise_is_separated():
     surface = fc.surfaces.fbm((160, 160), 1e-4, hurst=0.8, rms_increment=1e-6, rng=26)
     noisy = surface.copy(data=surface.values + 2.3e-7 * rng.standard_normal(surface.shape))
     plain, result = estimate_one(noisy), estimate_one(noisy, noise=True)
-    assert float(plain.hurst) < 0.72
-    assert float(result.ci_low) < 0.8 < float(result.ci_high)
-    assert float(result.noise_height) == pytest.approx(2.3e-7, rel=0.1)
-    assert np.isnan(plain.noise_height)
+    for found in (plain, result):  # this noise shows by itself
+        assert float(found.ci_low) < 0.8 < float(found.ci_high)
+        assert float(found.noise_height) == pytest.approx(2.3e-7, rel=0.1)
     gapped = estimate_one(with_gaps(noisy), noise=True)
     assert float(gapped.ci_low) < 0.8 < float(gapped.ci_high)
     assert float(gapped.noise_height) == pytest.approx(2.3e-7, rel=0.15)

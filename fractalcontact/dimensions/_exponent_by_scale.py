@@ -1,0 +1,287 @@
+"""Hurst exponent octave by octave of wavelength, and the longest run of octaves with one exponent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions import _cosine_modes, _mode_blocks
+from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
+from fractalcontact.dimensions._records import NORMAL
+from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_LEAST = 12  # modes of an octave
+_STEPS, _LONGEST_STEP = 60, 0.5
+_CORRELATION = 1.05  # of squared standard errors: neighbouring modes are slightly correlated
+_LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
+_FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
+_NAMES = (
+    "hurst",
+    "ci_low",
+    "ci_high",
+    "mode_count",
+    "in_window",
+    "wavelength",
+    "window_hurst",
+    "window_ci_low",
+    "window_ci_high",
+    "scale_min",
+    "scale_max",
+    "run_time",
+)
+
+
+def _check(problems: Problems, *, surface: Any) -> None:
+    check_surface(problems, surface, smallest=16, gaps=False, squares=True, reserved=_NAMES)
+
+
+@public_result(
+    title="Hurst exponent against scale",
+    references="Whittle (1957), J. R. Stat. Soc. B 19",
+    check=_check,
+)
+def scaling(surface: xr.DataArray) -> xr.Dataset:
+    """Return the Hurst exponent of every octave of wavelength, and the window that has one exponent.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., y, x) or (..., x) for a profile, without gaps; at least 16 points along
+        each axis.
+
+    Returns
+    -------
+    Dataset over `wavelength` (m, the middle of an octave)
+        `hurst` of the waves of the octave, with its 95 % interval `ci_low`, `ci_high`, and `mode_count`.
+        The exponents are not limited: long waves of white noise have -1 (a profile -0.5), waves as short as
+        the blur of an instrument more than 1.
+        `in_window` marks the longest run of octaves that one exponent between 0 and 1 fits; `window_hurst`,
+        `window_ci_low`, `window_ci_high`, `scale_min` and `scale_max` (m) are its exponent and its ends, NaN
+        if there is no such run.
+
+    Raises
+    ------
+    InvalidInput
+        Heights are missing, an axis is not uniform, or an axis has fewer than 16 points.
+
+    Notes
+    -----
+    Whittle's likelihood of the cosine modes, as in `estimate`. A run is accepted if the likelihood ratio
+    against separate exponents and amplitudes of its octaves is below the 99.7 % quantile of chi square.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    >>> result = fc.dimensions.scaling(surface)
+    >>> bool(result.in_window.all()), round(float(result.window_hurst), 1)
+    (True, 0.7)
+    """
+    surfaces = read_surfaces(surface)
+    records = [octaves(blocks_of(single)) for single in surfaces]
+    runs = [longest_run(record) for record in records]
+    spacing = surfaces[0].spacing[1]
+    leading = surface.dims[: surface.ndim - surfaces[0].axes]
+    sizes = [surface.sizes[dim] for dim in leading]
+
+    def stacked(values: Sequence[Any], *dims: str) -> tuple[tuple[Any, ...], Array]:
+        array = np.asarray(values)
+        return (*leading, *dims), array.reshape((*sizes, *array.shape[1:]))
+
+    fits = [[octave.fit for octave in record] for record in records]
+    data = {
+        "hurst": stacked([[fit.hurst for fit in row] for row in fits], "wavelength"),
+        "ci_low": stacked([[fit.low for fit in row] for row in fits], "wavelength"),
+        "ci_high": stacked([[fit.high for fit in row] for row in fits], "wavelength"),
+        "mode_count": stacked([[round(fit.modes) for fit in row] for row in fits], "wavelength"),
+        "in_window": stacked(
+            [
+                [run.first <= k < run.last for k in range(len(row))]
+                for run, row in zip(runs, fits, strict=True)
+            ],
+            "wavelength",
+        ),
+        "window_hurst": stacked([run.fit.hurst for run in runs]),
+        "window_ci_low": stacked([run.fit.low for run in runs]),
+        "window_ci_high": stacked([run.fit.high for run in runs]),
+        "scale_min": stacked([run.low * spacing for run in runs]),
+        "scale_max": stacked([run.high * spacing for run in runs]),
+    }
+    middle = np.array([np.sqrt(octave.low * octave.high) for octave in records[0]]) * spacing
+    coords = {**leading_coords(surface, leading, _NAMES), "wavelength": middle}
+    return xr.Dataset(data, coords=coords)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Mean squares of blocks of modes, and their expected power.
+
+    Attributes
+    ----------
+    power, count, wavelength : ndarray, shape (blocks,)
+        The wavelength is in spacings of x.
+    frame : Frame, optional
+        Table of the expected power with free edges; None for a periodic surface, whose power law is exact.
+    axes : int
+    """
+
+    power: Array
+    count: Array
+    wavelength: Array
+    frame: Frame | None
+    axes: int
+
+    def logs(self, hurst: float) -> tuple[Array, Array]:
+        """Return the logarithm of the expected power, and its derivative by H.
+
+        Beyond the table the slope of the logarithm at its end is that of a power law.
+        """
+        slope = 2.0 * np.log(self.wavelength)
+        if self.frame is None:
+            return (0.5 * self.axes + hurst) * slope, slope
+        inside = float(np.clip(hurst, LOWEST, HIGHEST))
+        weights, slopes = node_weights(inside)
+        logs = weights @ self.frame.logs
+        if inside != hurst:
+            return logs + (hurst - inside) * slope, slope
+        return logs, slopes @ self.frame.logs
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """Exponent of some blocks with its interval; the deviance is that at the best amplitude."""
+
+    hurst: float
+    low: float
+    high: float
+    modes: float
+    deviance: float
+
+
+@dataclass(frozen=True)
+class Octave:
+    """Blocks of one octave: wavelengths in spacings, a mask of the blocks, and their fit."""
+
+    low: float
+    high: float
+    inside: Array
+    fit: PowerLaw
+    blocks: Blocks
+
+
+@dataclass(frozen=True)
+class Run:
+    """Successive octaves `first` to `last` - 1 that one exponent fits; wavelengths in spacings."""
+
+    first: int
+    last: int
+    low: float
+    high: float
+    fit: PowerLaw
+
+
+def blocks_of(surface: Surface) -> Blocks:
+    """Return the blocks of a complete surface or profile."""
+    if all(surface.grid.periodic):
+        power, count, wavelength = _periodic(surface)
+        return Blocks(power, count, wavelength, None, surface.axes)
+    if surface.axes == 1:
+        return free_blocks(surface.heights[0], (1.0,))
+    return free_blocks(surface.heights, surface.plane_spacing)
+
+
+def free_blocks(heights: Array, spacing: tuple[float, ...]) -> Blocks:
+    """Return the blocks of complete heights with free edges, (ny, nx) or (n,)."""
+    frame = _mode_blocks.frame(heights.shape, spacing)
+    power = (
+        _cosine_modes.mode_power(heights) if heights.ndim == 2 else _mode_blocks.profile_modes(heights) ** 2
+    )
+    return Blocks(frame.mean(power), frame.count, 2.0 * np.pi / np.sqrt(frame.squares), frame, heights.ndim)
+
+
+def _periodic(surface: Surface) -> tuple[Array, Array, Array]:
+    """Return the mean power, the number of modes and the wavelength of every ring of a periodic surface."""
+    from fractalcontact.dimensions._periodic_modes import PeriodicModes
+
+    heights = surface.heights if surface.axes == 2 else surface.heights[0]
+    modes = PeriodicModes.of(heights, surface.relative_spacing)
+    ring = np.unique(np.rint(32.0 * np.log2(modes.wavenumber)), return_inverse=True)[1]
+    count = np.bincount(ring, modes.weights)
+    mean = np.bincount(ring, modes.weights * modes.power) / count
+    radius = np.exp(np.bincount(ring, modes.weights * np.log(modes.wavenumber)) / count)
+    unit = max(surface.grid.extent) / surface.spacing[1]
+    return mean, count, unit / radius
+
+
+def octaves(blocks: Blocks) -> list[Octave]:
+    """Fit every octave of wavelength, the shortest first; the longest holds all waves that are left."""
+    shortest = 2.0
+    result: list[Octave] = []
+    low = 0.0  # waves along a diagonal are shorter than two spacings
+    while (left := blocks.count[blocks.wavelength >= low * (1 - 1e-9)].sum()) >= _LEAST:
+        high = 2.0 * max(low, shortest)
+        if blocks.count[blocks.wavelength >= high * (1 - 1e-9)].sum() < _LEAST:
+            high = float(blocks.wavelength.max()) * (1 + 1e-6)
+        inside = (blocks.wavelength >= low * (1 - 1e-9)) & (blocks.wavelength < high * (1 - 1e-9))
+        if blocks.count[inside].sum() >= _LEAST and left > 0:
+            bottom = float(blocks.wavelength[inside].min()) if low == 0.0 else low
+            result.append(Octave(bottom, high, inside, fit_power_law(blocks, inside), blocks))
+        low = high
+    return result
+
+
+def fit_power_law(blocks: Blocks, inside: Array) -> PowerLaw:
+    """Fit exponent and amplitude to some blocks by scoring."""
+    part = Blocks(blocks.power[inside], blocks.count[inside], blocks.wavelength[inside], None, blocks.axes)
+    hurst, error, modes = 0.5, np.nan, float(part.count.sum())
+    for _ in range(_STEPS):
+        logs, slope = (values[inside] for values in blocks.logs(hurst))
+        ratio = np.log(np.maximum(part.power, 1e-300)) - logs
+        ratio = np.exp(ratio - ratio.max())
+        mean = float(np.sum(part.count * ratio) / modes)
+        slope = slope - np.average(slope, weights=part.count)
+        information = 0.5 * float(np.sum(part.count * slope * slope))
+        if not information > 0.0:
+            break
+        step = 0.5 * float(np.sum(part.count * slope * (ratio / mean - 1.0))) / information
+        error = float(np.sqrt(_CORRELATION / information))
+        hurst += float(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+        if abs(step) < 1e-6:
+            break
+    logs = blocks.logs(hurst)[0][inside]
+    top = np.log(np.maximum(part.power, 1e-300)) - logs
+    level = float(top.max() + np.log(np.sum(part.count * np.exp(top - top.max())) / modes))
+    deviance = float(np.sum(part.count * logs) + modes * level)
+    return PowerLaw(hurst, hurst - NORMAL * error, hurst + NORMAL * error, modes, deviance)
+
+
+def longest_run(record: Sequence[Octave]) -> Run:
+    """Return the longest run of octaves that one exponent of a fractal fits; of equal ones the surest."""
+    from scipy.special import chdtrc
+
+    best, width = None, 0
+    for first in range(len(record)):
+        for last in range(first + 1, len(record) + 1):
+            run = record[first:last]
+            if len(run) < max(width, min(2, len(record))):
+                continue
+            fit = fit_power_law(run[0].blocks, np.logical_or.reduce([octave.inside for octave in run]))
+            ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / _CORRELATION
+            fits = len(run) == 1 or chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM
+            is_fractal = fit.hurst > _LEAST_HURST and fit.low < 1.0
+            if not fits or not is_fractal:
+                continue
+            if best is None or len(run) > width or fit.modes > best.fit.modes:
+                best, width = Run(first, last, run[0].low, run[-1].high, fit), len(run)
+    if best is None:
+        return Run(0, 0, np.nan, np.nan, PowerLaw(np.nan, np.nan, np.nan, 0.0, np.nan))
+    return best

@@ -1,0 +1,399 @@
+"""Blocks of cosine modes of neighbouring wavenumbers, and their expected power for every Hurst exponent.
+
+The expected power of the modes of a fractional Brownian surface is smooth, so that modes of nearly the same
+wavenumber can be taken together: their mean square and their number hold what the likelihood needs. A fit
+then costs the same for every size of the surface. The logarithm of the expected power is tabulated over
+Hurst exponents, once for each shape, and interpolated by a polynomial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base import fft
+from fractalcontact.dimensions._whittle import CHI_SQUARE, UNEVEN, WhittleFit, fit_from_starts
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+LOWEST, HIGHEST = 0.01, 1.2  # range of Hurst exponents
+_OFFSET = 0.1  # the table is interpolated in ln(H + offset), which is smoother than in H
+_DEGREE = 11  # of the polynomial: the error of the expected power is then below 3e-4
+_ANGLES = (np.arange(_DEGREE + 1) + 0.5) * np.pi / (_DEGREE + 1)
+_FIRST, _LAST = np.log(LOWEST + _OFFSET), np.log(HIGHEST + _OFFSET)
+NODES = np.exp(0.5 * (_FIRST + _LAST) - 0.5 * (_LAST - _FIRST) * np.cos(_ANGLES)) - _OFFSET
+_SMOOTH = 1.3  # exponent up to which the sums over the covariance are exact enough
+_PER = 12  # inverse relative width of a block
+_LARGEST = 1024  # points along an axis up to which the table is summed over the lattice
+_ALIASES = 2  # aliases along each axis that are summed one by one
+_INVERSE = np.linalg.inv(np.polynomial.chebyshev.chebvander(-np.cos(_ANGLES), _DEGREE))
+
+
+def node_weights(hurst: float) -> tuple[Array, Array]:
+    """Return the weights of the nodes in polynomial interpolation, and their derivatives by H."""
+    angle = float(
+        np.arccos(np.clip((2.0 * np.log(hurst + _OFFSET) - _FIRST - _LAST) / (_LAST - _FIRST), -1.0, 1.0))
+    )
+    order = np.arange(_DEGREE + 1)
+    sine = np.sin(angle)
+    slopes = order * np.sin(order * angle) / sine if sine > 1e-9 else np.cos(angle) ** (order + 1) * order**2
+    return np.cos(order * angle) @ _INVERSE, slopes @ _INVERSE * (
+        2.0 / ((_LAST - _FIRST) * (hurst + _OFFSET))
+    )
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Blocks of the modes of one lattice.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (ny, nx), or (n,) of a profile.
+    spacing : tuple of float
+        Over that of x.
+    starts : tuple of ndarray
+        First mode of each block along each axis, counted from 1; the number of points at the end.
+    index : tuple of ndarray, shape (blocks,)
+        Number of each block along each axis. Where both axes are alike, two mirrored blocks are one.
+    count : ndarray, shape (blocks,)
+        Modes in each block.
+    waves : tuple of ndarray, shape (blocks,)
+        Wavenumber along each axis at the centre, rad per spacing of x.
+    logs : ndarray, shape (nodes, blocks)
+        Logarithm of the expected power of fractional Brownian heights.
+    """
+
+    shape: tuple[int, ...]
+    spacing: tuple[float, ...]
+    starts: tuple[Array, ...]
+    index: tuple[Array, ...]
+    count: Array
+    waves: tuple[Array, ...]
+    logs: Array
+
+    @property
+    def axes(self) -> int:
+        """Number of axes: 1 for a profile."""
+        return len(self.shape)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Squared wavenumber at the centre of each block."""
+        return np.asarray(sum(w * w for w in self.waves))
+
+    @cached_property
+    def aliases(self) -> Array:
+        """Squared wavenumbers of the blocks and of their nearest aliases: (aliases, blocks)."""
+        return alias_squares(self.waves, self.spacing, _ALIASES)
+
+    @cached_property
+    def alias_logs(self) -> Array:
+        """Logarithms of `aliases`."""
+        return np.asarray(np.log(self.aliases))
+
+    @cached_property
+    def near(self) -> Array:
+        """Indices of the aliases at most one period away along each axis."""
+        offsets = np.arange(-_ALIASES, _ALIASES + 1)
+        steps = np.abs(np.stack(np.meshgrid(*[offsets] * self.axes, indexing="ij"))).max(axis=0).ravel()
+        return np.flatnonzero(steps <= 1)
+
+    @cached_property
+    def tail_start(self) -> Array:
+        """Wavenumbers, one for each of some azimuths, beyond which aliases are summed as an integral."""
+        edge = (2 * _ALIASES + 1) * np.pi
+        if self.axes == 1:
+            return np.array([edge])
+        angle = (np.arange(16) + 0.5) / 16 * np.pi / 2
+        return np.asarray(edge / np.maximum(np.sin(angle) * self.spacing[0], np.cos(angle)))
+
+    @cached_property
+    def densities(self) -> Array:
+        """Logarithm of the aliased spectral density at the nodes: (nodes, blocks)."""
+        near = np.exp(-(NODES[:, None, None] + 0.5 * self.axes) * self.alias_logs)
+        tails = np.array([self.tail(h, 0.0)[0] for h in NODES])
+        return np.asarray(np.log(near.sum(axis=1) + tails[:, None]))
+
+    def tail(self, hurst: float, square: float) -> tuple[float, float, float]:
+        """Return the power of far aliases under a Gaussian blur, and its derivatives by H and `square`."""
+        x = np.linspace(0.0, 20.0, 80)
+        start = self.tail_start[:, None]
+        q = start * np.exp(x)
+        measure = self.spacing[0] / (2.0 * np.pi) if self.axes == 2 else 1.0 / np.pi
+        if square <= 0.0:
+            powers, logs = start[:, 0] ** (-2.0 * hurst), np.log(start[:, 0])
+            total = 0.5 * measure * float(np.mean(powers)) / hurst
+            change = -0.5 * measure * float(np.mean(powers * (2.0 * logs + 1.0 / hurst))) / hurst
+            return total, change, 0.0
+        value = measure * q ** (-2.0 * hurst) * np.exp(-square * q * q)
+        weights = (value, -2.0 * np.log(q) * value, -q * q * value)
+        power, slope, fall = (float(np.mean(np.trapezoid(w, x, axis=1))) for w in weights)
+        return power, slope, fall
+
+    def mean(self, values: Array) -> Array:
+        """Average the modes of each block: shape (modes along each axis from 1) to (blocks,)."""
+        for axis, starts in enumerate(self.starts):
+            values = np.add.reduceat(values, starts[:-1] - starts[0], axis=axis)
+        total = values[self.index]
+        if self.is_mirrored:
+            total = total + np.where(self.index[0] == self.index[1], 0.0, values[self.index[::-1]])
+        return np.asarray(total / self.count)
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether mirrored blocks are taken together."""
+        return _is_mirrored(self.shape, self.spacing)
+
+
+def alias_squares(waves: tuple[Array, ...], spacing: tuple[float, ...], images: int) -> Array:
+    """Return the squared wavenumbers of waves and of their aliases: (aliases, blocks)."""
+    offsets = 2.0 * np.pi * np.arange(-images, images + 1)
+    lines = [(w + offsets[:, None] / d) ** 2 for w, d in zip(waves, spacing, strict=True)]
+    if len(lines) == 1:
+        return np.asarray(lines[0])
+    return np.asarray((lines[0][:, None] + lines[1]).reshape(-1, lines[0].shape[1]))
+
+
+@lru_cache(maxsize=8)
+def frame(shape: tuple[int, ...], spacing: tuple[float, ...]) -> Frame:
+    """Divide the modes of a lattice into blocks and tabulate their expected power."""
+    starts = tuple(_starts(n, 2 if len(shape) == 1 else 1) for n in shape)
+    centres = [(s[:-1] + s[1:] - 1) // 2 for s in starts]
+    sizes = tuple(c.size for c in centres)
+    index = (
+        np.triu_indices(sizes[0])
+        if _is_mirrored(shape, spacing)
+        else np.unravel_index(range(np.prod(sizes)), sizes)
+    )
+    count = np.prod([np.diff(s)[i] for s, i in zip(starts, index, strict=True)], axis=0).astype(float)
+    if _is_mirrored(shape, spacing):
+        count[index[0] != index[1]] *= 2.0
+    waves = _waves(shape, spacing, [c[i] for c, i in zip(centres, index, strict=True)])
+    if len(shape) == 1:
+        logs = np.log(_profile_power(shape[0]))[:, centres[0] - 2]
+    elif min(shape) <= _LARGEST:
+        logs = np.log(_power_at(shape, spacing, centres))[:, index[0], index[1]]
+    else:
+        logs = (
+            _extrapolated(shape, spacing, centres, index)
+            + Frame(shape, spacing, starts, index, count, waves, count).densities
+        )
+    return Frame(shape, spacing, starts, index, count, waves, logs)
+
+
+def _extrapolated(shape: tuple[int, ...], spacing: tuple[float, ...], centres: Any, index: Any) -> Array:
+    """Return the logarithm of the expected power over the spectral density for a large surface.
+
+    Beyond the first modes they differ by a factor that depends on the number of the mode, and so little on
+    the size that a smaller lattice gives it.
+    """
+    factor = _LARGEST / min(shape)
+    small = tuple(round(n * factor) for n in shape)
+    ends = [np.minimum(c, _LARGEST // 2) for c in centres]
+    unique = [np.unique(e) for e in ends]
+    grid = np.unravel_index(range(unique[0].size * unique[1].size), (unique[0].size, unique[1].size))
+    waves = _waves(small, spacing, [u[i] for u, i in zip(unique, grid, strict=True)])
+    table = Frame(small, spacing, (), grid, np.empty(0), waves, np.empty(0))
+    ratio = np.log(_power_at(small, spacing, unique)) - table.densities.reshape(
+        NODES.size, *(u.size for u in unique)
+    )
+    places = [np.searchsorted(u, e)[i] for u, e, i in zip(unique, ends, index, strict=True)]
+    return np.asarray(ratio[:, places[0], places[1]])
+
+
+def _waves(shape: tuple[int, ...], spacing: tuple[float, ...], modes: Any) -> tuple[Array, ...]:
+    """Return the wavenumbers of numbered modes along each axis."""
+    return tuple(np.pi * k / (n * d) for k, n, d in zip(modes, shape, spacing, strict=True))
+
+
+def _is_mirrored(shape: tuple[int, ...], spacing: tuple[float, ...]) -> bool:
+    return len(shape) == 2 and shape[0] == shape[1] and spacing[0] == spacing[1]
+
+
+def _starts(n: int, first: int) -> Array:
+    """Return the first mode of each block along an axis; odd widths have a mode at their centre."""
+    starts = [first]
+    while starts[-1] < n:
+        width = max(1, starts[-1] // _PER)
+        starts.append(min(n, starts[-1] + width - (width % 2 == 0)))
+    return np.array(starts)
+
+
+def _power_at(shape: tuple[int, ...], spacing: tuple[float, ...], modes: Any) -> Array:
+    """Return the expected power of some modes of a surface at the nodes: (nodes, rows, columns)."""
+    expected = expected_power_at(shape, spacing, modes)
+    return np.stack([expected(hurst) for hurst in NODES])
+
+
+def expected_power_at(
+    shape: tuple[int, ...], spacing: tuple[float, ...], modes: Any
+) -> Callable[[float], Array]:
+    """Return a function of H: the expected power of the modes of given numbers, (rows, columns)."""
+    from fractalcontact.dimensions._cosine_modes import Lattice
+
+    lattice = Lattice.of((shape[0], shape[1]), (spacing[0], spacing[1]))
+    along_y, along_x = (_weights(n, k) for n, k in zip(shape, modes, strict=True))
+    return lambda hurst: np.asarray(along_y @ lattice.covariance(hurst) @ along_x.T)
+
+
+def _weights(n: int, modes: Array) -> Array:
+    """Return the weight of the covariance at each lag in the power of each mode: (modes, n)."""
+    lag = np.arange(n)
+    angle = np.pi * modes[:, None] / n
+    weights = 2.0 * ((n - lag) * np.cos(angle * lag) - np.sin(angle * lag) / np.sin(angle)) / n
+    weights[:, 0] = 1.0
+    return np.asarray(weights)
+
+
+def _profile_power(n: int) -> Array:
+    """Return the expected power of modes 2 to n - 1 of a profile at the nodes, a tilt being removed.
+
+    The tilt is that which the first mode would have; it is taken from the other odd modes, see
+    `profile_modes`.
+    """
+    lag = np.arange(n) / n
+    size = 2 * n
+    tilt = tilt_modes(n)
+    first = np.cos(np.pi * (np.arange(n) + 0.5) / n) * np.sqrt(2.0 / n)
+    modes = np.arange(1, n)
+    sine = np.sin(np.pi * modes / n)
+    table = []
+    for hurst in NODES:
+        excess = hurst - 1.0
+        logs = np.log(np.maximum(lag, 0.5 / n))
+        covariance = lag**2 * (np.expm1(2.0 * excess * logs) / excess if abs(excess) > 1e-9 else 2.0 * logs)
+        # as in `_cosine_modes._along`
+        tapered = np.append(covariance * np.arange(n, 0, -1.0), 0.0)
+        power = (
+            fft.dct(tapered[None], 1, (1,))[0][1:n] - fft.dst(covariance[None, 1:], 1, (1,))[0] / sine
+        ) / n
+        symbol = fft.rfft2(np.concatenate([covariance, [0.0], covariance[:0:-1]])[None])
+        product = fft.irfft2(symbol * fft.rfft2(np.pad(first, (0, n))[None]), (1, size))[0, :n]
+        with_first = fft.dct(product[None], 2, (1,))[0][1:] / np.sqrt(2.0 * n)
+        table.append((power + tilt**2 * power[0] - 2.0 * tilt * with_first)[1:])
+    return np.asarray(np.stack(table))
+
+
+def tilt_modes(n: int) -> Array:
+    """Return the cosine modes 1 to n - 1 of a tilted line over its first one: zero for even modes."""
+    modes = fft.dct((np.arange(n) - 0.5 * (n - 1))[None], 2, (1,))[0][1:]
+    return np.asarray(np.where(np.arange(1, n) % 2 == 1, modes / modes[0], 0.0))
+
+
+def profile_modes(heights: Array) -> Array:
+    """Return the cosine modes 2 to n - 1 of a profile, orthonormal, without the tilt of its first mode."""
+    n = heights.size
+    modes = fft.dct((heights - heights.mean())[None], 2, (1,))[0][1:] / np.sqrt(2.0 * n)
+    return np.asarray((modes - tilt_modes(n) * modes[0])[1:])
+
+
+@dataclass(frozen=True)
+class BlockModes:
+    """Modes of a large complete surface with free edges, block by block (a `_whittle.Modes`).
+
+    Attributes
+    ----------
+    power, logs, count : ndarray, shape (blocks,)
+        Mean square of the modes of a block, mean logarithm of their squares, and their number.
+    order, sector : ndarray, shape (blocks,)
+        Wavelength in spacings of x, and whether the wave runs steeper along y than along x.
+    model : callable
+        Hurst exponent to the expected power.
+    """
+
+    power: Array
+    logs: Array
+    count: Array
+    order: Array
+    sector: Array
+    model: Callable[[float], Array]
+    gapped: None = None
+
+    @classmethod
+    def of(
+        cls, heights: Array, spacing: tuple[float, float], scales: tuple[float, float] | None
+    ) -> BlockModes:
+        """Transform a surface; `scales` is a window of wavelengths in spacings of x."""
+        from fractalcontact.dimensions._cosine_modes import Lattice, expected_power, mode_power
+
+        ny, nx = heights.shape
+        starts = _starts(ny, 1), _starts(nx, 1)
+        centres = [(s[:-1] + s[1:] - 1) // 2 for s in starts]
+        power = mode_power(heights)
+        least = 1e-12 * float(power.mean())
+        means, logs = (
+            _sums(values, starts) for values in (power, np.log(np.maximum(power, least, out=power)))
+        )
+        count = np.outer(*(np.diff(s) for s in starts)).astype(float)
+        along_y, along_x = (np.pi * k / (n * d) for k, n, d in zip(centres, (ny, nx), spacing, strict=True))
+        order = 2.0 * np.pi / np.hypot(along_y[:, None], along_x)
+        chosen = np.ones(order.shape, dtype=bool)
+        if scales is not None:
+            chosen = (order >= scales[0] * (1 - 1e-9)) & (order <= scales[1] * (1 + 1e-9))
+        expected = expected_power_at((ny, nx), spacing, centres)
+
+        def model(hurst: float) -> Array:
+            if hurst > _SMOOTH:  # sums over the covariance cancel
+                lattice = Lattice.of((ny, nx), spacing)
+                return np.asarray(expected_power(lattice, hurst)[np.ix_(*(c - 1 for c in centres))][chosen])
+            return np.asarray(expected(hurst)[chosen])
+
+        return cls(
+            power=(means / count)[chosen],
+            logs=(logs / count)[chosen],
+            count=count[chosen],
+            order=order[chosen],
+            sector=(along_y[:, None] > along_x)[chosen],
+            model=model,
+        )
+
+    @property
+    def number(self) -> float:
+        """Number of modes."""
+        return float(self.count.sum())
+
+    def scatter(self, fit: WhittleFit) -> float:
+        """Return z of the flatness."""
+        ratio = self.power / fit.total
+        mean = float(np.average(ratio, weights=self.count))
+        logs = float(np.average(self.logs - np.log(fit.total), weights=self.count)) - np.log(mean)
+        return float((logs - CHI_SQUARE[0]) * np.sqrt(self.number / CHI_SQUARE[1]))
+
+    def part(self, chosen: Array) -> BlockModes:
+        """Return some of the blocks."""
+        model = self.model
+        return BlockModes(
+            power=self.power[chosen],
+            logs=self.logs[chosen],
+            count=self.count[chosen],
+            order=self.order[chosen],
+            sector=self.sector[chosen],
+            model=lambda hurst: model(hurst)[chosen],
+        )
+
+    def fit(self, start: float, noise: bool) -> WhittleFit:
+        """Fit from a pilot estimate; with noise from two starts, of which the better end is returned."""
+        return fit_from_starts(self.power, self.model, start, noise, weights=self.count)
+
+    def error(self, fit: WhittleFit) -> float:
+        """Return the standard error of H, see `_cosine_modes.FreeModes.error`."""
+        return fit.standard_error * (1.01 + 0.02 * float(np.clip(fit.hurst, 0.0, 1.0)))
+
+    def is_uneven(self, inside: Array, hurst: float) -> bool:
+        """Return whether few waves of some blocks carry more than their share."""
+        part = self.part(inside)
+        expected = part.model(hurst)
+        mean = float(np.average(part.power / expected, weights=part.count))
+        logs = float(np.average(part.logs - np.log(expected), weights=part.count)) - np.log(mean)
+        return bool((logs - CHI_SQUARE[0]) * np.sqrt(part.number / CHI_SQUARE[1]) < -UNEVEN)
+
+
+def _sums(values: Array, starts: tuple[Array, Array]) -> Array:
+    """Sum modes (ny - 1, nx - 1) over blocks."""
+    rows = np.add.reduceat(values, starts[0][:-1] - 1, axis=0)
+    return np.asarray(np.add.reduceat(rows, starts[1][:-1] - 1, axis=1))

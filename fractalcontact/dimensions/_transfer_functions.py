@@ -1,0 +1,118 @@
+"""Expected power of a surface under the transfer function of an instrument.
+
+A Gaussian point spread function of the standard deviation s multiplies the power at the wavenumber q by
+exp(-s^2 q^2). Its four forms differ in how short waves are aliased: a blur before the heights are sampled
+(`BEFORE`), one that also removes all aliases (`BAND`), a filter of the sampled heights with the Gaussian at
+whole points (`FILTER`), or with the Gaussian transfer function itself (`TRANSFER`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.dimensions._mode_blocks import Frame, node_weights
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+NONE, BEFORE, BAND, FILTER, TRANSFER = "none", "before", "band", "filter", "transfer"
+FORMS = {
+    NONE: "no blur",
+    BEFORE: "a blur before sampling",
+    BAND: "a band limit",
+    FILTER: "a filter of the sampled heights",
+    TRANSFER: "a filter of the sampled heights",
+}
+_NO_ALIASES = 0.1  # squared spread beyond which far aliases do not matter
+_LEAST_LOG = -600.0  # logarithm of the smallest expected power
+
+
+class Window:
+    """Blocks of a window with what the models need of them."""
+
+    def __init__(self, frame: Frame, inside: Array, power: Array, edges: Array | None = None) -> None:
+        self.frame, self.inside = frame, inside
+        self.count, self.power = frame.count[inside], power[inside]
+        self.logs, self.squares = frame.logs[:, inside], frame.squares[inside]
+        self.edges = None if edges is None else np.log1p(edges[inside])
+        self._parts: dict[str, Array] = {}
+
+    def part(self, name: str) -> Array:
+        """Return the blocks of an array of the frame."""
+        if name not in self._parts:
+            self._parts[name] = getattr(self.frame, name)[..., self.inside]
+        return self._parts[name]
+
+    def signal(self, form: str, hurst: float, square: float) -> tuple[Array, Array, Array]:
+        """Return the expected power without noise, and the derivatives of its logarithm by H and `square`."""
+        value, slope = node_weights(hurst)
+        logs, by_hurst = value @ self.logs, slope @ self.logs
+        by_square: Array = np.zeros(logs.size)
+        if form == TRANSFER:
+            logs, by_square = logs - square * self.squares, -self.squares
+        elif form == FILTER:
+            for log, derivative in self._lattice_filter(square):
+                logs, by_square = logs + log, by_square + derivative
+        elif form in (BEFORE, BAND):
+            density, density_slope = value @ self.part("densities"), slope @ self.part("densities")
+            ratio, ratio_hurst, by_square = self._unaliased(form, hurst, square)
+            logs, by_hurst = logs + ratio - density, by_hurst + ratio_hurst - density_slope
+        if self.edges is not None and form != NONE:
+            logs = logs + self.edges
+        return np.exp(np.maximum(logs, _LEAST_LOG)), by_hurst, by_square
+
+    def _unaliased(self, form: str, hurst: float, square: float) -> tuple[Array, Array, Array]:
+        """Return the logarithm of the spectral density of a blur before sampling, and derivatives."""
+        power = hurst + 0.5 * self.frame.axes
+        if form == BAND:
+            logs = np.log(self.squares)
+            return -power * logs - square * self.squares, -logs, -self.squares
+        squares, logs = self.part("aliases"), self.part("alias_logs")
+        if square > _NO_ALIASES:
+            near = self.frame.near
+            squares, logs = squares[near], logs[near]
+        terms = np.exp(-power * logs - square * squares)
+        total, by_hurst, by_square = terms.sum(0), -(terms * logs).sum(0), -(terms * squares).sum(0)
+        if square <= _NO_ALIASES:
+            tail = self.frame.tail(hurst, square)
+            total, by_hurst, by_square = total + tail[0], by_hurst + tail[1], by_square + tail[2]
+        return np.log(total), by_hurst / total, by_square / total
+
+    def _lattice_filter(self, square: float) -> Iterable[tuple[Array, Array]]:
+        """Yield the logarithm of the squared transfer function along each axis, and its derivative."""
+        for waves, spacing in zip(self.frame.waves, self.frame.spacing, strict=True):
+            lines, index = np.unique(waves[self.inside], return_inverse=True)
+            variance = max(square, 1e-3) / spacing**2
+            k = np.arange(1, int(4.0 * np.sqrt(variance) + 8.5))
+            weights = np.exp(-k * k / (2.0 * variance))
+            rates = weights * k * k / (2.0 * variance**2)
+            cosines = np.cos(np.outer(lines * spacing, k))
+            total, total_rate = 1.0 + 2.0 * weights.sum(), 2.0 * rates.sum()
+            transfer = (1.0 + 2.0 * cosines @ weights) / total
+            rate = (2.0 * cosines @ rates - transfer * total_rate) / total
+            transfer = np.where(np.abs(transfer) < 1e-12, 1e-12, transfer)
+            yield 2.0 * np.log(np.abs(transfer))[index], (2.0 * rate / transfer / spacing**2)[index]
+
+
+def edge_power(frame: Frame, hurst: float, square: float) -> Array:
+    """Return the power of the jump of the slope at the edges, over that of the blurred surface.
+
+    Reflected at an edge, heights of slope g have modes of the power 4 <g^2> / (n q^4) along the normal.
+    <g^2> of the waves of one wavenumber along the edge is an integral of the spectral density over those
+    across it. Waves longer than the blur have the same jump without blur, which is in the table.
+    """
+    p = np.exp(np.linspace(-6.0, np.log(np.pi), 240))
+    power = hurst + 0.5 * frame.axes
+    signal = frame.squares**-power * np.exp(-np.minimum(square * frame.squares, 600.0))
+    total = np.zeros_like(signal)
+    for axis, (n, d) in enumerate(zip(frame.shape, frame.spacing, strict=True)):
+        across = frame.waves[axis]
+        along, index = (
+            np.unique(frame.waves[1 - axis], return_inverse=True) if frame.axes == 2 else (np.zeros(1), 0)
+        )
+        radius = p**2 + along[:, None] ** 2
+        slopes = np.trapezoid(p**2 * radius**-power * np.exp(-square * radius), p, axis=1) / np.pi
+        total += 4.0 * slopes[index] / (n * d * across**4) * -np.expm1(-square * across**2)
+    return np.asarray(total / signal)

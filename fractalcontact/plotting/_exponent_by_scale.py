@@ -1,0 +1,72 @@
+"""Hurst exponent against wavelength, with the window of one exponent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import result_of, table
+from fractalcontact.plotting._units import axis_label, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
+
+
+@_style.styled
+def scaling(result: Any, *, ax: Axes | None = None) -> Figure:
+    """Draw the Hurst exponent of every octave of wavelength with its interval.
+
+    The band is the longest run of octaves with one exponent, as wide as its wavelengths and as high as the
+    interval of its exponent. The range of fractals, 0 to 1, lies between the dotted lines.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.dimensions.scaling`.
+    ax : Axes, optional
+        Draw here; otherwise on a new figure.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or the result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> ax = fc.plotting.scaling(fc.dimensions.scaling(surface)).axes[0]
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    wavelength (mm) | Hurst exponent
+    """
+    figure, ax = _style.axes_or_new(ax)
+    names = ("hurst", "ci_low", "ci_high", "window_hurst", "wavelength")
+    data = result_of(result, "scaling", names, ("wavelength",))
+    along = scale_of(data["wavelength"])
+    x = along(data["wavelength"].values)
+    hurst, low, high = (table(data, name, ("wavelength",)) for name in ("hurst", "ci_low", "ci_high"))
+    ax.errorbar(
+        x, hurst, [hurst - low, high - hurst], fmt="o", ms=3.5, lw=1.0, color="k", label="octave, 95 %"
+    )
+    if np.isfinite(float(data["window_hurst"])):
+        ends = [float(along(float(data[name]))) for name in ("scale_min", "scale_max")]
+        bottom, top = (float(data[f"window_ci_{end}"]) for end in ("low", "high"))
+        ax.fill_between(ends, bottom, top, color="C0", alpha=0.35, lw=0, label="one exponent")
+        ax.plot(ends, 2 * [float(data["window_hurst"])], color="C0", lw=1.2)
+    for limit in (0.0, 1.0):
+        ax.axhline(limit, color="0.6", lw=0.7, ls=":")
+    ax.set_xscale("log")
+    ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
+    ax.set_xlabel(axis_label(data["wavelength"], along))
+    ax.set_ylabel("Hurst exponent")
+    ax.legend()
+    return figure

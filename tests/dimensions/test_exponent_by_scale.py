@@ -1,0 +1,84 @@
+"""Exponent by octave, and the window of scales that has one exponent."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+
+SPACING = 1e-4
+
+
+def brownian(hurst, step, rng, shape=(256, 256)):
+    return fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=step, rng=rng).values
+
+
+def scaling(heights):
+    return fc.dimensions.scaling(fc.surfaces.from_array(heights, SPACING))
+
+
+def test_fractional_brownian_surface_has_one_window():
+    result = scaling(brownian(0.6, 1e-6, 1))
+    assert result.in_window.all()
+    assert float(result.window_ci_low) < 0.6 < float(result.window_ci_high)
+    assert ((result.ci_low < 0.6) & (result.ci_high > 0.6)).mean() > 0.7
+    assert int(result.mode_count.sum()) == 255**2
+    assert float(result.scale_min) < 2 * SPACING < float(result.scale_max)
+
+
+def test_white_noise_has_no_window():
+    noise = np.random.default_rng(1).standard_normal((256, 256))
+    result = scaling(1e-6 * noise)
+    assert float(result.hurst[0]) == pytest.approx(0.0, abs=0.05)  # sampled without limit of the band
+    assert (result.hurst[1:5] < 0.0).all()
+    assert np.isnan(result.window_hurst)
+    assert not result.in_window.any()
+
+
+def test_sum_of_two_surfaces_shows_the_exponent_of_each_end():
+    rough, smooth = brownian(0.2, 1e-6, 3), brownian(0.9, 3e-7, 2)
+    result = scaling(rough + smooth)
+    assert float(result.hurst[0]) < 0.35
+    assert float(result.hurst[3:].mean()) > 0.5
+    assert not result.in_window.all()
+
+
+def test_periodic_surface_with_rolloff():
+    surface = fc.surfaces.spectral(
+        (256, 256), SPACING, hurst=0.7, rms_height=1e-6, rolloff=32 * SPACING, rng=2
+    )
+    result = fc.dimensions.scaling(surface)
+    assert float(result.window_hurst) == pytest.approx(0.7, abs=0.03)
+    assert float(result.scale_max) == pytest.approx(32 * SPACING, rel=0.01)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-6])
+def test_profile_is_not_changed_by_a_tilt(tilt):
+    heights = brownian(0.5, 1e-6, 2, (1000,))
+    result = scaling(heights + tilt * np.arange(1000))
+    assert float(result.window_hurst) == pytest.approx(0.5, abs=0.06)
+    np.testing.assert_allclose(result.hurst, scaling(heights).hurst, atol=1e-6)
+
+
+def test_coverage_of_octaves():
+    rng = np.random.default_rng(5)
+    surfaces = fc.surfaces.fbm((64, 64), SPACING, hurst=0.4, rms_increment=1e-6, members=100, rng=rng)
+    result = fc.dimensions.scaling(surfaces)
+    held = (result.ci_low < 0.4) & (result.ci_high > 0.4)
+    assert (held[:, :3].mean("member") > 0.88).all()
+    assert result.in_window.all("wavelength").mean() > 0.95
+
+
+def test_gaps_are_refused():
+    heights = brownian(0.5, 1e-6, 1, (32, 32)).copy()
+    heights[3, 3] = np.nan
+    with pytest.raises(ValueError, match="fill"):
+        scaling(heights)
+
+
+def test_estimate_reports_the_window_of_a_surface_with_two_exponents():
+    heights = brownian(0.2, 1e-6, 3) + brownian(0.9, 2e-7, 2)
+    result = fc.dimensions.estimate(fc.surfaces.from_array(heights, SPACING)).isel(method=0)
+    window = scaling(heights)
+    if "no single exponent" in result.hurst.attrs["comment"]:
+        assert float(result.hurst) == pytest.approx(float(window.window_hurst))
+    assert float(result.ci_high - result.ci_low) < 0.7

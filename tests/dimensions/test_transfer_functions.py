@@ -1,0 +1,50 @@
+"""Expected power under the transfer functions of instruments, against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from fractalcontact.dimensions._mode_blocks import frame
+from fractalcontact.dimensions._transfer_functions import BAND, BEFORE, FILTER, FORMS, NONE, TRANSFER, Window
+
+FRAME = frame((64, 64), (1.0, 1.0))
+EVERY = np.ones(FRAME.count.size, dtype=bool)
+
+
+@pytest.fixture
+def window():
+    return Window(FRAME, EVERY, np.ones(EVERY.size))
+
+
+@pytest.mark.parametrize("form", [BEFORE, FILTER, TRANSFER])
+def test_no_blur_is_no_change(form, window):
+    plain, blurred = (window.signal(f, 0.4, 1e-12)[0] for f in (NONE, form))
+    np.testing.assert_allclose(blurred, plain, rtol=1e-3)
+
+
+def test_filter_is_that_of_sampled_weights(window):
+    impulse = np.zeros((65, 65))
+    impulse[32, 32] = 1.0
+    kernel = gaussian_filter(impulse, 0.8, truncate=12)
+    place = np.arange(65) - 32
+    phase = FRAME.waves[0][:, None, None] * place[:, None] + FRAME.waves[1][:, None, None] * place
+    transfer = np.sum(kernel * np.cos(phase), axis=(1, 2))
+    ratio = window.signal(FILTER, 0.4, 0.64)[0] / window.signal(NONE, 0.4, 0.0)[0]
+    np.testing.assert_allclose(ratio, transfer**2, rtol=1e-6)
+
+
+def test_wide_blur_leaves_no_aliases(window):
+    before, band = (window.signal(form, 0.4, 2.0)[0] for form in (BEFORE, BAND))
+    long = FRAME.squares < 4.0
+    np.testing.assert_allclose(before[long], band[long], rtol=1e-6)
+
+
+@pytest.mark.parametrize("form", list(FORMS))
+@pytest.mark.parametrize("square", [0.05, 0.5])
+def test_derivatives(form, square, window):
+    step = 1e-5
+    _, by_hurst, by_square = window.signal(form, 0.6, square)
+    ends = [np.log(window.signal(form, 0.6 + s, square)[0]) for s in (-step, step)]
+    np.testing.assert_allclose((ends[1] - ends[0]) / (2 * step), by_hurst, atol=2e-4)
+    ends = [np.log(window.signal(form, 0.6, square + s)[0]) for s in (-step, step)]
+    np.testing.assert_allclose((ends[1] - ends[0]) / (2 * step), by_square, atol=1e-3)

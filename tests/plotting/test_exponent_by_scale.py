@@ -1,0 +1,31 @@
+"""Exponents by octave of wavelength."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact import plotting
+
+
+@pytest.fixture(scope="module")
+def result():
+    surface = fc.surfaces.spectral((128, 128), 1e-4, hurst=0.7, rms_height=1e-6, rolloff=16e-4, rng=2)
+    return fc.dimensions.scaling(surface)
+
+
+def test_points_and_window(result):
+    ax = plotting.scaling(result).axes[0]
+    window = next(line for line in ax.lines if np.ptp(line.get_xdata()) > 0 and len(line.get_xdata()) == 2)
+    assert window.get_ydata()[0] == pytest.approx(float(result.window_hurst))
+    assert ax.get_xlabel() == "wavelength (mm)"
+    assert len(ax.containers[0][0].get_xdata()) == result.sizes["wavelength"]
+
+
+def test_no_window_is_drawn_where_there_is_none(result):
+    ax = plotting.scaling(result.assign(window_hurst=np.nan)).axes[0]
+    assert ax.get_legend_handles_labels()[1] == ["octave, 95 %"]
+
+
+def test_missing_variable_is_named(result):
+    with pytest.raises(ValueError, match="window_hurst"):
+        plotting.scaling(result.drop_vars("window_hurst"))
