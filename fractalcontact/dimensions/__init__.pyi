@@ -2,8 +2,8 @@ from ._covering_area import covering as covering
 from ._cube_counts import cube_counts as cube_counts
 from ._directions import directions as directions
 from ._estimate import estimate as estimate
-from ._hurst_map import hurst_map as hurst_map
 from ._exponent_by_scale import scaling as scaling
+from ._hurst_map import hurst_map as hurst_map
 from ._methods import methods as methods
 from ._roughness_length import roughness_length as roughness_length
 from ._spectrum import spectrum as spectrum
