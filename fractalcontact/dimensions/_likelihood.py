@@ -127,8 +127,9 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     # unequal parts count for fewer modes
     is_bent = abs(fit.misfit) > SIGNIFICANT * blocks.widening
     is_bent &= not surface.finest_scale  # gridding has removed short waves, as a blur does
-    # blur and noise together may be as straight as a smooth surface
-    is_odd = is_bent or fit.hurst > 1.0 or modes.scatter(fit) < -UNEVEN or (noise and fit.noise < 0.0)
+    # blur and noise together may be as straight as a smooth surface; unequal parts are neither
+    is_odd = is_bent or (noise and fit.noise < 0.0)
+    is_odd |= not blocks.note and (fit.hurst > 1.0 or modes.scatter(fit) < -UNEVEN)
     if modes.gapped is None and (spread is not None or (is_odd and not surface.finest_scale)):
         other, is_even = _with_blur(heights, surface, scales, noise, spread)
         if other is None and is_even and is_bent and scales is None:
