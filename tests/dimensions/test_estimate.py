@@ -317,7 +317,7 @@ def test_invalid_arguments(rough):
         "at least 25 observed points": lambda: estimate(surface_of(np.eye(4))),
         "see fractalcontact.surfaces.fill": lambda: estimate(with_gaps(rough), "spectrum"),
         "a DataArray of heights": lambda: estimate(rough.values),
-        "'m'": lambda: estimate(rough.assign_attrs(units="um")),
+        "'m'": lambda: estimate(rough.assign_attrs(units="kg")),
     }.items():
         with pytest.raises(ValueError, match=text):
             bad()
