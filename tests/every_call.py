@@ -79,6 +79,7 @@ CALLS = {
     "save": lambda folder: xr.open_dataset(fc.save(labels.rough(), folder / "saved.nc")).load(),
     "open": opened,
     "contact.effective_modulus": lambda _: fc.contact.effective_modulus(1e9, 0.2),
+    "contact.effective_poisson": lambda _: fc.contact.effective_poisson(1e9, 0.2),
     "contact.flat_stiffness": lambda _: fc.contact.flat_stiffness((20, 20), 1e-4, contact_modulus=1e9),
     "dimensions.methods": lambda _: fc.dimensions.methods(),
     "joints.Crack": lambda _: labels.crack().faces()[0],

@@ -25,6 +25,7 @@ UNLABELLED = {
     "contact.ContactOptions",
     "contact.LoadPath",
     "contact.effective_modulus",
+    "contact.effective_poisson",
     "contact.flat_stiffness",
     "dimensions.methods",
     "surfaces.SelfAffine",

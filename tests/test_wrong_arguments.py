@@ -50,6 +50,7 @@ CALLS = {
     "dimensions.waves": {"surface": SURFACE},
     "dimensions.estimate": {"surface": SURFACE, "methods": "variogram"},
     "contact.effective_modulus": {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
+    "contact.effective_poisson": {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
     "contact.flat_stiffness": {"shape": (8, 8), "spacing": 1e-4, "contact_modulus": 1e9},
     "contact.press": {"surface": SURFACE, "contact_modulus": 1e9, "nominal_pressure": 1e4},
     "contact.theories": {"surface": SURFACE, "contact_modulus": 1e9, "nominal_pressure": 1e4},

@@ -1,5 +1,6 @@
 from ._flat_block import flat_stiffness as flat_stiffness
 from ._modulus import effective_modulus as effective_modulus
+from ._modulus import effective_poisson as effective_poisson
 from ._options import ContactOptions as ContactOptions
 from ._options import LoadPath as LoadPath
 from ._partial_slip import partial_slip as partial_slip
@@ -10,6 +11,7 @@ __all__ = [
     "ContactOptions",
     "LoadPath",
     "effective_modulus",
+    "effective_poisson",
     "flat_stiffness",
     "partial_slip",
     "press",

@@ -1,4 +1,4 @@
-"""Contact modulus of a pair of elastic bodies."""
+"""Contact modulus and Poisson's ratio of a pair of elastic bodies."""
 
 from __future__ import annotations
 
@@ -50,20 +50,69 @@ def effective_modulus(
     31.25
     """
     with Problems("fractalcontact.contact.effective_modulus") as problems:
-        _check_body(problems, "young", young, "poisson", poisson)
-        if young2 is not None:
-            _check_body(problems, "young2", young2, "poisson2", poisson2)
-        elif poisson2 is not None:
-            problems.add("poisson2", "a value with young2, or neither of them for two equal bodies", poisson2)
-        elastic = not (_is_rigid(young) and (young2 is None or _is_rigid(young2)))
-        problems.require(elastic, "young / young2", "one of the bodies to be elastic", "two rigid ones")
+        _check_pair(problems, young, poisson, young2, poisson2)
     first = _compliance(young, poisson)
     second = first if young2 is None else _compliance(young2, poisson2)
     return 1.0 / (first + second)
 
 
+def effective_poisson(
+    young: float, poisson: float, young2: float | None = None, poisson2: float | None = None
+) -> float:
+    """Poisson's ratio of two equal bodies that have the tangential and normal compliance of a pair.
+
+    It is the mean of both, weighted by the compliance in shear, 2 (1 + nu)/E.
+
+    Parameters
+    ----------
+    young, poisson, young2, poisson2 : float
+        As for `effective_modulus`.
+
+    Returns
+    -------
+    float
+        For `partial_slip`; that of the elastic body where the other is rigid.
+
+    Raises
+    ------
+    InvalidInput
+        As for `effective_modulus`.
+
+    Notes
+    -----
+    Elastic displacements along the surface follow from E* and this ratio alone. What it leaves out, as
+    `partial_slip` does, is the slip that the pressure causes between dissimilar bodies.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> round(fc.contact.effective_poisson(30e9, 0.2, 60e9, 0.3), 4)
+    0.2351
+    """
+    with Problems("fractalcontact.contact.effective_poisson") as problems:
+        _check_pair(problems, young, poisson, young2, poisson2)
+    if young2 is None:
+        return float(poisson)
+    bodies = [(young, poisson), (young2, poisson2)]
+    elastic = [(float(modulus), float(ratio)) for modulus, ratio in bodies if ratio is not None]
+    softest = min(modulus for modulus, _ in elastic)  # no compliance leaves the range of numbers
+    weights = [softest / modulus * (1 + ratio) for modulus, ratio in elastic]
+    ratios = [ratio for _, ratio in elastic]
+    return sum(w * ratio for w, ratio in zip(weights, ratios, strict=True)) / sum(weights)
+
+
 def _is_rigid(young: object) -> bool:
     return isinstance(young, (int, float)) and young == math.inf
+
+
+def _check_pair(problems: Problems, young: object, poisson: object, young2: object, poisson2: object) -> None:
+    _check_body(problems, "young", young, "poisson", poisson)
+    if young2 is not None:
+        _check_body(problems, "young2", young2, "poisson2", poisson2)
+    elif poisson2 is not None:
+        problems.add("poisson2", "a value with young2, or neither of them for two equal bodies", poisson2)
+    elastic = not (_is_rigid(young) and (young2 is None or _is_rigid(young2)))
+    problems.require(elastic, "young / young2", "one of the bodies to be elastic", "two rigid ones")
 
 
 def _check_body(problems: Problems, name: str, young: object, ratio_name: str, poisson: object) -> None:

@@ -20,7 +20,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
-from fractalcontact.joints._crack import Crack, block_coords, check_sliding
+from fractalcontact.joints._crack import Crack, block_coords, check_elastic, check_sliding
 from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -255,6 +255,7 @@ def check_pressing(
         Grid(layout.cells, layout.spacing, layout.periodic), problems
     )
     if load is not None:
+        check_elastic(problems, crack)
         options.check_load(load, crack.nominal_area, problems)
 
 

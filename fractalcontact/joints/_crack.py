@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import plain
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.joints._compass import (
     check_direction,
     check_directions,
@@ -26,6 +26,7 @@ Pair = tuple[float, float]
 WHERE = "fractalcontact.joints.Crack"
 SMALLEST = 3  # cells along an edge of the block
 SHIFT_ROUNDING = 1e-6  # cells; a shift this close to whole cells is rounded to them
+MATERIAL: dict[str, dict[str, Any]] = {"young": {"above": 0.0}, "poisson": {"above": -1.0, "at_most": 0.5}}
 FILL = "see fractalcontact.surfaces.fill"
 
 
@@ -82,7 +83,7 @@ def _rounded(cells: float) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Crack:
-    """A crack between two elastic half-spaces of the same material.
+    """A crack between two elastic half-spaces of one material or of two.
 
     The upper body carries a block that lies on the lower face, slides over it and is pressed against it.
     A periodic axis wraps: the lower face repeats, and the block may slide any distance. On a free axis the
@@ -95,10 +96,10 @@ class Crack:
     upper : DataArray, shape (y, x), optional
         Heights (m) of the lower face of the upper body in the same frame and on the same grid: the aperture
         is upper - lower. None: the faces match perfectly.
-    young : float
-        Young's modulus of both bodies, Pa.
-    poisson : float
-        Poisson's ratio of both bodies, above -1 and at most 0.5.
+    young : float or pair (lower, upper), optional
+        Young's modulus, Pa. One value holds for both bodies; none is needed where nothing elastic is wanted.
+    poisson : float or pair (lower, upper), optional
+        Poisson's ratio, above -1 and at most 0.5.
     block : float or pair (y, x), optional
         Edge length of the sliding block, m, rounded to an integer number of cells; its first cell is
         (n - b)//2 of `lower`. None: the whole face.
@@ -114,7 +115,9 @@ class Crack:
     nominal_area : float
         Area of the block, m2.
     contact_modulus : float
-        E* of the pair, young / (2 (1 - poisson^2)), Pa.
+        E* of the pair, Pa: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+    contact_poisson : float
+        Poisson's ratio of two equal bodies that are as compliant, see `contact.effective_poisson`.
 
     Raises
     ------
@@ -133,20 +136,23 @@ class Crack:
     lower: xr.DataArray
     upper: xr.DataArray | None = None
     _: KW_ONLY
-    young: float
-    poisson: float
+    young: float | Pair | None = None
+    poisson: float | Pair | None = None
     block: Any = None
     basic_friction_angle: float = 35.0
     layout: Block = field(init=False)
 
     def __post_init__(self) -> None:
         with Problems(WHERE) as problems:
-            problems.number("young", self.young, above=0)
-            problems.number("poisson", self.poisson, above=-1, at_most=0.5)
+            for name, bounds in MATERIAL.items():
+                value = getattr(self, name)
+                if problems.numbers(name, value, optional=True, **bounds) and value is not None:
+                    problems.require(float_array(value).size <= 2, name, "one value or (lower, upper)", value)
             problems.number("basic_friction_angle", self.basic_friction_angle, at_least=0, below=90)
             layout = _check_faces(problems, self.lower, self.upper, self.block)
-        for name in ("young", "poisson", "basic_friction_angle"):
-            object.__setattr__(self, name, float(getattr(self, name)))
+        for name in MATERIAL:
+            object.__setattr__(self, name, _one_or_two(getattr(self, name)))
+        object.__setattr__(self, "basic_friction_angle", float(self.basic_friction_angle))
         assert layout is not None
         object.__setattr__(self, "layout", layout)
         object.__setattr__(self, "block", layout.edges)
@@ -156,7 +162,7 @@ class Crack:
         (ny, nx), (by, bx) = self.layout.face_cells, self.layout.cells
         faces = "mated faces" if self.upper is None else "two faces"
         block = f"block of {by} x {bx} cells, {self.block[0]:g} x {self.block[1]:g} m"
-        material = f"young={self.young:g}, poisson={self.poisson:g}"
+        material = ", ".join(f"{name}={_words(getattr(self, name))}" for name in MATERIAL)
         friction = f"basic_friction_angle={self.basic_friction_angle:g}"
         return f"Crack({faces} of {ny} x {nx}, {block}, {material}, {friction})"
 
@@ -167,10 +173,24 @@ class Crack:
 
     @property
     def contact_modulus(self) -> float:
-        """E* of two half-spaces of this material, Pa."""
+        """E* of the two half-spaces, Pa."""
         from fractalcontact.contact import effective_modulus  # a study of rigid faces loads no contact solver
 
-        return float(effective_modulus(self.young, self.poisson))
+        return float(effective_modulus(*self._bodies()))
+
+    @property
+    def contact_poisson(self) -> float:
+        """Poisson's ratio of two equal half-spaces that are as compliant."""
+        from fractalcontact.contact import effective_poisson
+
+        return float(effective_poisson(*self._bodies()))
+
+    def _bodies(self) -> tuple[float, float, float, float]:
+        """Return young and poisson of the lower body, then of the upper one."""
+        with Problems(WHERE) as problems:
+            check_elastic(problems, self)
+        young, poisson = (np.broadcast_to(float_array(getattr(self, name)), 2) for name in MATERIAL)
+        return float(young[0]), float(poisson[0]), float(young[1]), float(poisson[1])
 
     def travel(self, direction: str | float = "E") -> float:
         """Return the greatest shear towards `direction`, m; infinite where the face wraps."""
@@ -189,12 +209,26 @@ class Crack:
         return {
             "lower": plain(self.lower),
             "upper": "mated" if self.upper is None else plain(self.upper),
-            "young": self.young,
-            "poisson": self.poisson,
+            "young": plain(self.young),
+            "poisson": plain(self.poisson),
             "block": list(self.block),
             "block_cells": list(self.layout.cells),
             "basic_friction_angle": self.basic_friction_angle,
         }
+
+
+def _one_or_two(value: Any) -> float | Pair | None:
+    """Return a property of both bodies as one number, or as (lower, upper)."""
+    if value is None:
+        return None
+    numbers = float_array(value)
+    return float(numbers[0]) if numbers.size == 1 else (float(numbers[0]), float(numbers[1]))
+
+
+def _words(value: float | Pair | None) -> str:
+    if isinstance(value, tuple):
+        return f"({value[0]:g}, {value[1]:g})"
+    return "None" if value is None else f"{value:g}"
 
 
 def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Block | None:
@@ -262,6 +296,15 @@ def check_crack(problems: Problems, crack: Any) -> bool:
     return problems.require(
         isinstance(crack, Crack), "crack", expected, f"an object of type {type(crack).__name__}"
     )
+
+
+def check_elastic(problems: Problems, crack: Crack) -> bool:
+    """Check that the bodies of a crack have the constants of elasticity."""
+    given = [
+        problems.require(getattr(crack, name) is not None, f"crack.{name}", "a value: bodies deform", NONE)
+        for name in MATERIAL
+    ]
+    return all(given)
 
 
 def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) -> bool:

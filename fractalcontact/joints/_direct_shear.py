@@ -375,7 +375,7 @@ def _shear_stiffness(joint: WornJoint, position: float, load: float) -> float:
     """
     contact = joint.contact(position)
     closed = [joint.press(contact, part * load).closure for part in (1.0, UNLOADED)]
-    nu, unloading = joint.crack.poisson, closed[0] - closed[1]
+    nu, unloading = joint.crack.contact_poisson, closed[0] - closed[1]
     if unloading <= 0:
         return math.inf
     stiffness = (1.0 - UNLOADED) * load / unloading / joint.crack.nominal_area

@@ -166,7 +166,7 @@ def partial_slip(
         results.append(_pushed(crack, contact, load, forces, towards.azimuth, friction, method, names))
     result = xr.concat([each.expand_dims("shear") for each in results], "shear", join="override")
     result = result.set_coords(LOADS)
-    poisson = crack.poisson
+    poisson = crack.contact_poisson
     result = result.assign(
         nominal_area=crack.nominal_area,
         friction_coefficient=friction,
@@ -212,7 +212,7 @@ def _pushed(
             slipped = fc.contact.partial_slip(
                 contact.surface,
                 contact_modulus=contact.modulus,
-                poisson=crack.poisson,
+                poisson=crack.contact_poisson,
                 friction_coefficient=friction,
                 tangential_force=forces,
                 azimuth=azimuth,
@@ -247,11 +247,11 @@ def _block_stiffness(
 ) -> float:
     """Return the tangential stiffness of the flat block, all of which sticks, N/m."""
     if method == "superposition" or not math.isfinite(contact.stiffness):
-        return contact.stiffness * 2 * (1 - crack.poisson) / (2 - crack.poisson)
+        return contact.stiffness * 2 * (1 - crack.contact_poisson) / (2 - crack.contact_poisson)
     stuck = fc.contact.partial_slip(
         contact.surface * 0.0,
         contact_modulus=contact.modulus,
-        poisson=crack.poisson,
+        poisson=crack.contact_poisson,
         friction_coefficient=1.0,
         normal_force=1.0,
         tangential_force=0.0,

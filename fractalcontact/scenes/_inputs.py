@@ -12,8 +12,9 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
-from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, MaterialTable, Scene, SurfaceTable
 from fractalcontact.scenes._stages import ONE_LOAD, PARTIAL_SLIP, STAGES, public_function
 
 if TYPE_CHECKING:
@@ -94,14 +95,26 @@ def locate(path: str, folder: Path) -> Path:
     raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
 
 
-def contact_options(scene: Scene) -> dict[str, Any]:
-    """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
+def contact_modulus(material: MaterialTable) -> float:
+    """Return E* of the pair of bodies, Pa."""
     from fractalcontact.contact import effective_modulus
 
+    return effective_modulus(*_bodies(material))
+
+
+def _bodies(material: MaterialTable) -> tuple[float, float, float, float]:
+    """Return young and poisson of the lower body, then of the upper one."""
+    young, poisson = np.broadcast_to(float_array(material.young), 2), float_array(material.poisson)
+    poisson = np.broadcast_to(poisson, 2)
+    return float(young[0]), float(poisson[0]), float(young[1]), float(poisson[1])
+
+
+def contact_options(scene: Scene) -> dict[str, Any]:
+    """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
     table, material = scene.table("contact"), scene.material
     options = {key: value for key, value in table.items() if not isinstance(value, dict)}
     if "contact_modulus" not in options and material.young is not None and material.poisson is not None:
-        options["contact_modulus"] = effective_modulus(material.young, material.poisson)
+        options["contact_modulus"] = contact_modulus(material)
     if material.hardness is not None:
         options.setdefault("hardness", material.hardness)
     return options
@@ -116,8 +129,12 @@ def slip_options(scene: Scene) -> dict[str, Any]:
     pressed = contact_options(scene)
     if "contact_modulus" in pressed:
         options.setdefault("contact_modulus", pressed["contact_modulus"])
-    if material.poisson is not None:
+    if isinstance(material.poisson, (int, float)):
         options.setdefault("poisson", material.poisson)
+    elif material.poisson is not None and material.young is not None:
+        from fractalcontact.contact import effective_poisson
+
+        options.setdefault("poisson", effective_poisson(*_bodies(material)))
     if material.basic_friction_angle is not None:
         options.setdefault("friction_coefficient", math.tan(math.radians(material.basic_friction_angle)))
     return options

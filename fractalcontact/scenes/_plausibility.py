@@ -10,7 +10,7 @@ import numpy as np
 
 from fractalcontact.base.errors import ScaleWarning
 from fractalcontact.base.grid import distinct
-from fractalcontact.scenes._inputs import contact_options, spacing_of
+from fractalcontact.scenes._inputs import contact_modulus, contact_options, spacing_of
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import STAGES
 
@@ -49,9 +49,9 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
         yield from _high_pressures(
             "contact", options, float(np.prod(edges)), float(options["contact_modulus"])
         )
-    young, poisson = scene.material.young, scene.material.poisson
-    if scene.want.joints and young is not None and poisson is not None:
-        modulus = 0.5 * young / (1.0 - poisson**2)  # of two bodies of the same material
+    material = scene.material
+    if scene.want.joints and material.young is not None and material.poisson is not None:
+        modulus = contact_modulus(material)
         block = edges if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
         for name in ("closure", "area_dimension", "elastic_dilatancy"):

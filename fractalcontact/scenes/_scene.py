@@ -50,11 +50,12 @@ class SurfaceTable:
 class MaterialTable:
     """`[material]`: elastic constants (Pa, 1), basic friction angle (degree) and hardness (Pa).
 
+    `young` and `poisson` are one value, or that of the lower and that of the upper body.
     `yield_pressure` (Pa, one value or a range) changes no result: true pressures are compared with it.
     """
 
-    young: float | None = _number(above=0.0)
-    poisson: float | None = _number(above=-1.0, at_most=0.5)
+    young: float | Sequence[float] | None = _number(above=0.0)
+    poisson: float | Sequence[float] | None = _number(above=-1.0, at_most=0.5)
     basic_friction_angle: float | None = _number(at_least=0.0, below=90.0)
     hardness: float | None = _number(above=0.0)
     yield_pressure: float | Sequence[float] | None = _number(above=0.0)

@@ -60,6 +60,9 @@ NUMBERS: dict[str, dict[str, Any]] = {
 }
 
 
+RIGID = ("delta_surface", "delta_dimension", "rigid_dilatancy", "decorrelation_length")
+
+
 def load(path: str | os.PathLike[str]) -> Scene:
     """Read a scene and check all that can be checked without its surfaces.
 
@@ -266,8 +269,14 @@ def _check_material(table: Table, problems: Problems) -> None:
     _check_keys(table, MATERIAL_KEYS, "material", problems)
     for entry in fields(MaterialTable):
         if entry.name in table:
-            check = problems.numbers if entry.name == "yield_pressure" else problems.number
+            several = entry.name in ("young", "poisson", "yield_pressure")
+            check = problems.numbers if several else problems.number
             check(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
+    for name in ("young", "poisson"):
+        value = table.get(name)
+        if isinstance(value, list):
+            expected = "one value, or [lower, upper]"
+            problems.require(len(value) in (1, 2), f"material.{name}", expected, value)
 
 
 def _joint_keys() -> tuple[str, ...]:
@@ -316,10 +325,11 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     _check_partial_slip(scene, problems)
     contact, material = scene.table("contact"), scene.table("material")
-    slides = any(
-        name in JOINT_STAGES and not STAGES[f"joints/{name}"].takes_surface for name in scene.want.joints
+    deforms = any(
+        name in JOINT_STAGES and name not in RIGID and not STAGES[f"joints/{name}"].takes_surface
+        for name in scene.want.joints
     )
-    if slides or (scene.wanted("domains") and not scene.is_pressed):
+    if deforms or (scene.wanted("domains") and not scene.is_pressed):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):

@@ -66,3 +66,13 @@ def test_concrete_pair_and_nearly_rigid_body():
     assert fc.contact.effective_modulus(30e9, 0.2) == pytest.approx(30e9 / (2 * 0.96))
     soft_and_rigid = fc.contact.effective_modulus(1e9, 0.3, 1e30, 0.3)
     assert soft_and_rigid == pytest.approx(1e9 / 0.91)
+
+
+def test_poisson_of_a_pair():
+    """By hand: weights 2 (1 + nu)/E of 2.4/30 and 2.6/60 for .2 and .3; and that of the elastic body."""
+    assert fc.contact.effective_poisson(30e9, 0.2, 60e9, 0.3) == pytest.approx(0.235135135, rel=1e-8)
+    assert fc.contact.effective_poisson(1e9, 0.4) == 0.4
+    assert fc.contact.effective_poisson(1e9, 0.4, np.inf) == pytest.approx(0.4, rel=1e-15)
+    assert fc.contact.effective_poisson(np.inf, None, 1e9, 0.3) == pytest.approx(0.3, rel=1e-15)
+    with pytest.raises(InvalidInput, match="poisson2"):
+        fc.contact.effective_poisson(1e9, 0.2, 1e9)

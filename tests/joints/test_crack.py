@@ -53,6 +53,33 @@ def test_contact_modulus_of_two_equal_bodies(make_face):
     assert crack.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
 
 
+def test_two_materials(make_face):
+    """Concrete on rock by hand: .96/30 + .91/60 = .0471667 per GPa."""
+    crack = fc.joints.Crack(make_face(np.zeros((4, 4))), young=(30e9, 60e9), poisson=(0.2, 0.3))
+    assert crack.contact_modulus == pytest.approx(21.2014134e9, rel=1e-8)
+    # stiffness in full stick over that under normal load (Mindlin): S = sum (2 - nu)/G, G = E/(2 (1 + nu))
+    s = 1.8 * 2.4 / 30e9 + 1.7 * 2.6 / 60e9
+    nu = crack.contact_poisson
+    assert 2 * (1 - nu) / (2 - nu) == pytest.approx(4 / s / crack.contact_modulus, rel=1e-12)
+    one = fc.joints.Crack(make_face(np.zeros((4, 4))), young=(30e9, 30e9), poisson=0.2)
+    assert one.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
+    assert one.contact_poisson == pytest.approx(0.2, rel=1e-15)
+    assert "young=(3e+10, 6e+10), poisson=(0.2, 0.3)" in repr(crack)
+    with pytest.raises(ValueError, match=r"young: expected one value or \(lower, upper\)"):
+        fc.joints.Crack(make_face(np.zeros((4, 4))), young=(1e9, 2e9, 3e9), poisson=0.2)
+
+
+def test_rigid_faces_need_no_modulus(make_face):
+    heights = 1e-5 * np.random.default_rng(1).normal(size=(12, 12))
+    rigid = fc.joints.Crack(make_face(heights, 1e-3), block=6e-3)
+    elastic = fc.joints.Crack(make_face(heights, 1e-3), young=30e9, poisson=0.2, block=6e-3)
+    shear = [0.0, 1e-3]
+    found, expected = (fc.joints.dilatancy(crack, shear=shear) for crack in (rigid, elastic))
+    np.testing.assert_array_equal(found.rigid_dilatancy, expected.rigid_dilatancy)
+    with pytest.raises(ValueError, match=r"crack.young: expected a value(.|\n)*crack.poisson"):
+        fc.joints.closure(rigid, shear=1e-3, normal_force=1.0)
+
+
 def test_incompressible_material_is_allowed(make_face):
     crack = fc.joints.Crack(make_face(np.zeros((4, 4))), young=3e6, poisson=0.5)
     assert crack.contact_modulus == pytest.approx(3e6 / (2 * (1 - 0.25)), rel=1e-15)

@@ -2,6 +2,7 @@
 
 import time
 
+import numpy as np
 import pytest
 from study import SOUND, command
 
@@ -160,6 +161,31 @@ def test_incompressible_material_is_allowed(write):
     assert fc.scenes.validate(write(SOUND.replace("poisson = 0.2", "poisson = 0.5"))).material.poisson == 0.5
     with pytest.raises(InvalidInput, match=r"material.poisson: expected .* <= 0.5"):
         fc.scenes.load(write(SOUND.replace("poisson = 0.2", "poisson = 0.51")))
+
+
+def test_two_materials_are_those_of_the_crack(write):
+    text = SOUND.replace("young = 30e9", "young = [30e9, 60e9]").replace(
+        "poisson = 0.2", "poisson = [0.2, 0.3]"
+    )
+    scene = fc.scenes.load(write(text))
+    assert scene.material.young == [30e9, 60e9]
+    tree = fc.scenes.run(scene)
+    shear, force = [1e-4, 4e-4], [1.0, 10.0]
+    face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
+    crack = fc.joints.Crack(face, young=(30e9, 60e9), poisson=(0.2, 0.3), block=2.4e-3)
+    alone = fc.joints.closure(crack, shear=shear, normal_force=force, direction="W")
+    found = tree["joints/closure"].to_dataset()
+    np.testing.assert_allclose(found.closure.squeeze(), alone.closure.squeeze(), rtol=1e-6)
+    with pytest.raises(InvalidInput, match=r"material.young: expected one value, or \[lower, upper\]"):
+        fc.scenes.load(write(SOUND.replace("young = 30e9", "young = [1e9, 2e9, 3e9]")))
+
+
+def test_rigid_faces_need_no_material(write):
+    text = SOUND.replace("young = 30e9", "").replace("poisson = 0.2", "")
+    rigid = text.replace('"closure"', '"delta_dimension"')
+    assert fc.scenes.load(write(rigid)).material.young is None
+    with pytest.raises(InvalidInput, match=r"material.young: expected a value"):
+        fc.scenes.load(write(text))
 
 
 def test_problems_of_the_valid_tables_are_listed_with_those_of_the_file(write):
