@@ -23,8 +23,8 @@ semismooth Newton method or primal-dual active set (Hintermueller, Ito and Kunis
 
 It starts from the superposition, in later steps from its change, whose sets are nearly right, and takes five
 to eight iterations (in large contacts sometimes more, while sets of nodes change slowly) with two or
-three conjugate gradients each. Where a step of (3) does not lower f or the residual, a quarter of it is
-taken, and in the end a projected step along the gradient, which always lowers f.
+three conjugate gradients each. Where a step of (3) hardly lowers the residual, a quarter of it is tried,
+and in the end a projected step along the gradient, which always lowers f.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ FORCING = 0.1  # part of the residual that (3) may leave; with 0.3 and more some
 FORCING_GROWTH = 100.0  # and over the residual, so that the iteration converges faster than linearly
 LAST_SHARE = 0.3  # of the tolerance, beyond which (3) is not solved
 MAX_CUTS = 3
+SLOW = 0.7  # residual over the last one from which a shorter step is tried as well
 STIFFNESS_FORCING = 0.01  # reduction of the error of the stiffness, which is the square of this
 PARALLEL = 1e-12  # relative determinant from which all slipping nodes move along one line
 
@@ -135,6 +136,7 @@ class CoulombSolver:
         system = TangentSystem(self.operator, direction, state.compliance)
         d, moved, inner = system.solve(-state.g, np.eye(2), lambda r, _: self.size(r) <= goal)
         share = 1.0
+        best: CoulombState | None = None
         for _ in range(MAX_CUTS + 1):
             y, v = state.q + share * d, state.u + slip + share * moved
             g = v - multiplier(v, self.bound, direction)[:, None]
@@ -146,10 +148,14 @@ class CoulombSolver:
             if q is not None:
                 trial = self.evaluate(q, self.operator.apply(q), slip)
                 lower = trial.objective < state.objective - 1e-14 * abs(state.objective)
+                if best is not None and not trial.residual < best.residual:
+                    break
                 if lower or trial.residual < state.residual:
-                    return trial, inner
+                    best = trial
+                if trial.residual < SLOW * state.residual:
+                    break
             share /= 4
-        return None, inner
+        return best, inner
 
     def size(self, r: Array) -> float:
         """Return the part of the residual that an error r of the displacement makes."""
