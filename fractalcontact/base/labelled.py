@@ -17,8 +17,17 @@ from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity
 PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method", "azimuth", *CORE_DIMS)
 
 
-def result_faults(data: xr.Dataset, argument: str) -> Iterator[Fault]:
+def tree_faults(value: Any, argument: str) -> Iterator[Fault]:
+    """Yield a fault where a value is not the DataTree of a study."""
+    if not isinstance(value, xr.DataTree):
+        yield argument, "a DataTree, from fractalcontact.scenes.run or fractalcontact.open", value
+
+
+def result_faults(data: Any, argument: str) -> Iterator[Fault]:
     """Yield the faults of the variables whose names the schema has; others are not looked at."""
+    if not isinstance(data, xr.Dataset):
+        yield argument, "a Dataset, the result of a public function", data
+        return
     for dim in PATH_DIMS:
         if data.sizes.get(dim) == 0:
             yield f"{argument}.{dim}", "at least one entry", "none"

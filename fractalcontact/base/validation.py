@@ -314,19 +314,14 @@ class Problems:
 
     def tree(self, argument: str, value: Any) -> bool:
         """Check for the DataTree of a study."""
-        import xarray as xr
+        from fractalcontact.base.labelled import tree_faults  # loads xarray
 
-        expected = "a DataTree, from fractalcontact.scenes.run or fractalcontact.open"
-        return self.require(isinstance(value, xr.DataTree), argument, expected, value)
+        return self._add_all(tree_faults(value, argument))
 
     def result(self, argument: str, data: Any) -> bool:
         """Check that a labelled result has the dims, types and units of the schema."""
-        import xarray as xr
-
         from fractalcontact.base.labelled import result_faults  # loads xarray
 
-        if not isinstance(data, xr.Dataset):
-            return self.require(False, argument, "a Dataset, the result of a public function", data)
         return self._add_all(result_faults(data, argument))
 
     def _add_all(self, faults: Iterable[tuple[str, str, object]]) -> bool:
