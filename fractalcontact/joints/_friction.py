@@ -314,8 +314,8 @@ def _dependence(secants: xr.DataArray) -> str:
     if change <= NEGLIGIBLE:
         return f"changes by at most {change:.2g} degree when the distance is halved to {shortest_text}"
     return (
-        f"changes by up to {change:.3g} degree when the distance is halved to {shortest_text}, the "
-        "shortest that the shears resolve: no limit is reached; compare only peaks over equal distances"
+        f"changes by up to {change:.3g} degree when the distance is halved to {shortest_text}; the "
+        "shears resolve no further halving: no limit is reached; compare only peaks over equal distances"
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._directions import (
     direction_name,
@@ -92,8 +93,18 @@ def friction(
         axes[0].set_ylim(top=LOCKED)
         remarks.append(f"locked above {LOCKED:g}°")
     axes[0].set_title(", ".join(remarks))
+    if len(shown) > 1:
+        axes[1].set_title(_slope_lengths(data))
     _style.side_legend(axes[-1], entries, title=title)
     return _style.root_figure(sheet)
+
+
+def _slope_lengths(data: xr.Dataset) -> str:
+    """Return over which lengths of shear the slopes of the dilatancy were taken; empty where not stated."""
+    lengths = np.atleast_1d(data["smoothing"].values).astype(float) if "smoothing" in data else np.empty(0)
+    lengths = lengths[np.isfinite(lengths)]
+    ends = [quantity_text(end, "m") for end in (lengths.min(), lengths.max())] if lengths.size else []
+    return "slopes over " + " to ".join(dict.fromkeys(ends)) if ends else ""
 
 
 def _draw_curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any]) -> None:

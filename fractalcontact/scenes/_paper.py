@@ -184,7 +184,12 @@ CLAIMS = (
         "10 % less at the finest than at the coarsest, at 2.5, 25 and 75 MPa and every shear",
         findings.resolution,
     ),
-    Claim("4", "domain: dimension below 2", "below 1.95 at every shear and force", findings.domain_lacunar),
+    Claim(
+        "4",
+        "domain: dimension below 2",
+        "below 1.95 at every shear and force, and so are the 95 % intervals at the greatest force",
+        findings.domain_lacunar,
+    ),
     Claim(
         "4",
         "... from 0, single points",

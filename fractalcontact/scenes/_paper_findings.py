@@ -170,9 +170,8 @@ def _cells(closure: xr.Dataset) -> float:
 
 
 def _domain(tree: xr.DataTree) -> Closure | None:
-    return read_closure(
-        tree, "domains/box_dimension", "box_dimension", "null_dimension", "differs_from_random"
-    )
+    names = ("box_dimension", "ci_high", "null_dimension", "differs_from_random")
+    return read_closure(tree, "domains/box_dimension", *names)
 
 
 def domain_lacunar(tree: xr.DataTree) -> Finding | None:
@@ -180,7 +179,12 @@ def domain_lacunar(tree: xr.DataTree) -> Finding | None:
     if domain is None:
         return None
     largest = float(np.nanmax(domain.values["box_dimension"]))
-    return finding(f"at most {largest:.2f}", largest < 2.0 - SMALLEST_GAP)
+    ends = domain.values["ci_high"][:, -1]
+    if not np.isfinite(ends).any():
+        return finding(f"at most {largest:.2f}", largest < 2.0 - SMALLEST_GAP)
+    end = float(np.nanmax(ends))
+    values = f"at most {largest:.2f}; at the greatest force the intervals reach {end:.2f}"
+    return finding(values, max(largest, end) < 2.0 - SMALLEST_GAP)
 
 
 def domain_pointwise(tree: xr.DataTree) -> Finding | None:

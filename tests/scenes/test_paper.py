@@ -165,6 +165,18 @@ def test_claim_that_follows_from_the_model_has_no_verdict(falsification):
     assert len(CLAIMS) == 30
 
 
+def test_intervals_that_reach_two_are_no_evidence_for_less(study):
+    tree = study("smooth").copy()
+    boxes = tree["domains/box_dimension"].to_dataset()
+    for end, verdict in ((1.8, "yes"), (2.0, "no")):
+        tree["domains/box_dimension"] = boxes.assign(
+            box_dimension=xr.full_like(boxes["box_dimension"], 1.5),
+            ci_high=xr.full_like(boxes["ci_high"], end),
+        )
+        expected = f"at most 1.50; at the greatest force the intervals reach {end:.2f}"
+        assert findings(tree)["domain: dimension below 2"] == (expected, verdict)
+
+
 def test_results_of_a_plane(study):
     """Closed forms: a plane of slope .03 that rises towards E and S, on which the mated faces slide."""
     plane = findings(study("plane"))
@@ -174,7 +186,10 @@ def test_results_of_a_plane(study):
     assert plane["... because of the mean slope"] == ("E +0.030, S +0.030; mean E +0.030, S +0.030", "yes")
     assert plane["... then a plateau (W, N)"][1] == "no"
     assert plane["... and is nearly the same at .4 and .8 mm"][0].startswith("100.00 and 100.00 %")
-    assert plane["domain: dimension below 2"] == ("at most 2.00", "no")
+    assert plane["domain: dimension below 2"] == (
+        "at most 2.00; at the greatest force the intervals reach 2.00",
+        "no",
+    )
     # slope 35 degree downhill: tan(35 degree - atan(.03))
     expected = f"{np.tan(np.radians(35) - np.arctan(0.03)):.2f}"
     assert plane["codes: coefficient of friction 1.0 to 1.4"][0] == (
