@@ -152,6 +152,6 @@ def test_dim_named_like_a_result_is_refused(name, dim):
 
 
 def test_attributes_that_no_file_holds_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"result: expected names, values and attributes that a NetCDF"):
+    with pytest.raises(ValueError, match=r"height.operator: expected text, a number or a list of them"):
         fc.save(with_user_coords(rough()), tmp_path / "face.nc")
     assert list(tmp_path.iterdir()) == []

@@ -247,7 +247,8 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
         require_unpacked("fractalcontact.open", path.name, unpacked, limit)
         for group in _groups(file):
             store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
-            groups[group.path] = xr.open_dataset(store).load()
+            # `open_dataset` would import every library on this machine that adds a file format to xarray
+            groups[group.path] = xr.decode_cf(store).load()
             groups[group.path].set_close(None)
     return groups
 

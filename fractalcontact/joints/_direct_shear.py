@@ -87,11 +87,13 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         problems.add("direction", expected, towards.name)
         return
     cells = turning_points / step
-    moves = bool((np.diff(np.rint(cells)) != 0).all())
-    problems.require(moves, "path", "positions other than the one before, the first not 0", turning_points)
     whole = bool((np.abs(cells - np.rint(cells)) <= 1e-6 * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
-    problems.require(whole, "path", expected, turning_points.tolist())
+    if problems.require(whole, "path", expected, turning_points.tolist()):
+        moves = bool((np.diff(np.rint(cells)) != 0).all())
+        problems.require(
+            moves, "path", "positions other than the one before, the first not 0", turning_points
+        )
     y, x = towards.unit
     for reach, unit in ((turning_points.max(), (y, x)), (-turning_points.min(), (-y, -x))):
         travel = crack.layout.travel(unit)

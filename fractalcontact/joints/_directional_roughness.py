@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import brentq
 
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import float_array
@@ -183,6 +182,8 @@ def _fitted_shape(remainder: Array, share: Array) -> float:
 
     The derivative of the sum of squares over C is zero.
     """
+    from scipy.optimize import brentq  # a scene reads the arguments of all joint functions
+
     log = np.log(remainder)
 
     def derivative(shape: float) -> float:

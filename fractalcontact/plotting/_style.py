@@ -119,6 +119,9 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
     elif words[0] == "float":
         plain = is_real(value) or value is None  # a labelled number would carry its dims into the figure
         problems.number(name, value if plain else Words(type(value).__name__), optional=optional)
+    elif words[0] == "Sequence[str]":
+        valid = isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
+        problems.require(valid or (optional and value is None), name, "a sequence of words", value)
     elif words[0].startswith(("Sequence[", "tuple[")) and not (optional and value is None):
         pair = words[0].startswith("tuple[")
         expected = "two numbers" if pair else "a sequence of numbers"

@@ -50,11 +50,14 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
             "contact", options, float(np.prod(edges)), float(options["contact_modulus"])
         )
     material = scene.material
-    if scene.want.joints and material.young is not None and material.poisson is not None:
+    stages = [
+        name for name in ("closure", "area_dimension", "elastic_dilatancy") if name in scene.want.joints
+    ]
+    if stages and material.young is not None and material.poisson is not None:
         modulus = contact_modulus(material)
         block = edges if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
-        for name in ("closure", "area_dimension", "elastic_dilatancy"):
+        for name in stages:
             loads = scene.stage_options(STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
             yield from _high_pressures(f"joint.{name}", loads, area, modulus)
 

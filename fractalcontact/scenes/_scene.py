@@ -132,6 +132,9 @@ class Scene:
     name: str
     tables: Table
     folder: Path
+    checked: Table | None = field(
+        default=None, repr=False, compare=False
+    )  # a copy of the tables that were valid
 
     def table(self, name: str) -> Table:
         """Return one table as parsed; empty if the scene has none."""

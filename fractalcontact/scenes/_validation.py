@@ -244,11 +244,10 @@ def _contact_options(scene: Scene) -> dict[str, Any]:
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
     """Validate a call that has all arguments it needs; what is missing was noted before."""
-    allowed, required = arguments_of(name)
-    if "keep" in options and "keep" not in inspect.signature(public_function(name)).parameters:
-        del options["keep"]  # an unknown key, which was noted before
-    options = {key: value for key, value in options.items() if key in (*allowed, "keep")}
-    if required <= set(options):
+    known = inspect.signature(public_function(name)).parameters  # an unknown key was noted before
+    options = {key: value for key, value in options.items() if key in known}
+    others = list(known.values())[len(arguments) :]
+    if all(each.name in options for each in others if each.default is each.empty):
         public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base import unpacked_size
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 
 NX, NY, STEP = 12, 9, 0.5
@@ -257,9 +258,10 @@ def test_second_file_in_the_plane_of_the_first(tmp_path):
     np.testing.assert_allclose(gap[np.isfinite(gap)], 0.02 / np.hypot(1.0, 0.5), atol=1e-12)
 
 
-def test_gzip_that_unpacks_without_bound_is_refused(tmp_path):
-    (tmp_path / "a.xyz.gz").write_bytes(gzip.compress(bytes(1 << 27)))
-    with pytest.raises(UnreadableFile, match="unpack it first"):
+def test_gzip_that_unpacks_without_bound_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(unpacked_size, "SMALL", 1 << 20)
+    (tmp_path / "a.xyz.gz").write_bytes(gzip.compress(bytes(1 << 26)))
+    with pytest.raises(UnreadableFile, match="MiB when unpacked"):
         fc.surfaces.read(tmp_path / "a.xyz.gz")
 
 
