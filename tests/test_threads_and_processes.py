@@ -17,6 +17,7 @@ def test_every_public_function_has_a_call():
     assert not (set(every_call.CALLS) | every_call.LEFT_OUT) - {*every_call.names(), *every_call.LEFT_OUT}
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("modes", MODES, ids=" and ".join)
 def test_every_function_returns_the_same_numbers(modes):
     """The numbers of calls one after another; no call hangs, fails or ends the process."""
