@@ -80,20 +80,17 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     groups = _as_file(result)
     with Problems(where) as problems:
         _check_words(problems, groups)
-    temporary = unfinished(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
-        _write(groups, temporary)
-        temporary.replace(target)
+        with written_whole(target) as temporary:
+            _write(groups, temporary)
     except (TypeError, ValueError, AttributeError) as error:  # the last of netCDF4, for attributes
         expected = "names, values and attributes that a NetCDF file can hold"
         raise InvalidInput(where, [f"result: expected {expected}, got: {error}"]) from error
     except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as a RuntimeError
         reason = _failure_reason(target.parent, error)
         raise InvalidInput(where, [f"path: {target.name!r} cannot be written here: {reason}"]) from error
-    finally:
-        temporary.unlink(missing_ok=True) if target.parent.is_dir() else None
     return target
 
 
@@ -101,17 +98,14 @@ def replace_attribute(path: Path, name: str, value: str) -> None:
     """Replace a global attribute of a file, in a copy that takes its place when it is complete."""
     import netCDF4
 
-    copy = unfinished(path)
     try:
-        shutil.copyfile(path, copy)
-        with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
-            file.setncattr(name, value)
-        copy.replace(path)
+        with written_whole(path) as copy:
+            shutil.copyfile(path, copy)
+            with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
+                file.setncattr(name, value)
     except (OSError, RuntimeError) as error:
         reason = _failure_reason(path.parent, error)
         raise InvalidInput(SAVE, [f"path: {path.name!r} cannot be written here: {reason}"]) from error
-    finally:
-        copy.unlink(missing_ok=True)
 
 
 def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
@@ -330,7 +324,19 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
     return dataset
 
 
-def unfinished(target: Path) -> Path:
+@contextlib.contextmanager
+def written_whole(target: Path) -> Iterator[Path]:
+    """Yield a temporary name to write to; the file gets its own name when it is complete."""
+    temporary = _unfinished(target)
+    try:
+        yield temporary
+        temporary.replace(target)
+    finally:
+        if target.parent.is_dir():
+            temporary.unlink(missing_ok=True)
+
+
+def _unfinished(target: Path) -> Path:
     """Return the temporary name under which this thread of this process writes a file."""
     place = f"{_machine()}.{threading.get_native_id()}.{os.getpid()}"
     return target.with_name(f".{target.name}.{place}{PARTIAL}")

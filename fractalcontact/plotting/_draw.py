@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from fractalcontact.base.netcdf import unfinished
+from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems
@@ -213,10 +213,6 @@ def _write(figure: Figure, target: Path) -> Path:
     if layout is not None:
         layout.execute(figure)
         figure.set_layout_engine("none")
-    temporary = unfinished(target)
-    try:
+    with written_whole(target) as temporary:
         canvas.print_png(temporary)  # type: ignore[no-untyped-call]
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
     return target

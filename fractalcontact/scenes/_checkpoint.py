@@ -23,7 +23,7 @@ import xarray as xr
 
 import fractalcontact
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.base.netcdf import clear_partial, unfinished
+from fractalcontact.base.netcdf import clear_partial, written_whole
 from fractalcontact.base.schema import encoded
 from fractalcontact.scenes._inputs import contact_options, locate, slip_options
 from fractalcontact.scenes._scene import Scene
@@ -104,20 +104,16 @@ def _write_part(result: xr.Dataset, path: Path) -> None:
         header["variables"].append([str(name), [str(dim) for dim in variable.dims], attributes])
     text = json.dumps(header)
     checksum = _checksum(path.stem, text, arrays)
-    temporary = unfinished(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(path.parent)
-        with temporary.open("wb") as file:
+        with written_whole(path) as temporary, temporary.open("wb") as file:
             np.savez(file, **{_HEADER: np.array([text, checksum])}, **arrays)  # type: ignore[arg-type]
-        temporary.replace(path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidInput(
             "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
         ) from error
-    finally:
-        temporary.unlink(missing_ok=True) if path.parent.is_dir() else None
 
 
 def _read_part(path: Path) -> xr.Dataset:

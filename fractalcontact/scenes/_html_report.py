@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.netcdf import open as open_result
-from fractalcontact.base.netcdf import unfinished
+from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.tables import fixed_width
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
@@ -124,12 +124,8 @@ def _study(path: str | os.PathLike[str]) -> xr.DataTree:
 
 def _write(text: str, target: Path) -> Path:
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = unfinished(target)
-    try:
+    with written_whole(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
     return target
 
 

@@ -20,7 +20,7 @@ from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._autotune import Choice, choose
-from fractalcontact.scenes._caveats import MEMBER, caveats
+from fractalcontact.scenes._caveats import caveats, of_member
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
@@ -234,13 +234,10 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     """Write the page about the joint as PDF; of an ensemble that of its first member."""
     from fractalcontact import plotting
 
-    first = tree.map_over_datasets(lambda dataset: dataset.isel({MEMBER: 0}, missing_dims="ignore"))
-    first.attrs = dict(tree.attrs)
-    temporary = netcdf.unfinished(target)
-    with DRAWING_LOCK:
+    first = of_member(tree, 0)
+    with DRAWING_LOCK, netcdf.written_whole(target) as temporary:
         page = plotting.datasheet(first, notes=caveats(first))
         page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
-    temporary.replace(target)
 
 
 @contextmanager

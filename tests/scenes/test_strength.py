@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.errors import InvalidInput
 
 SCENE = """
 [surface]
@@ -116,3 +117,19 @@ def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
         tmp_path / "out" / "tables" / "joints_closure_by_shear_step.csv", delimiter=",", names=True
     )
     assert curves.size == tree["joints/closure"].sizes["step"]
+
+
+def test_datasheet_that_fails_leaves_no_incomplete_file(scene, tmp_path, monkeypatch):
+    text = SCENE.replace("figures = true", "datasheet = true").replace(
+        "[joint.direct_shear]", "shear = 2e-4\n[joint.direct_shear]"
+    )
+
+    def full_disk(*arguments, **options):
+        tmp_path.joinpath("out", arguments[1].name).write_bytes(b"%PDF")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", full_disk)
+    with pytest.raises(InvalidInput, match="No space left"):
+        fc.scenes.run(scene(text), out=tmp_path / "out", progress=False)
+    names = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
+    assert names == {"result.nc", "report.html"}
