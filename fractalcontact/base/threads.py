@@ -85,7 +85,9 @@ def in_bands(function: Callable[..., None], count: int, work: int, *arguments: A
     *arguments
         Further arguments of the function.
     """
-    threads = min(thread_count(), count, max(1, work // SHARE))
+    threads = min(count, work // SHARE)
+    if threads > 1:  # only then: reading the environment takes as long as a small loop
+        threads = min(threads, thread_count())
     if threads <= 1:
         function(0, count, *arguments)
         return

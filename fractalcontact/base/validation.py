@@ -207,7 +207,9 @@ class Problems:
         """Check for one of the allowed words; `optional` allows None."""
         words = tuple(allowed)
         valid = (isinstance(value, str) and value in words) or (optional and value is None)
-        return self.require(valid, argument, f"one of {_quoted(words)}{did_you_mean(value, words)}", value)
+        if valid:
+            return True
+        return self.require(False, argument, f"one of {_quoted(words)}{did_you_mean(value, words)}", value)
 
     def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> bool:
         """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""

@@ -328,8 +328,8 @@ class ConstrainedCG:
     def kkt_residual(self, evaluation: Evaluation) -> tuple[GapSums, GapSums, float]:
         """Return the gaps that should vanish, inside the free set and outside of it, and the residual (2)."""
         state = (self.h, self.u, self.p, self.p_max, self.dtype(evaluation.closure))
-        sums, maxima = self.pass_sums_and_maxima(_kernels.residual_sums, *state)
-        overlap = float(maxima[1])
+        sums = self.pass_sums(_kernels.residual_sums, *state)
+        overlap = float(self.block_sums[:, 1].max())
         inside, outside = GapSums(*sums[2:5]), GapSums(*sums[5:8])
         if evaluation.force <= 0:
             return inside, outside, float(overlap > 0)
@@ -481,13 +481,9 @@ class ConstrainedCG:
 
     def pass_sums(self, kernel: Any, *arguments: Any) -> Array:
         """Run a kernel over all blocks and add up its sums, block after block."""
-        return self.pass_sums_and_maxima(kernel, *arguments)[0]
-
-    def pass_sums_and_maxima(self, kernel: Any, *arguments: Any) -> tuple[Array, Array]:
-        """Run a kernel over all blocks; return the sums of its columns over the blocks, and their maxima."""
         rows = self.preconditioner.bin_rows
         in_bands(kernel, self.blocks, self.h.size, rows, *arguments, self.block_sums)
-        return np.asarray(self.block_sums.sum(axis=0)), np.asarray(self.block_sums.max(axis=0))
+        return np.asarray(self.block_sums.sum(axis=0))
 
 
 def subtract_step(start: int, stop: int, x: Array, t: Array, tau: Any) -> None:

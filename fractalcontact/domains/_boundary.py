@@ -97,7 +97,9 @@ def boundary_dimension(
 def analyse(planes: Planes) -> xr.Dataset:
     """Return the result of `boundary_dimension` for planes, without labels."""
     counts = parallel_map(
-        lambda k: count_pairs(planes.cells[k], planes.valid_of(k), planes.grid), range(planes.count)
+        lambda k: count_pairs(planes.cells[k], planes.valid_of(k), planes.grid),
+        range(planes.count),
+        planes.plane_size,
     )
     fits = np.array([fit_boundary_dimension(pairs, differing) for pairs, differing in counts])
     dimension, half_width = fits.reshape(-1, 2).T
@@ -105,6 +107,7 @@ def analyse(planes: Planes) -> xr.Dataset:
         parallel_map(
             lambda k: has_interiors(planes.cells[k], planes.valid_of(k), planes.grid, dimension[k]),
             range(planes.count),
+            planes.plane_size,
         ),
         bool,
     )

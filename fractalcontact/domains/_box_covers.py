@@ -51,40 +51,51 @@ def cover_curve(planes: Planes, sizes: Array, cover: str) -> Curve:
 
 def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
     """Fewest boxes over all offsets of the grid."""
+    axes = tuple(zip(planes.grid.shape, planes.grid.periodic, strict=True))
+    bands = {size: tuple(_bands(n, size, wraps) for n, wraps in axes) for size in map(int, sizes)}
 
     def fewest(task: tuple[Array, int]) -> tuple[int, int]:
-        count, area = _counts_by_offset(task[0], task[1], planes.grid.periodic)
+        cells, size = task
+        count, area = _counts_by_offset(cells, size, *bands[size], wrap_x=planes.grid.periodic[1])
         return int(count.min()), int(area.min())
 
-    tasks = [(cells, int(size)) for cells in planes.cells for size in sizes]
-    values = np.array(parallel_map(fewest, tasks), np.int64).reshape(planes.count, sizes.size, 2)
+    tasks = [(cells, size) for cells in planes.cells for size in bands]
+    values = np.array(parallel_map(fewest, tasks, planes.plane_size), np.int64).reshape(
+        planes.count, sizes.size, 2
+    )
     return Curve(sizes, values[..., 0], values[..., 1].astype(float))
 
 
-def _counts_by_offset(cells: Array, size: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
-    """Return the boxes that meet the set, and their area in cells, for every offset of the grid (y, x)."""
+def _counts_by_offset(
+    cells: Array, size: int, row_bands: Array, column_bands: Array, *, wrap_x: bool
+) -> tuple[Array, Array]:
+    """Return the boxes that meet the set, and their area in cells, for every offset of the grid (y, x).
+
+    The bands are those of `_bands` for the rows and for the columns.
+    """
     nx = cells.shape[1]
-    row_bands, column_bands = (_bands(n, size, wraps) for n, wraps in zip(cells.shape, periodic, strict=True))
     # ascending, so that the column sums of a band follow from those of the band before it
     row_bands = row_bands[np.lexsort((row_bands[:, 1], row_bands[:, 0]))]
     is_full = column_bands[:, 1] - column_bands[:, 0] == size
     count, area = np.zeros((2, size, size), np.int64)
     summed_rows = np.zeros((2, 2), np.int64)
     columns = np.zeros((3, nx), np.int32)
-    prefix = np.zeros((2, nx + 1 + (2 * size if periodic[1] else 0)), np.int32)
+    prefix = np.zeros((2, nx + 1 + (2 * size if wrap_x else 0)), np.int32)
     met, lost = np.zeros((2, size, int(is_full.sum())), np.int32)
     count_boxes_in_bands(
         cells, size, row_bands, column_bands[~is_full], summed_rows, columns, prefix, met, lost, count, area
     )
-    count += _sum_by_offset(met, size)
-    area += size * (size * _sum_by_offset(met, size) - _sum_by_offset(lost, size))
+    full = _sum_by_offset(met, size)
+    count += full
+    area += size * (size * full - _sum_by_offset(lost, size))
     return count, area
 
 
 def _sum_by_offset(values: Array, size: int) -> Array:
     """Add up the positions of boxes that belong to the same offset in x."""
-    ends = -values.shape[1] % size
-    padded = np.pad(values, ((0, 0), (0, ends)))
+    positions = values.shape[1]
+    padded = np.zeros((size, positions + -positions % size), values.dtype)
+    padded[:, :positions] = values
     return np.asarray(padded.reshape(size, -1, size).sum(1, dtype=np.int64))
 
 
@@ -118,7 +129,9 @@ def _mean_cover(planes: Planes, sizes: Array) -> Curve:
     """
     largest = int(sizes.max())
     positions = parallel_map(
-        lambda cells: _positions_that_meet(cells, largest, planes.grid.periodic), planes.cells
+        lambda cells: _positions_that_meet(cells, largest, planes.grid.periodic),
+        planes.cells,
+        planes.plane_size,
     )
     every, folded = (np.array([pair[k][sizes] for pair in positions], float) for k in (0, 1))
     return Curve(sizes, every / sizes.astype(float) ** 2, folded)
@@ -205,7 +218,9 @@ def _aligned_cover(planes: Planes, sizes: Array) -> Curve:
             )
         return [int(np.count_nonzero(levels[int(size)].view(np.bool_))) for size in sizes]
 
-    values = np.array(parallel_map(counts, planes.cells), np.int64).reshape(planes.count, sizes.size)
+    values = np.array(parallel_map(counts, planes.cells, planes.plane_size), np.int64).reshape(
+        planes.count, sizes.size
+    )
     return Curve(sizes, values, values * sizes.astype(float) ** 2)
 
 

@@ -125,7 +125,9 @@ def label_planes(
     """Find the islands of every plane; see `label_plane`."""
     periodic = planes.grid.periodic
     return parallel_map(
-        lambda cells: label_plane(cells, connectivity, periodic, keep=keep, detailed=detailed), planes.cells
+        lambda cells: label_plane(cells, connectivity, periodic, keep=keep, detailed=detailed),
+        planes.cells,
+        planes.plane_size,
     )
 
 

@@ -128,7 +128,7 @@ def gliding_lacunarity(planes: Planes, sizes: Array) -> Array:
     if planes.valid is None and all(planes.grid.periodic) and sizes.size > MANY_SIZES:
         return np.array([_lacunarity_from_pairs(cells, sizes) for cells in planes.cells])
     tasks = [(plane, int(size)) for plane in range(planes.count) for size in sizes]
-    values = parallel_map(lambda task: _lacunarity_at_size(planes, *task), tasks)
+    values = parallel_map(lambda task: _lacunarity_at_size(planes, *task), tasks, planes.plane_size)
     return np.array(values).reshape(planes.count, sizes.size)
 
 

@@ -27,6 +27,7 @@ S = TypeVar("S")
 R = TypeVar("R")
 
 RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius")  # dims that results add
+CELLS_PER_THREAD = 1 << 18  # a pass over so many takes as long as to start a pool of threads
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
 
 
@@ -50,6 +51,11 @@ class Planes:
     def count(self) -> int:
         """Number of planes."""
         return int(self.cells.shape[0])
+
+    @property
+    def plane_size(self) -> int:
+        """Number of cells of a plane."""
+        return int(self.cells[0].size) if self.count else 0
 
     @cached_property
     def observed(self) -> Array:
@@ -246,14 +252,21 @@ def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
     return coords
 
 
-def parallel_map(function: Callable[[S], R], items: Iterable[S]) -> list[R]:
-    """Apply a function that releases the interpreter lock to all items, on several threads, in order."""
+def parallel_map(function: Callable[[S], R], items: Iterable[S], cells: int) -> list[R]:
+    """Apply a function that releases the interpreter lock to all items, in order.
+
+    Each item takes a pass over so many cells. On several threads where that is worth their start, some items
+    at a time: to hand over one takes as long as a pass over a thousand cells.
+    """
     items = list(items)
-    threads = min(thread_count(), len(items))
+    threads = min(thread_count(), len(items), len(items) * cells // CELLS_PER_THREAD)
     if threads < 2:
         return [function(item) for item in items]
+    size = max(1, min(len(items) // (4 * threads), CELLS_PER_THREAD // max(1, cells)))
+    chunks = [items[start : start + size] for start in range(0, len(items), size)]
     with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(function, items))
+        results = pool.map(lambda chunk: [function(item) for item in chunk], chunks)
+        return [result for chunk in results for result in chunk]
 
 
 def check_box_sizes(problems: Problems, argument: str, sizes: Any, longest: int) -> bool:

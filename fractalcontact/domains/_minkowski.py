@@ -97,7 +97,9 @@ def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:
     r = default_sizes(planes.grid.shape) / 2.0 if radii is None else np.unique(float_array(radii))
     area = np.array(
         parallel_map(
-            lambda k: dilated_area(planes.cells[k], planes.valid_of(k), planes.grid, r), range(planes.count)
+            lambda k: dilated_area(planes.cells[k], planes.valid_of(k), planes.grid, r),
+            range(planes.count),
+            planes.plane_size,
         )
     )
     numbers = zip(planes.occupied, planes.observed, strict=True)
