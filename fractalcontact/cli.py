@@ -249,9 +249,14 @@ def _error_against_time(options: argparse.Namespace) -> int:
             from fractalcontact.plotting import error_against_time
 
             written.append(f"{name}.png")
-            error_against_time(part.to_dataset()).savefig(Path(options.out) / written[-1], dpi=150)
+            _write_figure(error_against_time(part.to_dataset()), Path(options.out) / written[-1])
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     return _accuracy_exit_code(stop)
+
+
+def _write_figure(axes: Any, path: Path) -> None:
+    """Write the figure of some Axes as PNG."""
+    axes.flat[0].figure.savefig(path, dpi=150)
 
 
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
@@ -295,7 +300,7 @@ def _estimators(options: argparse.Namespace) -> int:
     if file is not None:
         from fractalcontact.plotting import estimator_errors
 
-        estimator_errors(result).savefig(file.with_suffix(".png"), dpi=150)
+        _write_figure(estimator_errors(result), file.with_suffix(".png"))
         print(f"\nwritten to {options.out}: estimators.nc, estimators.png")
     return 0
 

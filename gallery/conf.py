@@ -13,7 +13,11 @@ if "FRACTALCONTACT_GALLERY" not in os.environ:
     os.environ["FRACTALCONTACT_GALLERY"] = tempfile.mkdtemp(prefix="fractalcontact-gallery-")
     atexit.register(shutil.rmtree, os.environ["FRACTALCONTACT_GALLERY"], ignore_errors=True)
 
+import matplotlib.pyplot as plt
+
 import fractalcontact
+
+plt.style.use("fractalcontact.plotting.report")
 
 project = "fractalcontact"
 author = "The fractalcontact developers"
@@ -48,7 +52,6 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"(conf|site_parts|shared_study|__init__)\.py$",
     "within_subsection_order": "ExampleTitleSortKey",
     "nested_sections": False,
-    "image_scrapers": ("site_parts",),
     "reset_modules": (),
     "abort_on_example_error": True,
     "only_warn_on_example_error": False,

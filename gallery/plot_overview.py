@@ -5,7 +5,7 @@ From a surface to its contact domain
 A rough surface, the pressure where a flat touches it, and the islands of contact.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 from PIL import Image
 from shared_study import HERE
 
@@ -26,7 +26,7 @@ print(islands)
 # %%
 # Three maps side by side.
 
-overview = Figure(figsize=(12.4, 3.7), layout="constrained")
+overview = plt.figure(figsize=(12.4, 3.7), layout="constrained")
 left, middle, right = overview.subplots(1, 3)
 fc.plotting.surface(surface, title="rough surface", ax=left)
 fc.plotting.field(pressed["pressure"], title="contact pressure under load", ax=middle)

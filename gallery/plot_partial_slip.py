@@ -7,8 +7,8 @@ of the contact spots slip first, small spots as a whole; what sticks under a tan
 contact under the normal force P - Q/mu.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import fractalcontact as fc
 
@@ -38,7 +38,7 @@ stick = (sheared["slip_state"] == 1).isel(step=[0, 3, 6, 9])
 dimensions = fc.domains.box_dimension(stick)
 print(dimensions["box_dimension"].values)
 
-figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+figure = plt.figure(figsize=(7.2, 3.2), layout="constrained")
 left, right = figure.subplots(1, 2)
 left.plot(sheared["tangential_displacement"] * 1e6, sheared["tangential_force"], c="#0072B2")
 left.set_xlabel("tangential displacement (µm)")

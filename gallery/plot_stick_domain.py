@@ -9,8 +9,8 @@ under the normal force P - Q/mu. That needs bodies without Poisson effect. Here 
 with a Poisson's ratio of .3, and its measures, stand beside it.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import fractalcontact as fc
 
@@ -59,7 +59,7 @@ measured = {
     name: (fc.domains.box_dimension(planes, scales=SCALES), fc.domains.lacunarity(planes))
     for name, planes in sets.items()
 }
-figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+figure = plt.figure(figsize=(7.2, 3.2), layout="constrained")
 left, right = figure.subplots(1, 2)
 styles = {"superposition": "o-", "full": "s--", "contact at P - Q/mu": "k:"}
 for name, (boxes, gliding) in measured.items():

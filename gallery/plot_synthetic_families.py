@@ -8,7 +8,7 @@ exactly. Spectral surfaces are periodic and have cut-offs, midpoint displacement
 surfaces are sums of few waves.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import fractalcontact as fc
 
@@ -29,7 +29,7 @@ def generate(family, seed):
 surfaces = {family: generate(family, 1) for family in SIZE}
 print(surfaces["fbm"])
 
-maps = Figure(figsize=(9.2, 7.4), layout="constrained")
+maps = plt.figure(figsize=(9.2, 7.4), layout="constrained")
 for ax, (family, surface) in zip(maps.subplots(2, 2).ravel(), surfaces.items(), strict=True):
     fc.plotting.surface(surface, title=family, ax=ax)
 
@@ -43,7 +43,7 @@ for family in SIZE:
     curves = [fc.dimensions.variogram(generate(family, seed), max_lag=N * SPACING / 3) for seed in range(12)]
     means[family] = sum(curve.variogram for curve in curves) / 12
 
-variograms = Figure(figsize=(9.2, 3.6), layout="constrained")
+variograms = plt.figure(figsize=(9.2, 3.6), layout="constrained")
 left, right = variograms.subplots(1, 2)
 for ax in (left, right):
     ax.set_prop_cycle(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])  # for any colour vision

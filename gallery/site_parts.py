@@ -1,4 +1,4 @@
-"""Extensions of sphinx for this site: figures without pyplot, and tables made from the package."""
+"""Extensions of sphinx for this site: tables made from the package."""
 
 import re
 from pathlib import Path
@@ -98,23 +98,3 @@ def _row(cells):
         text = nodes.Text(cell) if isinstance(cell, str) else cell
         row += nodes.entry("", nodes.paragraph("", "", text))
     return row
-
-
-def _get_sg_image_scraper():
-    return save_figures
-
-
-def save_figures(_, block_vars, gallery_conf):
-    """Save the new figures of a block of an example; return the text that shows them."""
-    from matplotlib.figure import Figure
-    from sphinx_gallery.scrapers import figure_rst
-
-    shown = block_vars["example_globals"].setdefault("_shown", set())
-    paths = []
-    for value in list(block_vars["example_globals"].values()):
-        if isinstance(value, Figure) and id(value) not in shown:
-            shown.add(id(value))
-            path = next(block_vars["image_path_iterator"])
-            value.savefig(path, dpi=150)
-            paths.append(path)
-    return figure_rst(paths, gallery_conf["src_dir"])

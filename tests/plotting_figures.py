@@ -39,13 +39,24 @@ def colours(ax):
     return np.asarray(ax.images[0].get_array())
 
 
-def render(figure):
-    """Draw a figure to pixels, as in a file, and check that nothing is cut off."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+def figure_of(axes):
+    """Return the figure of some Axes, alone, in an array or in a dict; a figure itself."""
+    if hasattr(axes, "add_axes"):
+        return axes
+    first = np.ravel(np.array(list(axes.values()) if isinstance(axes, dict) else axes, dtype=object))[0]
+    return first.get_figure(root=True)
 
+
+def render(axes):
+    """Draw the figure of some Axes to pixels, as in a file, and check that nothing is cut off."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.colors import to_rgb
+
+    figure = figure_of(axes)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]
     border = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
-    assert (border == 255).all(), "something is cut off at the edge of the figure"
+    face = np.round(255 * np.array(to_rgb(figure.get_facecolor())))
+    assert (border == face).all(), "something is cut off at the edge of the figure"
     return pixels

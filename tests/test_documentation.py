@@ -7,6 +7,7 @@ import textwrap
 from pathlib import Path
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -30,6 +31,8 @@ def public_names():
 def _in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mpl.use("Agg")
+    yield
+    plt.close("all")
 
 
 def public_object(name):

@@ -1,15 +1,16 @@
 """Figures, drawn from labelled results.
 
-Every function takes a result of another subpackage, as computed or as read back from a file, and returns a
-matplotlib Figure. No function uses pyplot or changes global settings, so figures can be drawn without a
-display and in any number. Units are read from the data and shown with a suitable prefix (mm, µm, kN).
+Every function takes a result of another subpackage, as computed or as read back from a file.
 
-    figure = fc.plotting.closure_laws(result)
-    figure.savefig("closure.png")
+    ax = fc.plotting.closure_laws(result)
+    ax.figure.savefig("closure.png")  # or .svg, .pdf
 
-A function with one panel takes `ax`, one with several takes `figure` (a Figure or a SubFigure), to draw into
-a larger figure. `paper_figure` draws the five figures of the 1998 paper from a study; `draw` writes every
-figure that a study has data for.
+A function with one panel returns its Axes, one with several an array of Axes; `ax=` or `axes=` draws into a
+figure that exists. A new figure is one of pyplot: a notebook shows it once, at the end of the cell, and
+`plt.show()` in a window. Text, lines and background follow the style of matplotlib that is in use;
+`plt.style.use("fractalcontact.plotting.report")` is that of the files that `draw` writes. Units are read from
+the data and shown with a suitable prefix (mm, µm, kN). `paper_figure` draws the five figures of the 1998
+paper from a study; `draw` writes every figure that a study has data for, without pyplot.
 """
 
 import lazy_loader

@@ -15,7 +15,8 @@ from fractalcontact.plotting._units import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
 MEGABYTE = 1e6
@@ -23,8 +24,8 @@ NARROW = 2.0  # costs within this ratio are drawn on an axis of at least its wid
 PLANE = ("method", "setting")
 
 
-@_style.styled
-def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+@_style.checked
+def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
     Each point is one setting of a method. A filled point is on the Pareto front: no other method of the
@@ -35,12 +36,12 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
     measured : DataTree or Dataset
         From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
         on_pareto_front over (method, setting), benchmark and error_meaning over method.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -64,14 +65,14 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
     ...         "error_meaning": ("method", ["relative error of the force"]),
     ...     },
     ... )
-    >>> time, memory = fc.plotting.error_against_time(measured).axes
+    >>> ((time, memory),) = fc.plotting.error_against_time(measured)
     >>> print(time.get_xlabel(), "|", memory.get_xlabel())
     run time (ms) | peak memory (MB)
     """
     benchmarks = _benchmarks(measured)
-    sheet = _style.figure_or_new(figure, (8.6, 2.7 * len(benchmarks)))
-    axes = sheet.subplots(len(benchmarks), 2, squeeze=False, sharey="row")
-    for (left, right), (name, data) in zip(axes, benchmarks.items(), strict=True):
+    shape = (len(benchmarks), 2)
+    shown = _style.panels(axes, shape, (8.6, 2.7 * len(benchmarks)), sharey="row")
+    for (left, right), (name, data) in zip(shown, benchmarks.items(), strict=True):
         seconds = scale_for("s", table(data, "run_time", PLANE))
         _error_curves(left, data, seconds(table(data, "run_time", PLANE)))
         left.set_xlabel(axis_label(data["run_time"], seconds))
@@ -81,8 +82,8 @@ def error_against_time(measured: Any, *, figure: Figure | SubFigure | None = Non
         right.tick_params(labelleft=False)
         _style.side_legend(right, entries)
         meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
-        left.set_title(f"{name}\n{meaning}", fontsize=8)
-    return _style.root_figure(sheet)
+        left.set_title(f"{name}\n{meaning}", fontsize="small")
+    return shown
 
 
 def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
@@ -103,14 +104,13 @@ def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
 
 def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
     """Draw error against a cost, a curve for each method; return the entries of the legend."""
-    _style.style_axes(ax)
     errors, on_front = table(data, "error", PLANE), table(data, "on_pareto_front", PLANE).astype(bool)
     entries = []
     for row, name in enumerate(words(data["method"])):
         finite = np.isfinite(errors[row]) & np.isfinite(cost[row])
         best = finite & on_front[row]
         style = _method_style(row)
-        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor="white")
+        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor=ax.get_facecolor())
         ax.plot(cost[row][best], errors[row][best], **style, ls="")
         entries.append(_style.legend_line(name.replace("_", " "), **style))
     _style.log_scale(ax, x=cost, y=errors)
@@ -122,12 +122,12 @@ def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
 
 
 def _method_style(number: int) -> dict[str, Any]:
-    colour = _style.CYCLE[number % len(_style.CYCLE)]
+    colour = _style.cycle()[number % len(_style.cycle())]
     return {"color": colour, "marker": MARKERS[number % len(MARKERS)]}
 
 
-@_style.styled
-def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+@_style.checked
+def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw the rms error over the Cramer-Rao bound and the interval coverage against the true Hurst exponent.
 
     There is one column per surface family and size, and one curve per method. An unbiased estimator has a
@@ -139,12 +139,12 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
     bench : Dataset
         From `fractalcontact.accuracy.estimators`: error_ratio and interval_coverage over (method, family,
         hurst, size), with the ends of their intervals.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -160,40 +160,37 @@ def estimator_errors(bench: Any, *, figure: Figure | SubFigure | None = None) ->
     ...     {"error_ratio": (dims, [[[[1.1], [1.2]]]]), "interval_coverage": (dims, [[[[0.94], [0.95]]]])},
     ...     coords={"method": ["default"], "family": ["fbm"], "hurst": [0.3, 0.8], "size": [128]},
     ... )
-    >>> upper, lower = fc.plotting.estimator_errors(bench).axes
-    >>> print(upper.get_title(loc="left"), "|", lower.get_xlabel())
+    >>> (upper,), (lower,) = fc.plotting.estimator_errors(bench)
+    >>> print(upper.get_title(), "|", lower.get_xlabel())
     fbm, n = 128 | true Hurst exponent
     """
     data = as_dataset(bench, "estimator_errors", "bench")
     require_variables(data, "estimator_errors", ("error_ratio", "interval_coverage"), "bench")
     cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
-    sheet = _style.figure_or_new(figure, (2.3 * len(cases) + 1.6, 5.2))
-    axes = np.asarray(
-        sheet.subplots(2, len(cases), squeeze=False, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
-    )
+    size = (2.3 * len(cases) + 1.6, 5.2)
+    shown = _style.panels(axes, (2, len(cases)), size, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
     names = words(data["method"])
     styles = [
-        _method_style(number) | {"ls": "-" if number < len(_style.CYCLE) else "--"}
+        _method_style(number) | {"ls": "-" if number < len(_style.cycle()) else "--"}
         for number in range(len(names))
     ]
-    for (upper, lower), (family, size) in zip(axes.T, cases, strict=True):
+    for (upper, lower), (family, size) in zip(shown.T, cases, strict=True):
         case = data.sel(family=family, size=size)
         for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
-            _style.style_axes(ax)
             _curves_against_hurst(ax, case, quantity, styles)
         upper.set_yscale("log")
-        upper.axhline(1.0, color=_style.BLACK, lw=0.9, ls=":")
-        lower.axhline(0.95, color=_style.BLACK, lw=0.9, ls=":")
+        upper.axhline(1.0, color=_style.ink(), lw=0.9, ls=":")
+        lower.axhline(0.95, color=_style.ink(), lw=0.9, ls=":")
         _style.plain_ticks(upper)
         upper.set_title(f"{family}, n = {size}")
         lower.set_xlabel("true Hurst exponent")
-    axes[0, 0].set_ylabel("rms error / Cramér-Rao bound")
-    axes[1, 0].set_ylabel("interval coverage")
+    shown[0, 0].set_ylabel("rms error / Cramér-Rao bound")
+    shown[1, 0].set_ylabel("interval coverage")
     entries = [
         _style.legend_line(name.replace("_", " "), **style) for name, style in zip(names, styles, strict=True)
     ]
-    _style.side_legend(axes[0, -1], entries)
-    return _style.root_figure(sheet)
+    _style.side_legend(shown[0, -1], entries)
+    return shown
 
 
 def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: list[dict[str, Any]]) -> None:

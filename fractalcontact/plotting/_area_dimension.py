@@ -11,13 +11,12 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 CORRECTED: dict[str, Any] = {"ls": (0, (4, 2)), "marker": "s", "ms": 3.5}
 
 
-@_style.styled
-def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None = None) -> Figure:
+@_style.checked
+def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None = None) -> Axes:
     """Draw the real contact area of a joint against the spacing of its heights, one curve per load.
 
     Solid lines are the cells in contact, dashed lines the area corrected for their perimeter. The slope of a
@@ -30,11 +29,11 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
     shear : float, optional
         Shear (m), the nearest one is drawn; None: the middle one.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -47,11 +46,11 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
     >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
     >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
     >>> areas = fc.joints.area_dimension(crack, shear=4e-4, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.area_dimension(areas).axes[0]
+    >>> ax = fc.plotting.area_dimension(areas)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     spacing (µm) | real contact area (%)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
     data = at_shear(result_of(result, "area_dimension", names, ("shear", "step", "resolution")), shear)
     along, across = scale_of(data["resolution"]), scale_of(data["contact_fraction"])
@@ -75,4 +74,4 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
         _style.legend_line("perimeter-\ncorrected", **CORRECTED),
     ]
     _style.side_legend(ax, entries, low=True)
-    return figure
+    return ax

@@ -10,23 +10,22 @@ import xarray as xr
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._box_size_curves import draw_size_curves, path_panels
+from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
 from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 DIMENSIONS = ("box_dimension", "minkowski_dimension", "correlation_dimension", "boundary_dimension")
 WIDE_INTERVAL = 0.5  # width of an interval beyond which a point is drawn open
 
 
-@_style.styled
-def box_dimension(
-    result: Any, *, normal_force: float | None = None, figure: Figure | SubFigure | None = None
-) -> Figure:
+@_style.checked
+def box_dimension(result: Any, *, normal_force: float | None = None, axes: Panels | None = None) -> AxesArray:
     r"""Draw the box dimension of a contact domain against load, and against shear at one force.
 
     The other dimensions of a domain are drawn in the same way. Dashed lines show the random null: randomly
@@ -40,12 +39,13 @@ def box_dimension(
         `boundary_dimension` over (shear, step), or over one of them.
     normal_force : float, optional
         Normal force (N) of the panel against shear; the nearest step is taken. Default: the last step.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. There is one for each of the
+        dims that is longer than one. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -57,33 +57,33 @@ def box_dimension(
     >>> import fractalcontact as fc
     >>> import numpy as np
     >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
-    >>> ax = fc.plotting.box_dimension(fc.domains.box_dimension(mask)).axes[0]
+    >>> (ax,) = fc.plotting.box_dimension(fc.domains.box_dimension(mask))
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     coverage (%) | box dimension $\Delta_\sigma$
     """
     present = [name for name in DIMENSIONS if name in as_dataset(result, "box_dimension")]
     data = result_of(result, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
     name = present[0]
-    sheet, axes = path_panels(figure, data)
+    shown = path_panels(axes, data)
     colours = _style.sequence_colours(data.sizes["shear"])
-    for ax, dim in axes:
+    for dim, ax in shown.items():
         if dim == "step":
             for i, colour in enumerate(colours):
                 _dimension_curve(ax, data.isel(shear=i), name, dim, colour, band=len(colours) == 1)
         else:
             path = at_force(data, normal_force)
-            _dimension_curve(ax, path, name, dim, _style.BLACK, band=True)
+            _dimension_curve(ax, path, name, dim, _style.ink(), band=True)
             ax.set_title(load_text(path, data))
         ax.set_ylim(-0.05, 2.05)
         if not bool(data[name].notnull().any()):
             _style.write_in_empty_axes(ax, "no contact")
-    axes[0][0].set_ylabel(name_of(data[name]))
-    last = axes[-1][0]
+    first, *_, last = (*shown.values(), *shown.values())
+    first.set_ylabel(name_of(data[name]))
     if data.sizes["step"] > 1:
         title, labels = shear_words(data)
         _style.sequence_legend(last, title, labels, colours)
     _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
-    return _style.root_figure(sheet)
+    return as_array(shown)
 
 
 def _line_legend(data: xr.Dataset, name: str) -> list[Any]:
@@ -92,11 +92,11 @@ def _line_legend(data: xr.Dataset, name: str) -> list[Any]:
 
     entries = [_style.legend_line("contact domain", marker="o")]
     if "ci_low" in data and "ci_high" in data:
-        entries.append(Patch(facecolor=_style.GREY, alpha=0.25, lw=0, label="interval"))
+        entries.append(Patch(facecolor=_style.grey(), alpha=0.25, lw=0, label="interval"))
         uncertain = ~(data["ci_high"] - data["ci_low"] <= WIDE_INTERVAL) & data[name].notnull()
         if bool(uncertain.any()):
             label = f"interval wider than\n{WIDE_INTERVAL:g}, or none"
-            entries.append(_style.legend_line(label, ls="", marker="o", mfc="white"))
+            entries.append(_style.legend_line(label, ls="", marker="o", mfc=_style.tone(0.0)))
     if "null_dimension" in data:
         entries.append(_style.legend_line("random null,\nequal coverage", **_style.NULL_LINE))
     return entries
@@ -119,21 +119,21 @@ def _dimension_curve(ax: Axes, path: xr.Dataset, name: str, dim: str, colour: An
     ax.plot(scale(x), values, color=colour)
     if values.size <= _style.MAX_MARKED_POINTS:
         ax.plot(scale(x)[certain], values[certain], "o", color=colour)
-        ax.plot(scale(x)[~certain], values[~certain], "o", mec=colour, mfc="white")
+        ax.plot(scale(x)[~certain], values[~certain], "o", mec=colour, mfc=ax.get_facecolor())
     if "null_dimension" in path:
         ax.plot(scale(x), table(path, "null_dimension", (dim,)), color=colour, **_style.NULL_LINE)
     _style.log_x_if_wide(ax, x)
     ax.set_xlabel(axis_label(path[against], scale) if labelled else against)
 
 
-@_style.styled
+@_style.checked
 def local_slopes(
     result: Any,
     *,
     shear: float | None = None,
     normal_force: float | None = None,
-    figure: Figure | SubFigure | None = None,
-) -> Figure:
+    axes: Panels | None = None,
+) -> AxesArray:
     """Draw the local dimension against box size, for increasing load and for increasing shear.
 
     A power law holds where the curve is level. Dashed lines show the random null: randomly placed cells of
@@ -149,12 +149,13 @@ def local_slopes(
         middle one.
     normal_force : float, optional
         Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. There is one for each of the
+        dims that is longer than one. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -166,7 +167,7 @@ def local_slopes(
     >>> import fractalcontact as fc
     >>> import numpy as np
     >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
-    >>> ax = fc.plotting.local_slopes(fc.domains.box_dimension(mask)).axes[0]
+    >>> (ax,) = fc.plotting.local_slopes(fc.domains.box_dimension(mask))
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | local dimension
     """
@@ -180,4 +181,4 @@ def local_slopes(
     elif "null_fraction" in data:
         slope = 2.0 - local_slope(data["radius"].values, data["null_fraction"].values)
         data = data.assign(null_slope=(data["null_fraction"].dims, slope))
-    return draw_size_curves(data, shear, normal_force, figure, "local_slope", "null_slope")
+    return draw_size_curves(data, shear, normal_force, axes, "local_slope", "null_slope")

@@ -23,7 +23,8 @@ from fractalcontact.plotting._units import name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 SIZES = ("box_length", "radius_length", "box_size", "radius")
 MAX_CURVES = 6  # more curves than this cross the curves of their random nulls illegibly
@@ -31,11 +32,11 @@ STEEP = 1.5  # ratio of values above which lacunarity is drawn on a logarithmic 
 
 
 def draw_size_curves(
-    data: xr.Dataset, shear: float | None, force: float | None, figure: Any, name: str, null_name: str
-) -> Figure:
+    data: xr.Dataset, shear: float | None, force: float | None, axes: Panels | None, name: str, null_name: str
+) -> AxesArray:
     """Draw `name` over box size beside its random null, a panel per path that is longer than one."""
-    sheet, axes = path_panels(figure, data)
-    for ax, dim in axes:
+    shown = path_panels(axes, data)
+    for dim, ax in shown.items():
         if dim == "step":
             path = at_shear(data, shear)
             path = path.isel(step=loaded_steps(path, MAX_CURVES))
@@ -51,18 +52,20 @@ def draw_size_curves(
         _style.sequence_legend(ax, title, labels, colours)
     if null_name in data:
         note = _style.legend_line("random null,\nequal coverage", **_style.NULL_LINE)
-        _style.side_legend(axes[-1][0], [note], low=True)
-    return _style.root_figure(sheet)
+        _style.side_legend(ax, [note], low=True)
+    return as_array(shown)
 
 
-def path_panels(figure: Any, data: xr.Dataset) -> tuple[Any, list[tuple[Axes, str]]]:
-    """Return the figure, and axes for each path dim that is longer than one (`step` if none is)."""
+def path_panels(axes: Panels | None, data: xr.Dataset) -> dict[str, Axes]:
+    """Return Axes for each path dim that is longer than one (`step` if none is)."""
     dims = [dim for dim in ("step", "shear") if data.sizes[dim] > 1] or ["step"]
-    sheet = _style.figure_or_new(figure, (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL)
-    axes = list(sheet.subplots(1, len(dims), squeeze=False)[0])
-    for ax in axes:
-        _style.style_axes(ax)
-    return sheet, list(zip(axes, dims, strict=True))
+    size = (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL
+    return dict(zip(dims, _style.panel_row(axes, len(dims), size), strict=True))
+
+
+def as_array(panels: dict[str, Axes]) -> AxesArray:
+    """Return the Axes of the panels as an array."""
+    return np.array(list(panels.values()), dtype=object)
 
 
 def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name: str, null_name: str) -> None:

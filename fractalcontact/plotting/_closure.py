@@ -16,7 +16,6 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from fractalcontact.base.units import Scale
 
@@ -24,7 +23,7 @@ RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 
 
-@_style.styled
+@_style.checked
 def closure_laws(
     closure: Any,
     *,
@@ -32,7 +31,7 @@ def closure_laws(
     marked: Sequence[int] = (),
     key: bool = True,
     ax: Axes | None = None,
-) -> Figure:
+) -> Axes:
     """Draw normal force against closure, one curve per shear displacement.
 
     Thin lines show the total closure w, thick lines the interface closure w_int = w - w_b, where w_b is the
@@ -50,11 +49,11 @@ def closure_laws(
     key : bool
         Add a legend of the shear displacements.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -67,11 +66,11 @@ def closure_laws(
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
     >>> result = fc.joints.closure(crack, shear=2e-4, direction="E", normal_force=[1.0, 10.0])
-    >>> ax = fc.plotting.closure_laws(result).axes[0]
+    >>> ax = fc.plotting.closure_laws(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     closure (µm) | normal force $F$ (N)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(closure, "closure_laws", ("closure", "normal_force"), ("shear", "step"), "closure")
     inner_name = "interface_closure" if "interface_closure" in data else "closure"
     force = table(data, "normal_force", ("shear", "step"))
@@ -106,13 +105,13 @@ def closure_laws(
             title="closure",
             low=True,
         )
-    return figure
+    return ax
 
 
-@_style.styled
+@_style.checked
 def contact_area(
     result: Any, *, against: str = "normal_force", theory: Any = None, ax: Axes | None = None
-) -> Figure:
+) -> Axes:
     """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
 
     Solid lines show the area corrected for the perimeter, thin dashed lines the count of cells in contact,
@@ -128,11 +127,11 @@ def contact_area(
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -148,11 +147,11 @@ def contact_area(
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.contact_area(result, against="nominal_pressure").axes[0]
+    >>> ax = fc.plotting.contact_area(result, against="nominal_pressure")
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | real / nominal contact area (%)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(result, "contact_area", ("contact_fraction", against), ("shear", "step"))
     with Problems("fc.plotting.contact_area") as problems:
         own = data[against].dims
@@ -182,7 +181,7 @@ def contact_area(
         entries = lines + entries
     if entries:
         _style.side_legend(ax, entries, title="contact area", low=True)
-    return figure
+    return ax
 
 
 def _draw_theories(ax: Axes, theory: Any, against: str, scale: Scale, percent: Scale) -> list[Any]:
@@ -191,7 +190,11 @@ def _draw_theories(ax: Axes, theory: Any, against: str, scale: Scale, percent: S
     loads, areas = table(data, against, ("step",)), table(data, "contact_fraction", ("theory", "step"))
     entries = []
     for i, name in enumerate(words(data["theory"])):
-        style: dict[str, Any] = {"ls": "-.", "lw": 1.0, "color": _style.CYCLE[(i + 1) % len(_style.CYCLE)]}
+        style: dict[str, Any] = {
+            "ls": "-.",
+            "lw": 1.0,
+            "color": _style.cycle()[(i + 1) % len(_style.cycle())],
+        }
         ax.plot(scale(loads), percent(areas[i]), **style)
         authors = ", ".join(part.capitalize() for part in name.split("_"))
         entries.append(_style.legend_line(authors.replace(", ", ",\n"), **style))
@@ -210,10 +213,10 @@ def mark_points(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
 
     The letters are centred on their points, so that none covers another curve.
     """
-    ax.plot(x, y, "o", mfc="white", mec=colour, mew=1.2, ms=10.5, zorder=4, clip_on=False)
+    ax.plot(x, y, "o", mfc=ax.get_facecolor(), mec=colour, mew=1.2, ms=10.5, zorder=4, clip_on=False)
     for number, (a, b) in enumerate(zip(x, y, strict=True), first):
         if np.isfinite(a) and np.isfinite(b):
-            ax.annotate(_style.letter(number), (a, b), fontsize=7, weight="bold", ha="center",
+            ax.annotate(_style.letter(number), (a, b), fontsize="x-small", weight="bold", ha="center",
                         va="center_baseline", zorder=5, annotation_clip=False)  # fmt: skip
 
 

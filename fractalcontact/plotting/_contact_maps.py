@@ -14,20 +14,21 @@ from fractalcontact.plotting._surface import plane_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 COLUMNS = 3
 
 
-@_style.styled
+@_style.checked
 def contact_domains(
     result: Any,
     *,
     shear: float | None = None,
     normal_force: float | None = None,
     panels: int = 6,
-    figure: Figure | SubFigure | None = None,
-) -> Figure:
+    axes: Panels | None = None,
+) -> AxesArray:
     """Draw maps of the contact state for increasing load at one shear, or increasing shear at one force.
 
     Parameters
@@ -40,12 +41,12 @@ def contact_domains(
         Normal force (N) at which the shear path is shown; the nearest step is taken.
     panels : int
         Largest number of maps. Along a load path they are spread evenly over the closure.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -57,31 +58,32 @@ def contact_domains(
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e5, 1e6])
-    >>> figure = fc.plotting.contact_domains(result)
-    >>> len(figure.axes)
+    >>> maps = fc.plotting.contact_domains(result)
+    >>> len(maps)
     2
     """
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
     count, columns = path.sizes[dim], number_of_columns(path.sizes[dim])
     width = _style.WIDTH * columns / COLUMNS
-    sheet = _style.figure_or_new(figure, (max(width, 3.0), maps_height(path, count, width)))
-    axes = sheet.subplots(-(-count // columns), columns, squeeze=False).ravel()
-    names = [_map_name(path.isel({dim: number}), data, dim) for number in range(count)]
-    for number, ax in enumerate(axes):
-        if number >= count:
-            ax.set_axis_off()
-            continue
-        _state_map(ax, path["state"].isel({dim: number}), number if count > 1 else None, names[number])
+    size = (max(width, 3.0), maps_height(path, count, width))
+    shown = _style.panels(axes, (-(-count // columns), columns), size, count=count)
+    sheet = _style.sheet_of(axes, shown)
+    common = shear_text(path, data) if dim == "step" else load_text(path, data)
+    for number, ax in enumerate(shown):
+        state = path.isel({dim: number})
+        name = load_text(state, data) if dim == "step" else shear_text(state, data)
+        if sheet is None and common:  # no room above the panels of others
+            name = f"{common},  {name}" if name else common
+        _state_map(ax, state["state"], number if count > 1 else None, name)
     if "x" in path.coords:
         extent, length = extent_of(path["state"]), plane_scale(path["state"])
-        _maps.scale_bar(axes[(count - 1) // columns * columns], extent, length)
-    common = shear_text(path, data) if dim == "step" else load_text(path, data)
-    if common:
-        sheet.suptitle(common, x=0.01, ha="left", fontsize=9)
+        _maps.scale_bar(shown[(count - 1) // columns * columns], extent, length)
+    if common and sheet is not None:
+        sheet.suptitle(common, x=0.01, ha="left", fontsize="medium")
     if bool((path["state"] > 1).any()):
-        _state_legend(sheet)
-    return _style.root_figure(sheet)
+        _maps.flag_legend(shown, sheet, ("open", "contact", "yielded"), _style.STATE_COLOURS)
+    return shown
 
 
 def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> None:
@@ -91,12 +93,7 @@ def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> 
     head = "" if number is None else rf"$\bf{{{_style.letter(number)}}}$  "
     fraction = 100 * float(np.mean(flags > 0)) if flags.size else 0.0
     percent = f"{fraction:.0f}" if fraction >= 10 else f"{fraction:.2g}"
-    ax.set_title(f"{head}{name}{',  ' if name else ''}{percent} % in contact", fontsize=8.5)
-
-
-def _map_name(state: xr.Dataset, data: xr.Dataset, dim: str) -> str:
-    """Return the load or the shear of one map."""
-    return load_text(state, data) if dim == "step" else shear_text(state, data)
+    ax.set_title(f"{head}{name}{',  ' if name else ''}{percent} % in contact", fontsize="medium")
 
 
 def number_of_columns(count: int) -> int:
@@ -110,13 +107,3 @@ def maps_height(path: xr.Dataset, count: int, width: float) -> float:
     left, right, bottom, top = extent_of(path["state"])
     shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
     return 0.5 + -(-count // columns) * (shape * (width / columns - 0.15) + 0.28)
-
-
-def _state_legend(sheet: Any) -> None:
-    from matplotlib.patches import Patch
-
-    entries = [
-        Patch(facecolor=colour, edgecolor=_style.GREY, linewidth=0.4, label=word)
-        for colour, word in zip(_style.STATE_COLOURS, ("open", "contact", "yielded"), strict=True)
-    ]
-    sheet.legend(handles=entries, loc="outside lower left", ncols=3)

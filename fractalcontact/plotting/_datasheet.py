@@ -19,7 +19,10 @@ from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from fractalcontact.plotting._style import AxesArray
 
 A4 = (8.27, 11.69)  # inches
 ROWS = (0.7, 3.0, 2.7, 2.5, 2.3)  # relative heights: title, strength, shear, stiffness and flow, limits
@@ -30,8 +33,10 @@ ROUGHNESS = ("roughness_coefficient", "directional_roughness")
 GROUPS = ("strength_envelope", "direct_shear", "shear_curve", "closure", "transmissivity")
 
 
-@_style.styled
-def datasheet(tree: xr.DataTree, *, notes: Sequence[str] = ()) -> Figure:
+@_style.checked
+def datasheet(
+    tree: xr.DataTree, *, notes: Sequence[str] = (), figure: Figure | None = None
+) -> dict[str, Axes]:
     """Draw one page about a joint: roughness, strength, stiffness, aperture and flow against normal stress.
 
     Parameters
@@ -42,11 +47,13 @@ def datasheet(tree: xr.DataTree, *, notes: Sequence[str] = ()) -> Figure:
         closure and transmissivity. Panels without data stay empty.
     notes : sequence of str
         Sentences to print with the limits of validity that the results state themselves.
+    figure : Figure, optional
+        An empty figure, which becomes the page: A4, upright. Default: a new figure.
 
     Returns
     -------
-    Figure
-        A4, upright.
+    dict of str to Axes
+        The panels by what they show.
 
     Raises
     ------
@@ -63,32 +70,53 @@ def datasheet(tree: xr.DataTree, *, notes: Sequence[str] = ()) -> Figure:
     ...     surface, nominal_pressure=[1e6, 4e6], wall_strength=6e7, basic_friction_angle=30
     ... )
     >>> groups = {"/joints/roughness_coefficient": roughness, "/joints/strength_envelope": envelope}
-    >>> page = fc.plotting.datasheet(xr.DataTree.from_dict(groups))
-    >>> [round(float(inches), 2) for inches in page.get_size_inches()]
+    >>> panels = fc.plotting.datasheet(xr.DataTree.from_dict(groups))
+    >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
     [8.27, 11.69]
     """
     found = {name: group(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS)}
     with Problems("fractalcontact.plotting.datasheet") as problems:
         expected = f"at least one of joints/{', joints/'.join(found)}"
         problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
-    page = _style.figure_or_new(None, A4)
-    parts = page.subfigures(len(ROWS), 1, height_ratios=ROWS)
+    import matplotlib.style
+
+    page = _style.new_figure(A4) if figure is None else figure
+    with matplotlib.style.context(_style.STYLE):  # the text of the page fits at one size only
+        page.set_size_inches(A4)
+        page.set_layout_engine("constrained", w_pad=0.07, h_pad=0.07)
+        page.set_facecolor("white")
+        return _draw_page(page, tree, found, notes)
+
+
+def _draw_page(
+    page: Figure, tree: xr.DataTree, found: dict[str, xr.Dataset | None], notes: Sequence[str]
+) -> dict[str, Axes]:
+    """Draw the rows of the page; return its panels."""
+    panels: dict[str, Axes] = {}
+    parts: Any = page.subfigures(len(ROWS), 1, height_ratios=ROWS)
     title = str(tree.attrs.get("title") or tree.name or "joint")
     parts[0].text(0.03, 0.6, title, size=13, weight="bold", va="center")
-    parts[0].text(0.03, 0.2, _source(tree), size=8, color=_style.GREY, va="center")
+    parts[0].text(0.03, 0.2, _source(tree), size=8, color=_style.grey(), va="center")
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
     left.text(0.08, 0.93, "\n".join(_roughness_lines(found)), size=8, va="top", linespacing=1.5)
     if found["strength_envelope"] is not None:
-        strength_envelope(found["strength_envelope"], tests=found["direct_shear"], ax=right.add_subplot())
+        panels["strength"] = right.add_subplot()
+        _style.style_axes(panels["strength"])
+        strength_envelope(found["strength_envelope"], tests=found["direct_shear"], ax=panels["strength"])
     tests, curve = found["direct_shear"], found["shear_curve"]
     if tests is not None or curve is not None:
         beside = curve if tests is not None else None
-        shear_curve(curve if tests is None else tests, beside=beside, figure=parts[2])
-    _flow_panels(parts[3], found["closure"], found["transmissivity"])
+        curves = shear_curve(curve if tests is None else tests, beside=beside, axes=parts[2])
+        panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
+    panels |= zip(
+        ("normal stiffness", "mean gap", "transmissivity"),
+        _flow_panels(parts[3], found["closure"], found["transmissivity"]),
+        strict=True,
+    )
     lines = list(_limits(found, notes))
     parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
     parts[4].text(0.03, 0.86, "\n".join(lines[:MOST_LINES]), size=6.5, va="top", linespacing=1.35)
-    return _style.root_figure(page)
+    return panels
 
 
 def _source(tree: xr.DataTree) -> str:
@@ -134,11 +162,9 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
             yield f"  {texts[0]}: {texts[1]}, {texts[2]} ({float(row['peak_friction_angle']):.0f}°)"
 
 
-def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | None) -> None:
+def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | None) -> AxesArray:
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
-    axes = figure.subplots(1, 3)
-    for ax in axes:
-        _style.style_axes(ax)
+    axes: AxesArray = _style.panel_row(figure, 3, A4)
     if closure is not None:
         pressure = table(_with_dims(closure), "nominal_pressure", ("shear", "step"))
         closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
@@ -159,6 +185,7 @@ def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | Non
         colours = _style.sequence_colours(len(labels))
         entries = [_style.legend_line(text, color=c) for text, c in zip(labels, colours, strict=True)]
         _style.side_legend(axes[2], entries[: _style.MAX_LEGEND_ENTRIES], title=title)
+    return axes
 
 
 def _with_dims(data: xr.Dataset, *more: str) -> xr.Dataset:

@@ -13,13 +13,12 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
 
 
-@_style.styled
-def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the correlation of the two faces of a joint against shear displacement.
 
     Vertical dotted lines show the decorrelation lengths, and bands their intervals.
@@ -29,11 +28,11 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     memory : Dataset or node of a DataTree
         From `fractalcontact.joints.decorrelation_length`.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -46,11 +45,11 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
     >>> lower = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=3.2e-3)
     >>> result = fc.joints.decorrelation_length(crack, direction="E")
-    >>> ax = fc.plotting.correlation(result).axes[0]
+    >>> ax = fc.plotting.correlation(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | correlation of the faces
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     names = ("correlation", "decorrelation_length", "shear")
     data = result_of(memory, "correlation", names, ("direction", "shear"), "memory")
     values = table(data, "correlation", ("direction", "shear"))
@@ -66,16 +65,16 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Figure:
         if np.isfinite(low) and np.isfinite(high):
             ax.axvspan(float(along(low)), float(along(high)), color=style["color"], alpha=0.12, lw=0)
         entries.append(_style.legend_line(name, **style))
-    ax.axhline(0.0, color="0.6", lw=0.6)
+    ax.axhline(0.0, color=_style.grey(), lw=0.6)
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("correlation of the faces")
     _style.side_legend(ax, entries, title="block slides")
     _style.side_legend(ax, [_style.legend_line("decorrelation\nlength", lw=0.7, ls=":")], low=True)
-    return figure
+    return ax
 
 
-@_style.styled
-def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method.
 
     Parameters
@@ -83,11 +82,11 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     dimension : Dataset or node of a DataTree
         From `fractalcontact.joints.delta_dimension`.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -100,16 +99,16 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     >>> import xarray as xr
     >>> names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
     >>> result = xr.Dataset({name: ("shear", [2.1, 2.2]) for name in names}, {"shear": [1e-4, 1e-3]})
-    >>> ax = fc.plotting.delta_dimension(result).axes[0]
+    >>> ax = fc.plotting.delta_dimension(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | dimension of the delta-surface
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",), "dimension")
     along = scale_of(data["shear"])
     entries = []
     for i, name in enumerate(DIMENSIONS):
-        style: dict[str, Any] = {"color": _style.CYCLE[i], "marker": "osD"[i], "ms": 3.5}
+        style: dict[str, Any] = {"color": _style.cycle()[i], "marker": "osD"[i], "ms": 3.5}
         ax.plot(along(data["shear"].values), table(data, name, ("shear",)), **style)
         entries.append(_style.legend_line(name.split("_")[0], **style))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
@@ -117,4 +116,4 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Figure:
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel("dimension of the delta-surface")
     _style.side_legend(ax, entries, title="method")
-    return figure
+    return ax

@@ -17,13 +17,12 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MEAN_SLOPE_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
 
 
-@_style.styled
-def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Axes:
     r"""Draw the dilatancy of rigid surfaces against shear displacement, one curve per direction.
 
     Thin dotted lines show the rise along the mean plane of the surface.
@@ -34,11 +33,11 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
         From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), and optionally
         mean_slope over direction.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -51,11 +50,11 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
     >>> result = fc.joints.dilatancy(crack, shear=[0.0, 2e-4, 4e-4])
-    >>> ax = fc.plotting.rigid_dilatancy(result).axes[0]
+    >>> ax = fc.plotting.rigid_dilatancy(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (µm) | rigid dilatancy $\delta_\mathrm{r}$ (µm)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(
         dilatancy, "rigid_dilatancy", ("rigid_dilatancy", "shear"), ("direction", "shear"), "dilatancy"
     )
@@ -77,10 +76,10 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Figure:
         _style.side_legend(ax, entries, title="block slides")
     if "mean_slope" in data:
         _style.side_legend(ax, [_style.legend_line("mean slope", **MEAN_SLOPE_LINE)], low=True)
-    return figure
+    return ax
 
 
-@_style.styled
+@_style.checked
 def elastic_dilatancy(
     dilatancy: Any,
     *,
@@ -88,7 +87,7 @@ def elastic_dilatancy(
     reach: float | None = None,
     marked: Sequence[float] = (),
     ax: Axes | None = None,
-) -> Figure:
+) -> Axes:
     r"""Draw dilatancy under constant normal force against shear displacement, one curve per force.
 
     The black curve is the dilatancy of rigid surfaces.
@@ -105,11 +104,11 @@ def elastic_dilatancy(
     marked : sequence of float
         Shear displacements (m) to mark A, B, C ... on the curve of the last force.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -122,11 +121,11 @@ def elastic_dilatancy(
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
     >>> result = fc.joints.dilatancy(crack, shear=[0.0, 2e-4], direction="E", normal_force=[1.0, 10.0])
-    >>> ax = fc.plotting.elastic_dilatancy(result).axes[0]
+    >>> ax = fc.plotting.elastic_dilatancy(result)
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     selected = limit_shear(select_direction(dilatancy, direction, "elastic_dilatancy", "dilatancy"), reach)
     data = result_of(selected, "elastic_dilatancy", ("dilatancy", "shear"), ("shear", "step"), "dilatancy")
     shear = np.atleast_1d(data["shear"].values).astype(float)
@@ -138,8 +137,8 @@ def elastic_dilatancy(
     marker = "o" if shear.size <= _style.MAX_MARKED_POINTS else ""
     entries = []
     if rigid is not None:
-        ax.plot(along(shear), across(rigid), color=_style.BLACK, lw=1.0, marker=marker)
-        entries.append(_style.legend_line("0 (rigid)", color=_style.BLACK, lw=1.0))
+        ax.plot(along(shear), across(rigid), color=_style.ink(), lw=1.0, marker=marker)
+        entries.append(_style.legend_line("0 (rigid)", color=_style.ink(), lw=1.0))
     for j, colour in enumerate(colours):
         ax.plot(along(shear), across(opening[:, j]), color=colour, marker=marker)
     for number, target in enumerate(marked):
@@ -152,4 +151,4 @@ def elastic_dilatancy(
     ax.set_xlabel(axis_label(data["shear"], along))
     ax.set_ylabel(across.label(r"dilatancy $\delta$"))
     _style.side_legend(ax, entries, title=title)
-    return figure
+    return ax

@@ -15,7 +15,8 @@ from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
@@ -36,10 +37,8 @@ COLUMNS = 3
 CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
-@_style.styled
-def dimension_curves(
-    curves: Any, estimates: Any = None, *, figure: Figure | SubFigure | None = None
-) -> Figure:
+@_style.checked
+def dimension_curves(curves: Any, estimates: Any = None, *, axes: Panels | None = None) -> AxesArray:
     """Draw scaling curves with their local slopes, and the fitted window and slope.
 
     Parameters
@@ -50,12 +49,12 @@ def dimension_curves(
     estimates : Dataset, optional
         From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
         scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -66,7 +65,7 @@ def dimension_curves(
     --------
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> upper, lower = fc.plotting.dimension_curves(fc.dimensions.variogram(surface)).axes
+    >>> (upper,), (lower,) = fc.plotting.dimension_curves(fc.dimensions.variogram(surface))
     >>> print(upper.get_ylabel(), "|", lower.get_xlabel())
     variogram (µm²) | lag (mm)
     """
@@ -75,18 +74,23 @@ def dimension_curves(
     columns = 2 if len(names) == 4 else min(len(names), COLUMNS)
     rows = -(-len(names) // columns)
     width = 2.7 * columns + (0.4 if columns > 1 else 1.6)
-    sheet = _style.figure_or_new(figure, (width, 3.7 * rows))
-    heights = (2.2, 1.0) * rows
-    axes = np.asarray(sheet.subplots(2 * rows, columns, squeeze=False, height_ratios=heights))
-    for number in range(rows * columns):
-        row, column = divmod(number, columns)
-        upper, lower = axes[2 * row, column], axes[2 * row + 1, column]
-        if number >= len(names):
-            upper.set_axis_off()
-            lower.set_axis_off()
-            continue
-        _draw_curve(upper, lower, names[number], datasets[names[number]], _fit_of(fits, names[number]))
-    return _style.root_figure(sheet)
+    shown = _curve_panels(axes, len(names), rows, columns, (width, 3.7 * rows))
+    for name, (upper, lower) in zip(names, shown.T, strict=True):
+        _draw_curve(upper, lower, name, datasets[name], _fit_of(fits, name))
+    return shown
+
+
+def _curve_panels(
+    axes: Panels | None, count: int, rows: int, columns: int, size: tuple[float, float]
+) -> AxesArray:
+    """Return two rows of Axes: for the curves, and for the local slopes below each of them."""
+    if axes is not None and not hasattr(axes, "subplots"):
+        return _style.panels(axes, (2, count), size)
+    made = _style.panels(axes, (2 * rows, columns), size, height_ratios=(2.2, 1.0) * rows)
+    pairs = made.reshape(rows, 2, columns).transpose(1, 0, 2).reshape(2, rows * columns)
+    for unused in pairs[:, count:].ravel():
+        unused.remove()
+    return pairs[:, :count]
 
 
 ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
@@ -132,8 +136,6 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 
 
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
-    for ax in (upper, lower):
-        _style.style_axes(ax)
     scale, value = curve_of(curve)
     curve = result_of(curve, "dimension_curves", (scale, value), (), "curves")
     with Problems("fc.plotting.dimension_curves") as problems:
@@ -188,7 +190,7 @@ def _draw_fit(
     if not np.isfinite(window).all():
         return
     for ax in (upper, lower):
-        ax.axvspan(*shown[0](window), color=_style.PALE, alpha=0.55, lw=0, zorder=0)
+        ax.axvspan(*shown[0](window), color=_style.pale(), alpha=0.55, lw=0, zorder=0)
     x, y = curve
     inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9)) & (x > 0) & (y > 0)
     hurst, dimension = float(fit["hurst"]), float(fit["fractal_dimension"])
@@ -206,14 +208,14 @@ def _draw_fit(
                ha="right" if right else "left")  # fmt: skip
 
 
-@_style.styled
+@_style.checked
 def dimensions(
     estimates: Any,
     *,
     truth: float | None = None,
     band: tuple[float, float] | None = None,
     ax: Axes | None = None,
-) -> Figure:
+) -> Axes:
     r"""Draw the fractal dimension estimated by each method with its 95 % interval.
 
     A method without a validated interval is drawn as an open circle.
@@ -228,11 +230,11 @@ def dimensions(
     band : pair of float, optional
         Range of dimensions for comparison, shaded.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -244,7 +246,7 @@ def dimensions(
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> estimates = fc.dimensions.estimate(surface, ["default", "variogram"])
-    >>> ax = fc.plotting.dimensions(estimates, truth=2.2).axes[0]
+    >>> ax = fc.plotting.dimensions(estimates, truth=2.2)
     >>> print([label.get_text() for label in ax.get_yticklabels()], "|", ax.get_xlabel())
     ['default', 'variogram'] | fractal dimension $\Delta$
     """
@@ -252,7 +254,7 @@ def dimensions(
         estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",), "estimates"
     )
     names = words(data["method"])
-    figure, ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
+    ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
     value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))
     embedding = value + hurst  # 3 for a surface, 2 for a profile
     missing = np.full(value.shape, np.nan)
@@ -262,7 +264,7 @@ def dimensions(
     has_interval = np.isfinite(low) & np.isfinite(high)
     ax.hlines(rows[has_interval], low[has_interval], high[has_interval], color=_style.BLUE, lw=2.2)
     ax.plot(value[has_interval], rows[has_interval], "o", color=_style.BLUE, ms=6)
-    ax.plot(value[~has_interval], rows[~has_interval], "o", mfc="white", mec=_style.BLUE, ms=6)
+    ax.plot(value[~has_interval], rows[~has_interval], "o", mfc=_style.tone(0.0), mec=_style.BLUE, ms=6)
     entries = (
         [_style.legend_line("95 % interval", color=_style.BLUE, lw=2.2, marker="o")]
         if has_interval.any()
@@ -270,16 +272,16 @@ def dimensions(
     )
     if not has_interval.all():
         entries.append(
-            _style.legend_line("no interval", ls="", marker="o", mfc="white", mec=_style.BLUE, ms=6)
+            _style.legend_line("no interval", ls="", marker="o", mfc=_style.tone(0.0), mec=_style.BLUE, ms=6)
         )
     if band is not None:
-        ax.axvspan(*band, color=_style.PALE, lw=0, zorder=0)
+        ax.axvspan(*band, color=_style.pale(), lw=0, zorder=0)
     if truth is not None:
-        ax.axvline(truth, color=_style.BLACK, lw=0.9, ls=":")
-        entries.append(_style.legend_line("true", color=_style.BLACK, lw=0.9, ls=":"))
+        ax.axvline(truth, color=_style.ink(), lw=0.9, ls=":")
+        entries.append(_style.legend_line("true", color=_style.ink(), lw=0.9, ls=":"))
     ax.set_yticks(rows, [name.replace("_", " ") for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.grid(False, axis="y")
     ax.set_xlabel(name_of(data["fractal_dimension"]))
     _style.side_legend(ax, entries)
-    return figure
+    return ax

@@ -12,7 +12,6 @@ from fractalcontact.plotting._inputs import result_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SIZE = (5.0, 4.0)  # inches
 COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
@@ -22,8 +21,8 @@ CURVES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-@_style.styled
-def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
     r"""Draw the directional roughness over the azimuth of the shear, in polar coordinates.
 
     The distance from the centre is an angle: the metric theta_max/(C+1), and dashed the mean apparent dip
@@ -38,7 +37,7 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -50,17 +49,14 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=2e-5, rng=1)
     >>> result = fc.joints.directional_roughness(surface)
-    >>> ax = fc.plotting.directional_roughness(result).axes[0]
+    >>> ax = fc.plotting.directional_roughness(result)
     >>> [line.get_label() for line in ax.lines]
     ['$\\theta^*_{max}/(C+1)$', 'mean dip']
     """
     data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
-    polar: Any = ax
-    if ax is None:
-        polar = _style.figure_or_new(None, SIZE).add_subplot(projection="polar")
+    polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
     with Problems("fc.plotting.directional_roughness") as problems:
         problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
-    _style.style_axes(polar)
     azimuth = data["azimuth"].values
     order = np.argsort(azimuth % 360.0)
     if _is_full_circle(azimuth):
@@ -75,7 +71,8 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Figure:
     for tick_label in polar.get_yticklabels():
         tick_label.set_path_effects(_style.halo())
     _style.side_legend(polar, polar.lines)
-    return _style.root_figure(polar)
+    drawn: Axes = polar
+    return drawn
 
 
 def _is_full_circle(azimuth: Any) -> bool:

@@ -43,7 +43,7 @@ def direction_style(name: str, number: int) -> dict[str, Any]:
     """Return colour and line style: fixed for E, N, W and S, by number for other directions."""
     if name in _style.DIRECTION_COLOURS:
         return {"color": _style.DIRECTION_COLOURS[name], "ls": _style.DIRECTION_LINES[name]}
-    colours = [colour for colour in _style.CYCLE if colour not in _style.DIRECTION_COLOURS.values()]
+    colours = [colour for colour in _style.cycle() if colour not in _style.DIRECTION_COLOURS.values()]
     cycle, index = divmod(number, len(colours))
     return {"color": colours[index], "ls": ("-", "--", "-.", ":")[cycle % 4]}
 

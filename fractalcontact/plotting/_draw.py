@@ -37,10 +37,13 @@ from fractalcontact.plotting._partial_slip import slip_domains, slip_loops
 from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
+from fractalcontact.plotting._style import drawn_for_files, figure_of
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
 # names of the same figures in a study that is not compared with the paper
@@ -96,14 +99,14 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, drawing in track(_all_drawings(tree, paper), progress, "figures", unit="figure"):
-        with DRAWING_LOCK:
-            figure = drawing()
+        with DRAWING_LOCK, drawn_for_files():
+            figure = figure_of(drawing())
             written.append(_write(figure, folder / f"{name}.png"))
             figure.clear()
     return written
 
 
-def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Callable[[], Figure]]]:
+def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Drawing]]:
     """Return file name and drawing function of every figure; of an ensemble with a band of the members."""
     members = member_count(tree)
     if not members:
@@ -115,7 +118,7 @@ def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Callable[[]
     ]
 
 
-def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
     """Yield file name (without suffix) and drawing function of every figure with data."""
     for number, name in PAPER.items():
         if has_figure(tree, number):
@@ -160,7 +163,7 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Callable[[]
             yield name, _later(_slip_domains, slipped)
 
 
-def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Drawing]]:
     """Yield the figures of the strength: criteria with the tests among them, shear curves of both."""
     envelope, tests, curve = (
         group(tree, f"joints/{name}") for name in ("strength_envelope", "direct_shear", "shear_curve")
@@ -173,7 +176,7 @@ def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Callable[[], Fi
         yield "shear_curve", _later(shear_curve, curve)
 
 
-def _later(drawing: Callable[..., Figure], *arguments: Any) -> Callable[[], Figure]:
+def _later(drawing: Callable[..., Any], *arguments: Any) -> Drawing:
     return lambda: drawing(*arguments)
 
 
@@ -184,22 +187,22 @@ def _scaling_curves(tree: xr.DataTree) -> dict[str, xr.Dataset]:
     return {name: dataset for name, dataset in datasets.items() if curve_of(dataset)[1]}
 
 
-def _friction(data: xr.Dataset) -> Figure:
+def _friction(data: xr.Dataset) -> Any:
     # with forces only one direction fits in a figure: the first one
     several = "step" in data.dims and data.sizes.get("direction", 1) > 1
     direction = words(data["direction"])[0] if several else None
     return friction(data, direction=direction, reach=evenly_sampled_reach(data))
 
 
-def _lacunarity(data: xr.Dataset) -> Figure:
+def _lacunarity(data: xr.Dataset) -> Any:
     return lacunarity(data, shear=shown_shear(data))
 
 
-def _slip_domains(data: xr.Dataset) -> Figure:
+def _slip_domains(data: xr.Dataset) -> Any:
     return slip_domains(data.isel(shear=-1) if "shear" in data.dims else data)  # at the greatest shear
 
 
-def _local_slopes(data: xr.Dataset) -> Figure:
+def _local_slopes(data: xr.Dataset) -> Any:
     return local_slopes(data, shear=shown_shear(data))
 
 

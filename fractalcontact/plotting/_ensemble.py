@@ -14,7 +14,6 @@ from fractalcontact.plotting import _style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MEMBER = "member"
 MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
@@ -55,15 +54,15 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
     return rest.assign(reduced).set_coords(loads)
 
 
-def draw_with_band(drawings: Sequence[Callable[[], Figure]], members: int) -> Figure:
+def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:
     """Draw the median, and for every curve the band between the same curves of the two other drawings."""
     median, *ends = drawings
     with recorded_scales() as record:
-        figure = median()
+        figure = _style.figure_of(median())
     bounds = []
     for drawing in ends:
         with replayed_scales(record):
-            bounds.append(drawing())
+            bounds.append(_style.figure_of(drawing()))
     bands = sum(
         _add_bands(ax, low, high)
         for ax, low, high in zip(figure.axes, *(bound.axes for bound in bounds), strict=False)
@@ -76,8 +75,8 @@ def draw_with_band(drawings: Sequence[Callable[[], Figure]], members: int) -> Fi
         words.append(f"maps: member 0 of {members}" if bands else f"member 0 of {members}")
     if not words:
         words = [f"median of {members} members"]
-    figure.supxlabel("; ".join(words), x=0.99, ha="right", fontsize=7.5, color=_style.GREY)
-    return figure
+    figure.supxlabel("; ".join(words), x=0.99, ha="right", fontsize="small", color=_style.grey())
+    return figure.axes[0]
 
 
 def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:

@@ -12,13 +12,12 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
 
 
-@_style.styled
-def scaling(result: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def scaling(result: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the Hurst exponent of every octave of wavelength with its interval.
 
     The band is the longest run of octaves with one exponent, as wide as its wavelengths and as high as the
@@ -29,11 +28,11 @@ def scaling(result: Any, *, ax: Axes | None = None) -> Figure:
     result : Dataset or node of a DataTree
         From `fractalcontact.dimensions.scaling`.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -44,29 +43,28 @@ def scaling(result: Any, *, ax: Axes | None = None) -> Figure:
     --------
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> ax = fc.plotting.scaling(fc.dimensions.scaling(surface)).axes[0]
+    >>> ax = fc.plotting.scaling(fc.dimensions.scaling(surface))
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     wavelength (mm) | Hurst exponent
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     names = ("hurst", "ci_low", "ci_high", "window_hurst", "wavelength")
     data = result_of(result, "scaling", names, ("wavelength",))
     along = scale_of(data["wavelength"])
     x = along(data["wavelength"].values)
     hurst, low, high = (table(data, name, ("wavelength",)) for name in ("hurst", "ci_low", "ci_high"))
-    ax.errorbar(
-        x, hurst, [hurst - low, high - hurst], fmt="o", ms=3.5, lw=1.0, color="k", label="octave, 95 %"
-    )
+    bars = [hurst - low, high - hurst]
+    ax.errorbar(x, hurst, bars, fmt="o", ms=3.5, lw=1.0, color=_style.ink(), label="octave, 95 %")
     if np.isfinite(float(data["window_hurst"])):
         ends = [float(along(float(data[name]))) for name in ("scale_min", "scale_max")]
         bottom, top = (float(data[f"window_ci_{end}"]) for end in ("low", "high"))
         ax.fill_between(ends, bottom, top, color="C0", alpha=0.35, lw=0, label="one exponent")
         ax.plot(ends, 2 * [float(data["window_hurst"])], color="C0", lw=1.2)
     for limit in (0.0, 1.0):
-        ax.axhline(limit, color="0.6", lw=0.7, ls=":")
+        ax.axhline(limit, color=_style.grey(), lw=0.7, ls=":")
     ax.set_xscale("log")
     ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
     ax.set_xlabel(axis_label(data["wavelength"], along))
     ax.set_ylabel("Hurst exponent")
     ax.legend()
-    return figure
+    return ax

@@ -21,19 +21,20 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
 
 
-@_style.styled
+@_style.checked
 def friction(
     result: Any,
     *,
     direction: str | None = None,
     reach: float | None = None,
-    figure: Figure | SubFigure | None = None,
-) -> Figure:
+    axes: Panels | None = None,
+) -> AxesArray:
     """Draw friction angle and shear strength against shear displacement, one curve per normal force.
 
     Parameters
@@ -46,12 +47,12 @@ def friction(
         direction gets a curve.
     reach : float, optional
         Largest shear displacement (m) to show.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -64,39 +65,38 @@ def friction(
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3, basic_friction_angle=35.0)
     >>> opening = fc.joints.dilatancy(crack, shear=[0.0, 1e-4, 2e-4, 3e-4])
-    >>> ax = fc.plotting.friction(fc.joints.friction(opening)).axes[0]
+    >>> (ax,) = fc.plotting.friction(fc.joints.friction(opening))
     >>> print(ax.get_ylabel())
     friction angle (°)
     """
     selected = limit_shear(as_dataset(result, "friction"), reach)
-    shown = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
+    names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
     by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
     over = "step" if by_force else "direction"
     if by_force or direction:
         selected = select_direction(selected, direction, "friction")
-    data = result_of(selected, "friction", (*shown, "shear"), ("shear", over))
-    sheet = _style.figure_or_new(figure, (_style.WIDTH if len(shown) > 1 else _style.PANEL[0], 3.1))
-    axes = sheet.subplots(1, len(shown), squeeze=False, sharex=True)[0]
+    data = result_of(selected, "friction", (*names, "shear"), ("shear", over))
+    size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
+    shown = _style.panel_row(axes, len(names), size, sharex=True)
     entries, title = _curve_legend(data, over)
-    for ax, name in zip(axes, shown, strict=True):
-        _style.style_axes(ax)
+    for ax, name in zip(shown, names, strict=True):
         _draw_curves(ax, data, name, over, entries)
     if "basic_friction_angle" in data:
         basic_angle = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
-        style: dict[str, Any] = {"color": _style.BLACK, "lw": 0.8, "ls": ":"}
-        axes[0].axhline(basic_angle, **style)
+        style: dict[str, Any] = {"color": _style.ink(), "lw": 0.8, "ls": ":"}
+        shown[0].axhline(basic_angle, **style)
         entries = [*entries, _style.legend_line("basic angle", **style)]
     remarks = []
     if over == "step" and "direction" in data.coords:
         remarks.append(f"block slides {direction_name(words(data['direction'])[0])}")
-    if axes[0].get_ylim()[1] > LOCKED:
-        axes[0].set_ylim(top=LOCKED)
+    if shown[0].get_ylim()[1] > LOCKED:
+        shown[0].set_ylim(top=LOCKED)
         remarks.append(f"locked above {LOCKED:g}°")
-    axes[0].set_title(", ".join(remarks))
-    if len(shown) > 1:
-        axes[1].set_title(_slope_lengths(data))
-    _style.side_legend(axes[-1], entries, title=title)
-    return _style.root_figure(sheet)
+    shown[0].set_title(", ".join(remarks))
+    if len(names) > 1:
+        shown[1].set_title(_slope_lengths(data))
+    _style.side_legend(shown[-1], entries, title=title)
+    return shown
 
 
 def _slope_lengths(data: xr.Dataset) -> str:

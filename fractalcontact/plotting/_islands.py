@@ -15,14 +15,15 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 MAX_CURVES = 8  # of the distributions of many masks
 PALETTE = 12  # colours of neighbouring islands
 
 
-@_style.styled
-def islands(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+@_style.checked
+def islands(result: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw a map of the islands of a contact domain and the distribution of their areas.
 
     The left panel shows neighbouring islands in different colours. The right panel shows the number of
@@ -34,12 +35,12 @@ def islands(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
         From `fractalcontact.domains.islands` with `keep=("label",)`: label (y, x), and area (m2) over
         `island`. Of several masks the last one with an island is mapped, and each gets a curve (at most
         eight are drawn).
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -52,20 +53,19 @@ def islands(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
     >>> import numpy as np
     >>> mask = fc.surfaces.from_array(np.kron(np.eye(4), np.ones((2, 2))), 1e-3) > 0
     >>> result = fc.domains.islands(mask, connectivity=1, keep=("label",))
-    >>> island_map, areas = fc.plotting.islands(result).axes
-    >>> print(island_map.get_title(loc="left"), "|", areas.get_xlabel())
+    >>> island_map, areas = fc.plotting.islands(result)
+    >>> print(island_map.get_title(), "|", areas.get_xlabel())
     4 islands | island area (mm²)
     """
     data = _checked_islands(result, ("label", "area"))
-    sheet = _style.figure_or_new(figure, (_style.WIDTH, 3.2))
-    left, right = sheet.subplots(1, 2, width_ratios=(1, 1.15))
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
     island_map(data, ax=left)
     _island_areas(right, data)
-    return _style.root_figure(sheet)
+    return shown
 
 
-@_style.styled
-def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None) -> Figure:
+@_style.checked
+def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw a map of the islands of a contact domain, neighbouring islands in different colours.
 
     Parameters
@@ -76,11 +76,11 @@ def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None)
     title : str, optional
         Default: the number of islands.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -93,8 +93,8 @@ def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None)
     >>> import numpy as np
     >>> mask = fc.surfaces.from_array(np.kron(np.eye(4), np.ones((2, 2))), 1e-3) > 0
     >>> result = fc.domains.islands(mask, connectivity=2, keep=("label",))
-    >>> ax = fc.plotting.island_map(result).axes[0]
-    >>> print(ax.get_title(loc="left"), "|", ax.get_xlabel())
+    >>> ax = fc.plotting.island_map(result)
+    >>> print(ax.get_title(), "|", ax.get_xlabel())
     1 island | $x$ (mm)
     """
     import matplotlib
@@ -104,13 +104,13 @@ def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None)
     hues = matplotlib.colormaps[_style.SEQUENCE_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
     image = hues[(labels * 5) % PALETTE]  # consecutive labels are often neighbours and need unlike colours
     image[labels <= 0] = matplotlib.colors.to_rgb(_style.STATE_COLOURS[0])
-    figure, ax = _style.axes_or_new(ax, (3.8, 3.8))
+    ax = _style.axes_or_new(ax, (3.8, 3.8))
     length = plane_scale(plane)
     _maps.draw_image(ax, image, extent_of(plane), length)
     label_axes(ax, plane, length)
     count = np.unique(labels[labels > 0]).size
     ax.set_title(f"{count} island{'' if count == 1 else 's'}" if title is None else title)
-    return figure
+    return ax
 
 
 def _checked_islands(result: Any, names: tuple[str, ...]) -> xr.Dataset:
@@ -130,7 +130,6 @@ def _last_map(plane: xr.DataArray) -> xr.DataArray:
 
 
 def _island_areas(ax: Axes, data: xr.Dataset) -> None:
-    _style.style_axes(ax)
     areas = np.asarray(data["area"].values, dtype=float).ravel()
     scale = scale_of(data["area"])
     ax.set_xlabel(axis_label(data["area"], scale))

@@ -9,17 +9,17 @@ from fractalcontact.plotting._box_size_curves import draw_size_curves
 from fractalcontact.plotting._inputs import require_dims, result_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 
-@_style.styled
+@_style.checked
 def lacunarity(
     result: Any,
     *,
     shear: float | None = None,
     normal_force: float | None = None,
-    figure: Figure | SubFigure | None = None,
-) -> Figure:
+    axes: Panels | None = None,
+) -> AxesArray:
     r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
 
     Dashed lines show the random null: randomly placed cells of equal coverage. At most six curves are drawn.
@@ -33,12 +33,13 @@ def lacunarity(
         middle one.
     normal_force : float, optional
         Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure. There is a panel for each of the dims that is longer than one.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. There is one for each of the
+        dims that is longer than one. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -51,10 +52,10 @@ def lacunarity(
     >>> import numpy as np
     >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
     >>> result = fc.domains.lacunarity(mask, box_sizes=[1, 2, 4, 8])
-    >>> ax = fc.plotting.lacunarity(result).axes[0]
+    >>> (ax,) = fc.plotting.lacunarity(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | lacunarity $\Lambda$
     """
     data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
     require_dims(data, "lacunarity", {"lacunarity": "box_size"})
-    return draw_size_curves(data, shear, normal_force, figure, "lacunarity", "null_lacunarity")
+    return draw_size_curves(data, shear, normal_force, axes, "lacunarity", "null_lacunarity")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -133,15 +134,31 @@ def colour_bar(ax: Axes, mappable: Any, label: str) -> Any:
         mappable, ax=ax, label=label, extend=mappable.beyond, aspect=28, shrink=0.85, pad=0.02
     )
     bar.outline.set_linewidth(0.5)
-    bar.ax.tick_params(labelsize=_style.RC["ytick.labelsize"], length=2.5)
+    _style.style_axes(bar.ax)
+    bar.ax.grid(False)
+    bar.ax.tick_params(length=2.5)
     return bar
+
+
+def flag_legend(axes: Any, sheet: Any, words: Sequence[str], colours: Sequence[str]) -> None:
+    """Put the key of the colours of flags below all panels of a figure, or beside the last of those given."""
+    from matplotlib.patches import Patch
+
+    entries = [
+        Patch(facecolor=colour, edgecolor=_style.grey(), linewidth=0.4, label=word)
+        for colour, word in zip(colours, words, strict=True)
+    ]
+    if sheet is None:
+        _style.side_legend(axes[-1], entries)
+    else:
+        sheet.legend(handles=entries, loc="outside lower right", ncols=3)
 
 
 def bare_frame(ax: Axes) -> None:
     """Remove ticks and draw a thin frame."""
     ax.set_xticks([])
     ax.set_yticks([])
-    _style.draw_frame(ax, _style.GREY)
+    _style.draw_frame(ax, _style.grey())
 
 
 def scale_bar(ax: Axes, extent: Extent, length: Scale) -> None:
@@ -150,7 +167,7 @@ def scale_bar(ax: Axes, extent: Extent, length: Scale) -> None:
     size = round_length(width / 4)
     start = float(length(extent[0]))
     end, transform = float(length(extent[0] + size)), ax.get_xaxis_transform()
-    ax.plot([start, end], [-0.045, -0.045], color=_style.INK, lw=1.6, solid_capstyle="butt",
+    ax.plot([start, end], [-0.045, -0.045], color=_style.ink(), lw=1.6, solid_capstyle="butt",
             transform=transform, clip_on=False)  # fmt: skip
     ax.text(
         end + 0.02 * float(length(width)),
@@ -158,7 +175,7 @@ def scale_bar(ax: Axes, extent: Extent, length: Scale) -> None:
         quantity_text(size, "m"),
         transform=transform,
         va="center",
-        fontsize=8,
+        fontsize="small",
     )
 
 

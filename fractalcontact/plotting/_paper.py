@@ -17,11 +17,12 @@ from fractalcontact.plotting._directions import direction_name, evenly_sampled_r
 from fractalcontact.plotting._inputs import extent_of, nearest, result_of, words
 from fractalcontact.plotting._paths import at_shear, loaded_steps, select_path
 from fractalcontact.plotting._shear_scheme import shear_step_of, sliding_scheme
-from fractalcontact.plotting._surface import surface
+from fractalcontact.plotting._surface import SIZE, surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 PANELS = 6
 SHOWN_SHEAR = 1 / 50  # of the block edge: 0.4 mm of 2 cm, the shear of the maps in the paper
@@ -55,8 +56,8 @@ def has_figure(tree: xr.DataTree, number: int) -> bool:
     return all(part is not None for part in parts) and needed in parts[0].variables  # type: ignore[union-attr]
 
 
-@_style.styled
-def paper_figure(tree: xr.DataTree, number: int) -> Figure:
+@_style.checked
+def paper_figure(tree: xr.DataTree, number: int, *, axes: Panels | None = None) -> AxesArray:
     """Draw one of the five figures of the 1998 paper from the data of a study.
 
     Parameters
@@ -67,10 +68,12 @@ def paper_figure(tree: xr.DataTree, number: int) -> Figure:
         1: crack surface and delta-surface; 2: scheme of the simulation; 3: closure laws and real contact
         area; 4: contact domains for increasing force; 5: rigid and elastic dilatancy, with the contact
         domains for increasing shear.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
         The panels that the study has data for.
 
     Raises
@@ -88,9 +91,9 @@ def paper_figure(tree: xr.DataTree, number: int) -> Figure:
     >>> import xarray as xr
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> tree = xr.DataTree.from_dict({"/surfaces": surface.to_dataset()})
-    >>> figure = fc.plotting.paper_figure(tree, 1)
-    >>> print(figure.axes[1].get_ylabel())
-    height (µm)
+    >>> (ax,) = fc.plotting.paper_figure(tree, 1)
+    >>> print(ax.get_xlabel())
+    $x$ (mm)
     """
     with Problems("fc.plotting.paper_figure") as problems:
         is_number = problems.integer("number", number, at_least=1, at_most=5)
@@ -98,47 +101,49 @@ def paper_figure(tree: xr.DataTree, number: int) -> Figure:
             groups = " and ".join(GROUPS[number])
             problems.require(has_figure(tree, number), "tree", f"data for figure {number} in {groups}", NONE)
     drawing = {1: _surfaces, 2: _scheme, 3: _closure, 4: _domains, 5: _dilatancy}[number]
-    return drawing(tree)
+    return drawing(tree, axes)
 
 
-def _surfaces(tree: xr.DataTree) -> Figure:
+def _surfaces(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     delta = group(tree, "joints/delta_surface")
     if delta is None:
-        return surface(group(tree, "surfaces"))
+        shown = _style.panel_row(axes, 1, SIZE)
+        surface(group(tree, "surfaces"), ax=shown[0])
+        return shown
     step = shear_step_of(delta)
-    sheet = _style.figure_or_new(None, (_style.WIDTH + 0.8, 3.2))
-    left, right = sheet.subplots(1, 2)
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.2))
     title = r"$\bf{a}$  crack surface and block"
     surface(group(tree, "surfaces"), block=step.block, title=title, ax=left)
     shear = f"$v$ = {quantity_text(step.shear, 'm')} {direction_name(step.direction)}".rstrip()
     surface(step.block, title=rf"$\bf{{b}}$  delta-surface, {shear}", ax=right)
-    return _style.root_figure(sheet)
+    return shown
 
 
-def _scheme(tree: xr.DataTree) -> Figure:
+def _scheme(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     upper = group(tree, "joints/faces")
-    return sliding_scheme(group(tree, "surfaces"), group(tree, "joints/delta_surface"), upper=upper)
+    return sliding_scheme(
+        group(tree, "surfaces"), group(tree, "joints/delta_surface"), upper=upper, axes=axes
+    )
 
 
-def _closure(tree: xr.DataTree) -> Figure:
+def _closure(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     data = result_of(group(tree, "joints/closure"), "paper_figure", ("closure",), ("shear", "step"))
-    sheet = _style.figure_or_new(None, (9.4, 3.3))
-    left, right = sheet.subplots(1, 2)
+    left, right = shown = _style.panel_row(axes, 2, (9.4, 3.3))
     shear = shown_shear(data)
     marked = loaded_steps(at_shear(data, shear), PANELS) if "state" in data else ()
     closure_laws(data, shear=shear, marked=marked, key=False, ax=left)
     contact_area(data, ax=right)
     left.set_title(r"$\bf{a}$  closure laws")
     right.set_title(r"$\bf{b}$  real contact area")
-    return _style.root_figure(sheet)
+    return shown
 
 
-def _domains(tree: xr.DataTree) -> Figure:
+def _domains(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     data = result_of(group(tree, "joints/closure"), "paper_figure", ("state",), ("shear", "step"))
-    return contact_domains(data, shear=shown_shear(data), panels=PANELS)
+    return contact_domains(data, shear=shown_shear(data), panels=PANELS, axes=axes)
 
 
-def _dilatancy(tree: xr.DataTree) -> Figure:
+def _dilatancy(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     rigid, elastic = (group(tree, path) for path in GROUPS[5])
     curves = [drawing for part, drawing in ((rigid, _rigid), (elastic, _elastic)) if part is not None]
     closure = group(tree, "joints/closure")
@@ -149,14 +154,21 @@ def _dilatancy(tree: xr.DataTree) -> Figure:
         data = result_of(maps, "paper_figure", ("state",), ("shear", "step"))
         path, dim = select_path(data, None, force, PANELS, "paper_figure")
         below = maps_height(path, path.sizes[dim], width)
-    sheet = _style.figure_or_new(None, (width, top + below))
-    parts = sheet.subfigures(2, 1, height_ratios=(top, below)) if maps is not None else [sheet]
-    axes = parts[0].subplots(1, len(curves), squeeze=False)[0]
-    for ax, drawing, letter in zip(axes, curves, "ab", strict=False):
+    upper: Any
+    lower: Any
+    if axes is None or hasattr(axes, "subfigures"):
+        sheet: Any = _style.new_figure((width, top + below)) if axes is None else axes
+        upper, lower = sheet.subfigures(2, 1, height_ratios=(top, below)) if maps is not None else (sheet, [])
+    else:
+        given = np.ravel(np.asarray(axes, dtype=object))
+        upper, lower = given[: len(curves)], given[len(curves) :]
+    shown = _style.panel_row(upper, len(curves), (width, top))
+    for ax, drawing, letter in zip(shown, curves, "ab", strict=False):
         ax.set_title(rf"$\bf{{{letter}}}$  {drawing(ax, tree)}")
-    if maps is not None:
-        contact_domains(maps, normal_force=force, panels=PANELS, figure=parts[1])
-    return _style.root_figure(sheet)
+    if maps is None:
+        return shown
+    domains = contact_domains(maps, normal_force=force, panels=PANELS, axes=lower)
+    return np.concatenate([shown, domains])
 
 
 def _rigid(ax: Axes, tree: xr.DataTree) -> str:

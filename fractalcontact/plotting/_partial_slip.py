@@ -17,18 +17,19 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 STATES = ("open", "stick", "slip")
 
 
-@_style.styled
+@_style.checked
 def slip_domains(
     result: Any,
     *,
     panels: int = 6,
-    figure: Figure | SubFigure | None = None,
-) -> Figure:
+    axes: Panels | None = None,
+) -> AxesArray:
     """Draw maps of stick, slip and open along a path of tangential force.
 
     Parameters
@@ -38,12 +39,12 @@ def slip_domains(
         step.
     panels : int
         Largest number of maps, spread evenly over the steps.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -62,8 +63,8 @@ def slip_domains(
     ...     normal_force=10.0,
     ...     tangential_force=[1.0, 3.0, -3.0],
     ... )
-    >>> figure = fc.plotting.slip_domains(result)
-    >>> len(figure.axes)
+    >>> maps = fc.plotting.slip_domains(result)
+    >>> len(maps)
     3
     """
     with Problems("fc.plotting.slip_domains") as problems:
@@ -73,25 +74,21 @@ def slip_domains(
     count, columns = path.sizes["step"], number_of_columns(path.sizes["step"])
     width = _style.WIDTH * columns / COLUMNS
     height = maps_height(path.rename(slip_state="state"), count, width) + 0.25
-    sheet = _style.figure_or_new(figure, (max(width, 3.0), height))
-    axes = sheet.subplots(-(-count // columns), columns, squeeze=False).ravel()
-    for number, ax in enumerate(axes):
-        if number >= count:
-            ax.set_axis_off()
-            continue
+    shown = _style.panels(axes, (-(-count // columns), columns), (max(width, 3.0), height), count=count)
+    for number, ax in enumerate(shown):
         step = path.isel(step=number)
         _slip_map(ax, step["slip_state"])
         head = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
-        ax.set_title(head + ",  ".join(_title_parts(step, data)), fontsize=8.5)
+        ax.set_title(head + ",  ".join(_title_parts(step, data)), fontsize="medium")
     if "x" in path.coords:
         extent, length = extent_of(path["slip_state"]), plane_scale(path["slip_state"])
-        _maps.scale_bar(axes[(count - 1) // columns * columns], extent, length)
-    _legend(sheet)
-    return _style.root_figure(sheet)
+        _maps.scale_bar(shown[(count - 1) // columns * columns], extent, length)
+    _maps.flag_legend(shown, _style.sheet_of(axes, shown), STATES, _style.SLIP_COLOURS)
+    return shown
 
 
-@_style.styled
-def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+@_style.checked
+def slip_loops(result: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw tangential force against displacement, and the part of the contact that sticks against the force.
 
     Parameters
@@ -99,12 +96,12 @@ def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figu
     result : Dataset or node of a DataTree
         From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
         (shear, step).
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -123,7 +120,7 @@ def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figu
     ...     normal_force=10.0,
     ...     tangential_force=[0.0, 3.0, -3.0, 3.0],
     ... )
-    >>> print(fc.plotting.slip_loops(result).axes[0].get_ylabel())
+    >>> print(fc.plotting.slip_loops(result)[0].get_ylabel())
     tangential force $Q$ (N)
     """
     needed = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
@@ -132,8 +129,7 @@ def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figu
     displacement = table(data, "tangential_displacement", ("shear", "step"))
     stuck = table(data, "stick_area", ("shear", "step"))
     contact = table(data, "contact_area", ("shear", "step"))
-    sheet = _style.figure_or_new(figure, (_style.WIDTH, 3.1))
-    left, right = sheet.subplots(1, 2)
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
     along, up = scale_of(data["tangential_displacement"]), scale_of(data["tangential_force"])
     colours = _style.sequence_colours(len(displacement))
     marker = "o" if displacement.shape[1] <= _style.MAX_MARKED_POINTS else ""
@@ -149,11 +145,11 @@ def slip_loops(result: Any, *, figure: Figure | SubFigure | None = None) -> Figu
     right.set_ylim(0, 105)
     title, labels = shear_words(data) if "shear" in data.dims else ("", [])
     if labels:
-        shown = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)
+        named = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)
         _style.side_legend(
-            right, [_style.legend_line(labels[i], color=colours[i]) for i in shown], title=title
+            right, [_style.legend_line(labels[i], color=colours[i]) for i in named], title=title
         )
-    return _style.root_figure(sheet)
+    return shown
 
 
 def _slip_map(ax: Axes, plane: xr.DataArray) -> None:
@@ -180,13 +176,3 @@ def _title_parts(step: xr.Dataset, data: xr.Dataset) -> list[str]:
     else:
         parts.append("no contact")
     return parts
-
-
-def _legend(sheet: Any) -> None:
-    from matplotlib.patches import Patch
-
-    entries = [
-        Patch(facecolor=colour, edgecolor=_style.GREY, linewidth=0.4, label=word)
-        for colour, word in zip(_style.SLIP_COLOURS, STATES, strict=True)
-    ]
-    sheet.legend(handles=entries, loc="outside lower right", ncols=3)

@@ -14,14 +14,13 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHEAR_LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.2)))
 CONSTANT: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": "-."}
 
 
-@_style.styled
-def self_weight(result: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def self_weight(result: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the shear strength of a joint under self-weight against the size of the structure.
 
     One colour for each direction of sliding, one line style for each shear. A grey line is the strength for
@@ -32,11 +31,11 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Figure:
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.self_weight`.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -49,11 +48,11 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Figure:
     >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
     >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
     >>> strength = fc.joints.self_weight(crack, structure_size=[10, 100], unit_weight=24e3, shear=1e-3)
-    >>> ax = fc.plotting.self_weight(strength).axes[0]
+    >>> ax = fc.plotting.self_weight(strength)
     >>> print(ax.get_xlabel(), ax.get_xscale(), ax.get_yscale())
     size of the structure (m) log log
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
     data = result_of(result, "self_weight", names, ("direction", "shear", "structure_size"))
     along, across = scale_of(data["structure_size"]), scale_of(data["shear_strength"])
@@ -78,4 +77,4 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Figure:
     ]
     constant = _style.legend_line("basic angle\nalone", **CONSTANT)
     _style.side_legend(ax, [*shown, constant], title=title, low=True)
-    return figure
+    return ax

@@ -13,16 +13,15 @@ from fractalcontact.plotting._units import axis_label
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 SHOWN = ("shear_stress", "dilatancy")
 BESIDE: dict[str, Any] = {"lw": 1.0, "ls": "--"}  # curves to compare with
 
 
-@_style.styled
-def shear_curve(
-    result: Any, *, beside: Any | None = None, figure: Figure | SubFigure | None = None
-) -> Figure:
+@_style.checked
+def shear_curve(result: Any, *, beside: Any | None = None, axes: Panels | None = None) -> AxesArray:
     r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress.
 
     Parameters
@@ -31,12 +30,12 @@ def shear_curve(
         From `fractalcontact.joints.direct_shear` or `fractalcontact.joints.shear_curve`.
     beside : Dataset or node of a DataTree, optional
         Such a result to draw dashed, in the colours of the same normal stresses.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -50,18 +49,16 @@ def shear_curve(
     >>> result = fc.joints.shear_curve(
     ...     surface, [0, 1e-3, 5e-3], nominal_pressure=1e6, wall_strength=6e7, residual_friction_angle=30
     ... )
-    >>> print(fc.plotting.shear_curve(result).axes[0].get_ylabel())
+    >>> print(fc.plotting.shear_curve(result)[0].get_ylabel())
     shear stress $\tau$ (MPa)
     """
     data = [_read(result)] + ([] if beside is None else [_read(beside)])
-    sheet = _style.figure_or_new(figure, (_style.WIDTH, 3.1))
-    axes = sheet.subplots(1, 2, sharex=True)
+    shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
     pressures = np.unique(np.concatenate([each["nominal_pressure"].values for each in data]))
     colours = dict(zip(pressures.tolist(), _style.sequence_colours(pressures.size), strict=True))
     displacements = np.concatenate([each["shear_displacement"].values.ravel() for each in data])
     along = scale_for("m", displacements)
-    for ax, name in zip(axes, SHOWN, strict=True):
-        _style.style_axes(ax)
+    for ax, name in zip(shown, SHOWN, strict=True):
         across = scale_for(
             data[0][name].attrs["units"], np.concatenate([each[name].values.ravel() for each in data])
         )
@@ -81,8 +78,8 @@ def shear_curve(
             _style.legend_line(each.attrs.get("title", ""), **style)
             for each, style in zip(data, ({}, BESIDE), strict=True)
         ]
-    _style.side_legend(axes[1], entries, title=f"normal stress\n({stress.unit})")
-    return _style.root_figure(sheet)
+    _style.side_legend(shown[1], entries, title=f"normal stress\n({stress.unit})")
+    return shown
 
 
 def _read(result: Any) -> xr.Dataset:

@@ -17,7 +17,8 @@ from fractalcontact.plotting._surface import draw_outline, label_axes, plane_of,
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 AZIMUTHS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
@@ -46,10 +47,8 @@ class ShearStep:
         return float(np.nanmax(heights)) if np.isfinite(heights).any() else 0.0
 
 
-@_style.styled
-def sliding_scheme(
-    surface: Any, delta: Any, *, upper: Any = None, figure: Figure | SubFigure | None = None
-) -> Figure:
+@_style.checked
+def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels | None = None) -> AxesArray:
     """Draw the sliding block from above and a section through the crack along the sliding direction.
 
     The section shows the given surfaces, with heights exaggerated. The block is lifted by the largest height
@@ -64,12 +63,12 @@ def sliding_scheme(
         shears is drawn.
     upper : DataArray, Dataset or node of a DataTree, optional
         Heights (m) of the block in the same coordinates. Default: mated, equal to `surface`.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise on a new figure.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -82,20 +81,19 @@ def sliding_scheme(
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
     >>> delta = fc.joints.delta_surface(crack, shear=4e-4, direction="E")
-    >>> plan, section = fc.plotting.sliding_scheme(lower, delta).axes
-    >>> print(section.get_title(loc="left"))
+    >>> plan, section = fc.plotting.sliding_scheme(lower, delta)
+    >>> print(section.get_title())
     section along the sliding direction, East
     """
     lower, step = plane_of(surface, "sliding_scheme", "height", "surface"), shear_step_of(delta)
     facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height", "upper")
-    sheet = _style.figure_or_new(figure, (_style.WIDTH + 0.8, 3.0))
-    left, right = sheet.subplots(1, 2, width_ratios=(1.0, 1.9))
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.0), width_ratios=(1.0, 1.9))
     _draw_plan(left, lower, step)
     _draw_section(right, lower, facing, step, r"$\delta_\mathrm{r}$" if upper is None else "lift")
     left.set_title("plan view")
     direction = f", {direction_name(step.direction)}" if step.direction else ""
     right.set_title(f"section along the sliding direction{direction}")
-    return _style.root_figure(sheet)
+    return shown
 
 
 def shear_step_of(delta: Any) -> ShearStep:
@@ -113,7 +111,6 @@ def shear_step_of(delta: Any) -> ShearStep:
 
 def _draw_plan(ax: Axes, lower: xr.DataArray, step: ShearStep) -> None:
     length, extent = plane_scale(lower), extent_of(lower)
-    _style.style_axes(ax)
     _maps.relief(ax, np.asarray(lower.values, float), extent, length, scale_for("m", lower.values))
     left, right, bottom, top = extent_of(step.block)
     x, y = step.shear * step.unit
@@ -147,7 +144,6 @@ def _draw_section(
     ax: Axes, lower: xr.DataArray, facing: xr.DataArray, step: ShearStep, lift_name: str
 ) -> None:
     """Draw lower surface and lifted block along the line through the centre of the block."""
-    _style.style_axes(ax)
     ax.grid(False)
     left, right, bottom, top = extent_of(step.block)
     # through the middle cell of the block, so that a section along x or y meets cell centres
@@ -165,10 +161,10 @@ def _draw_section(
     block_top = float(np.nanmax(upper_height)) + step.lift + 0.5 * span
     along, up = scale_for("m", position), scale_for("m", (low, block_top + 0.6 * span))
     ax.fill_between(along(position), float(up(low)), up(lower_height), color=LOWER, lw=0)
-    ax.plot(along(position), up(lower_height), color=_style.INK, lw=0.9)
+    ax.plot(along(position), up(lower_height), color=_style.ink(), lw=0.9)
     block_bottom = up(upper_height + step.lift)
     ax.fill_between(along(upper_position), block_bottom, float(up(block_top)), color=UPPER, lw=0)
-    ax.plot(along(upper_position), block_bottom, color=_style.INK, lw=0.9)
+    ax.plot(along(upper_position), block_bottom, color=_style.ink(), lw=0.9)
     ax.set_xlim(float(along(position[0])), float(along(position[-1])))
     ax.set_ylim(float(up(low)), float(up(block_top + 0.6 * span)))
     middle = (float(along(np.mean(upper_position))), float(up(block_top - 0.08 * span)))

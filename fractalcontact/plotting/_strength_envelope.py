@@ -13,13 +13,12 @@ from fractalcontact.plotting._units import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is out of its range
 
 
-@_style.styled
-def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None = None) -> Figure:
+@_style.checked
+def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None = None) -> Axes:
     r"""Draw the peak shear strength against the normal stress, one curve per criterion.
 
     A curve is dotted where its criterion is used out of its range.
@@ -31,11 +30,11 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     tests : Dataset or node of a DataTree, optional
         From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -49,10 +48,10 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     >>> result = fc.joints.strength_envelope(
     ...     surface, nominal_pressure=[1e6, 2e6, 4e6], wall_strength=60e6, basic_friction_angle=30
     ... )
-    >>> print(fc.plotting.strength_envelope(result).axes[0].get_ylabel())
+    >>> print(fc.plotting.strength_envelope(result).get_ylabel())
     shear strength $\tau$ (MPa)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(result, "strength_envelope", ("shear_strength", "in_range", "criterion"), ("criterion",))
     require_dims(data, "strength_envelope", {"shear_strength": "nominal_pressure"})
     data = data.sortby("nominal_pressure")
@@ -64,7 +63,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     x = scale(pressure)
     entries = []
     for i, name in enumerate(words(data["criterion"])):
-        colour = _style.CYCLE[i % len(_style.CYCLE)]
+        colour = _style.cycle()[i % len(_style.cycle())]
         y = scale(strength.values[i])
         ax.plot(x, y, color=colour, **OUTSIDE_LINE)
         ax.plot(x, np.where(in_range[i], y, np.nan), color=colour)
@@ -76,7 +75,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
         names = ("peak_shear_strength", "residual_shear_strength", "nominal_pressure")
         found = result_of(tests, "strength_envelope", names, ("nominal_pressure",), "tests")
         for name, marker in (("peak_shear_strength", "o"), ("residual_shear_strength", "x")):
-            style: dict[str, Any] = {"ls": "", "marker": marker, "color": _style.BLACK, "zorder": 3}
+            style: dict[str, Any] = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
             ax.plot(scale(found["nominal_pressure"]), scale(found[name]), clip_on=False, **style)
             entries.append(_style.legend_line(f"direct shear, {name.partition('_')[0]}", **style))
     ax.set_xlim(left=0)
@@ -84,4 +83,4 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     ax.set_xlabel(axis_label(pressure, scale))
     ax.set_ylabel(axis_label(data["shear_strength"], scale))
     _style.side_legend(ax, entries)
-    return figure
+    return ax

@@ -1,11 +1,13 @@
-"""Sizes, colours, line styles and legends shared by all figures."""
+"""Axes and figures to draw on, and sizes, colours, line styles and legends shared by all figures."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -18,14 +20,17 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 R = TypeVar("R")
+AxesArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]  # of Axes
+# the Axes of the panels, or a figure or subfigure in which they are made
+Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | SubFigure"
 
-DPI = 150
+STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
+FONT_SIZE = 9.0  # points; the sizes of figures below are for text of this size
 WIDTH = 7.2  # inches, a figure with several panels
 PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
-BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
-    "#000000",
+ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
     "#E69F00",
     "#56B4E9",
     "#009E73",
@@ -33,67 +38,47 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
     "#D55E00",
     "#CC79A7",
 )
-CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+COLOURS = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY)
 DIRECTION_COLOURS = {"E": RED, "N": GREEN, "W": BLUE, "S": ORANGE}
 DIRECTION_LINES = {"E": "-", "N": "--", "W": "-", "S": "--"}
-INK, GREY, PALE, MISSING = "#222222", "#6B6B6B", "#E4E4E4", "#D9D9D9"
+MISSING = "#D9D9D9"
 STATE_COLOURS = ("#F2F0E9", "#12355B", RED)  # open, contact, yielded
 SLIP_COLOURS = (STATE_COLOURS[0], STATE_COLOURS[1], ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
-SEQUENCE_END = 0.86  # the lightest colours of the map cannot be read on white
+# the lightest colours of the map cannot be read on white, the darkest not on black
+SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
 MAX_LEGEND_ENTRIES = 8
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
 NULL_LINE: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}  # the random null beside a measured curve
 LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
 
-RC: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.labelsize": 9.0,
-    "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # no panel has ticks above it; looking for them takes a tenth of the time
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": PALE,
-    "grid.linewidth": 0.6,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "lines.linewidth": 1.5,
-    "lines.markersize": 4.0,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "legend.title_fontsize": 8.0,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "savefig.dpi": DPI,
-    "figure.dpi": DPI,
-    "text.color": INK,
-}
+_for_files: ContextVar[bool] = ContextVar("figures for files", default=False)
 
 
-def styled(function: Callable[P, R]) -> Callable[P, R]:
-    """Check the options by their declared types, and draw with the settings `RC`, which are restored."""
+@contextmanager
+def drawn_for_files() -> Iterator[None]:
+    """Within this context figures have the style of the files, and pyplot neither keeps nor shows them."""
+    import matplotlib.style
+
+    token = _for_files.set(True)
+    try:
+        with matplotlib.style.context(STYLE):
+            yield
+    finally:
+        _for_files.reset(token)
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Check the options of a figure by their declared types, before anything is drawn."""
     signature = inspect.signature(function)
     where = f"fc.plotting.{function.__name__}"
 
     @functools.wraps(function)
     def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
-        import matplotlib
-
         with Problems(where) as problems:
             for name, value in signature.bind(*arguments, **options).arguments.items():
                 _check_option(problems, name, value, str(signature.parameters[name].annotation))
-        with matplotlib.rc_context(RC):
-            return function(*arguments, **options)
+        return function(*arguments, **options)
 
     return wrapper
 
@@ -107,6 +92,12 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
     optional = "None" in words
     if words[0] == "Axes":
         problems.require(value is None or isinstance(value, Axes), name, "an Axes, or None", value)
+    elif words[0] == "Panels":
+        several = isinstance(value, (list, tuple, np.ndarray)) and all(
+            isinstance(each, Axes) for each in np.ravel(np.asarray(value, dtype=object))
+        )
+        expected = "a sequence of Axes, a Figure or SubFigure, or None"
+        problems.require(value is None or several or isinstance(value, FigureBase), name, expected, value)
     elif words[0] == "Figure":
         expected = "a Figure or SubFigure, or None"
         problems.require(value is None or isinstance(value, FigureBase), name, expected, value)
@@ -130,41 +121,129 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
             problems.numbers(name, value)
 
 
-def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL) -> tuple[Figure, Axes]:
-    """Return the root figure and the axes to draw on; both are new if `ax` is None."""
-    if ax is None:
-        ax = figure_or_new(None, size).add_subplot()
+def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL, **options: Any) -> Any:
+    """Return the Axes to draw on: those given, or the only ones of a new figure."""
+    if ax is not None:
+        return ax
+    ax = new_figure(size).add_subplot(**options)
     style_axes(ax)
-    return root_figure(ax), ax
+    return ax
 
 
-def figure_or_new(figure: Figure | SubFigure | None, size: tuple[float, float]) -> Any:
-    """Return the (sub)figure for the panels; a new one if `figure` is None."""
-    if figure is not None:
-        return figure
+def panels(
+    axes: Panels | None,
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    *,
+    count: int | None = None,
+    **layout: Any,
+) -> AxesArray:
+    """Return an array of the Axes to draw on, of shape (rows, columns), or the first `count` of them.
+
+    Those given are taken as they come. Otherwise they are made in the figure `axes`, or in a new one.
+    """
+    if axes is not None and not hasattr(axes, "subplots"):
+        given = np.ravel(np.asarray(axes, dtype=object))
+        needed = shape[0] * shape[1] if count is None else count
+        with Problems("fc.plotting") as problems:
+            problems.require(given.size == needed, "axes", f"{needed} Axes", f"{given.size}")
+        return given.reshape(shape) if count is None else given
+    sheet: Any = new_figure(size) if axes is None else axes
+    made = np.asarray(sheet.subplots(*shape, squeeze=False, **layout))
+    for unused in () if count is None else made.ravel()[count:]:
+        unused.remove()
+    shown = made if count is None else made.ravel()[:count]
+    for ax in shown.ravel():
+        style_axes(ax)
+    return shown
+
+
+def panel_row(axes: Panels | None, count: int, size: tuple[float, float], **layout: Any) -> AxesArray:
+    """Return the Axes of panels side by side."""
+    row: AxesArray = panels(axes, (1, count), size, **layout)[0]
+    return row
+
+
+def new_figure(size: tuple[float, float]) -> Any:
+    """Return a figure of pyplot, which a notebook or a window shows; for files one that pyplot does not know.
+
+    The size, in inches, grows with the size of the text.
+    """
+    import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(figsize=size, layout=ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07))
+    scale = max(1.0, float(matplotlib.rcParams["font.size"]) / FONT_SIZE)
+    layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07)
+    options: dict[str, Any] = {"figsize": (scale * size[0], scale * size[1]), "layout": layout}
+    if _for_files.get():
+        return Figure(**options)
+    from matplotlib import pyplot
+
+    return pyplot.figure(**options)
 
 
-def root_figure(part: Any) -> Figure:
-    """Return the figure that axes or a subfigure belong to."""
-    figure: Figure = part.get_figure(root=True)
+def figure_of(axes: Any) -> Figure:
+    """Return the figure that Axes, an array of Axes or a dict of Axes belong to."""
+    first = np.ravel(np.asarray(list(axes.values()) if isinstance(axes, dict) else axes, dtype=object))[0]
+    figure: Figure = first.get_figure(root=True)
     return figure
 
 
+def sheet_of(axes: Panels | None, shown: AxesArray) -> Any:
+    """Return the figure or subfigure of new panels, None where the panels were given."""
+    return None if axes is not None and not hasattr(axes, "subplots") else shown.ravel()[0].get_figure()
+
+
+def ink() -> Any:
+    """Return the colour of text."""
+    return tone(1.0)
+
+
+def grey() -> Any:
+    """Return the colour of notes and of lines in a legend."""
+    return tone(0.75)
+
+
+def pale() -> Any:
+    """Return the colour of an area in the background."""
+    return tone(0.14)
+
+
+def tone(share: float) -> Any:
+    """Return a colour between that of the axes (0) and that of the text (1), in the style of the moment."""
+    import matplotlib
+    from matplotlib.colors import to_hex, to_rgb
+
+    rc = matplotlib.rcParams
+    parts = zip(to_rgb(rc["axes.facecolor"]), to_rgb(rc["text.color"]), strict=True)
+    red, green, blue = ((1 - share) * face + share * text for face, text in parts)
+    return to_hex((red, green, blue))
+
+
+def cycle() -> tuple[Any, ...]:
+    """Return colours of curves without an order."""
+    return (*COLOURS, ink())
+
+
 def style_axes(ax: Axes) -> None:
-    """Set what matplotlib looks up only when the figure is rendered, outside the context of `RC`."""
-    ax.tick_params(which="both", labelsize=RC["xtick.labelsize"], color=INK, labelcolor=INK)
-    ax.grid(True, color=PALE, linewidth=0.6)
+    """Keep the style of the moment, which matplotlib would look up again when the figure is rendered."""
+    import matplotlib
+
+    rc: dict[Any, Any] = matplotlib.rcParams
+    for name, axis in (("xtick", ax.xaxis), ("ytick", ax.yaxis)):
+        colour, text = rc[f"{name}.color"], rc[f"{name}.labelcolor"]
+        axis.set_tick_params(which="both", labelsize=rc[f"{name}.labelsize"], color=colour,
+                             labelcolor=colour if text == "inherit" else text)  # fmt: skip
+    if rc["axes.grid"]:
+        ax.grid(True, color=rc["grid.color"], linewidth=rc["grid.linewidth"])
 
 
-def draw_frame(ax: Axes, colour: str = INK) -> None:
+def draw_frame(ax: Axes, colour: Any = None) -> None:
     """Draw a frame on all four sides of a map."""
     ax.grid(False)
     for spine in ax.spines.values():
-        spine.set(visible=True, linewidth=0.6, color=colour)
+        spine.set(visible=True, linewidth=0.6, color=colour or ink())
 
 
 def sequence_colours(count: int) -> list[Any]:
@@ -172,7 +251,9 @@ def sequence_colours(count: int) -> list[Any]:
     import matplotlib
 
     colours = matplotlib.colormaps[SEQUENCE_MAP]
-    return [colours(position) for position in np.linspace(0.0, SEQUENCE_END, max(count, 2))[:count]]
+    is_light = sum(matplotlib.colors.to_rgb(matplotlib.rcParams["axes.facecolor"])) > 1.5
+    ends = SEQUENCE_ENDS["light" if is_light else "dark"]
+    return [colours(position) for position in np.linspace(*ends, max(count, 2))[:count]]
 
 
 def sequence_legend(ax: Axes, title: str, labels: Sequence[str], colours: Sequence[Any]) -> None:
@@ -212,7 +293,7 @@ def legend_line(label: str, **style: Any) -> Any:
     """Return a legend entry that shows a line style."""
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], label=label, **{"color": GREY, **style})
+    return Line2D([], [], label=label, **{"color": grey(), **style})
 
 
 def spread_indices(count: int, most: int) -> list[int]:
@@ -228,10 +309,10 @@ def letter(number: int) -> str:
 
 
 def halo() -> list[Any]:
-    """Return a white outline that keeps text readable where it crosses a line."""
+    """Return an outline in the colour of the axes, which keeps text readable where it crosses a line."""
     from matplotlib.patheffects import withStroke
 
-    return [withStroke(linewidth=2.0, foreground="white")]
+    return [withStroke(linewidth=2.0, foreground=tone(0.0))]
 
 
 def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
@@ -266,7 +347,7 @@ def plain_ticks(ax: Axes) -> None:
 
 def write_in_empty_axes(ax: Axes, text: str) -> None:
     """Write a note in the middle of axes without data."""
-    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=grey())
 
 
 def log_x_if_wide(ax: Axes, values: Any) -> None:

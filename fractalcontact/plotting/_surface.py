@@ -15,16 +15,15 @@ from fractalcontact.plotting._units import axis_label, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SIZE = (4.6, 3.8)
 POSITIVE = ("pressure", "gap")
 
 
-@_style.styled
+@_style.checked
 def surface(
     surface: Any, *, block: xr.DataArray | None = None, title: str = "", ax: Axes | None = None
-) -> Figure:
+) -> Axes:
     """Draw a map of heights as a shaded relief, lit from the north-west (upper left).
 
     Colour shows height. Shading shows slope, exaggerated until it is visible, and is not to scale. If a few
@@ -38,11 +37,11 @@ def surface(
         Any array with the x and y (m) of the sliding block, whose outline is drawn.
     title : str
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -53,13 +52,13 @@ def surface(
     --------
     >>> import fractalcontact as fc
     >>> heights = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> figure = fc.plotting.surface(heights)
-    >>> [ax.get_ylabel() for ax in figure.axes]
+    >>> ax = fc.plotting.surface(heights)
+    >>> [each.get_ylabel() for each in ax.figure.axes]
     ['$y$ (mm)', 'height (mm)']
     """
     plane = plane_of(surface, "surface", "height", "surface")
     outline = None if block is None else _block_extent(block)
-    figure, ax = _style.axes_or_new(ax, SIZE)
+    ax = _style.axes_or_new(ax, SIZE)
     length, height = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
     mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height)
@@ -68,11 +67,11 @@ def surface(
     _maps.colour_bar(ax, mappable, axis_label(plane, height))
     label_axes(ax, plane, length)
     ax.set_title(title)
-    return figure
+    return ax
 
 
-@_style.styled
-def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
+@_style.checked
+def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Axes:
     """Draw a map of one field of a result, for example contact pressure, gap or displacement.
 
     Parameters
@@ -81,11 +80,11 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
         Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale.
     title : str
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -97,12 +96,12 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
     >>> import fractalcontact as fc
     >>> heights = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> result = fc.contact.press(heights, contact_modulus=1e9, nominal_pressure=1e6, keep=("pressure",))
-    >>> figure = fc.plotting.field(result["pressure"])
-    >>> print(figure.axes[1].get_ylabel())
+    >>> ax = fc.plotting.field(result["pressure"])
+    >>> print(ax.figure.axes[1].get_ylabel())
     contact pressure (MPa)
     """
     plane = plane_of(data, "field", "", "data")
-    figure, ax = _style.axes_or_new(ax, SIZE)
+    ax = _style.axes_or_new(ax, SIZE)
     length, shown = plane_scale(plane), scale_of(plane)
     mappable = _maps.field(
         ax, np.asarray(plane.values, float), extent_of(plane), length, shown, positive=plane.name in POSITIVE
@@ -110,7 +109,7 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Figure:
     _maps.colour_bar(ax, mappable, shown.label(name_of(plane)))
     label_axes(ax, plane, length)
     ax.set_title(title)
-    return figure
+    return ax
 
 
 def _block_extent(block: Any) -> tuple[float, float, float, float]:

@@ -14,14 +14,13 @@ from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FLOW_LINES = ("-", (0, (4, 2)))
 MEAN_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}
 
 
-@_style.styled
-def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
+@_style.checked
+def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the hydraulic aperture against load, one curve per shear displacement and flow direction.
 
     The aperture is zero where contacts block the flow from side to side. Thin dotted lines show the
@@ -33,11 +32,11 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
         From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
         over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
     ax : Axes, optional
-        Draw here; otherwise on a new figure.
+        Default: those of a new figure.
 
     Returns
     -------
-    Figure
+    Axes
 
     Raises
     ------
@@ -49,11 +48,11 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e5, 1e6], keep=("gap",))
-    >>> ax = fc.plotting.hydraulic_aperture(fc.joints.transmissivity(pressed["gap"])).axes[0]
+    >>> ax = fc.plotting.hydraulic_aperture(fc.joints.transmissivity(pressed["gap"]))
     >>> print(ax.get_ylabel())
     hydraulic aperture (µm)
     """
-    figure, ax = _style.axes_or_new(ax)
+    ax = _style.axes_or_new(ax)
     data = result_of(result, "hydraulic_aperture", ("hydraulic_aperture",), ("shear", "step", "axis"))
     by_shear = data.sizes["step"] == 1 and "shear" in data.coords
     over, dim = ("step", "shear") if by_shear else ("shear", "step")
@@ -89,4 +88,4 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Figure:
         if mean_gap is not None:
             entries.append(_style.legend_line("mean gap", **MEAN_LINE))
         _style.side_legend(ax, entries, title="flow", low=True)
-    return figure
+    return ax

@@ -13,18 +13,18 @@ from fractalcontact.plotting._surface import label_axes, plane_of, plane_scale
 from fractalcontact.plotting._units import axis_label, scale_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    from fractalcontact.plotting._style import AxesArray, Panels
 
 SIZE = (9.0, 3.6)  # inches
 LINES: dict[str, dict[str, Any]] = {
     "joint": {"color": _style.BLUE, "ls": "-"},
-    "linear": {"color": _style.INK, "ls": "--", "lw": 1.0},
+    "linear": {"ls": "--", "lw": 1.0},
     "bilinear": {"color": _style.RED, "ls": "-.", "lw": 1.0},
 }
 
 
-@_style.styled
-def uplift(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
+@_style.checked
+def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw the water pressure in a joint and, beside it, the uplift along the flow with its lines of action.
 
     The diagrams of guidelines are dashed. A triangle on the axis marks each line of action. Contacts and
@@ -34,12 +34,12 @@ def uplift(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.uplift`, of one gap.
-    figure : Figure or SubFigure, optional
-        Draw here; otherwise a new figure is made.
+    axes : array of Axes, Figure or SubFigure, optional
+        The Axes of the panels, or a figure to make them in. Default: a new figure.
 
     Returns
     -------
-    Figure
+    array of Axes
 
     Raises
     ------
@@ -51,8 +51,8 @@ def uplift(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
     >>> import numpy as np
     >>> import fractalcontact as fc
     >>> gap = fc.surfaces.from_array(np.full((8, 16), 1e-4), 1.0)
-    >>> figure = fc.plotting.uplift(fc.joints.uplift(gap, upstream_pressure=490e3))
-    >>> print(figure.axes[1].get_ylabel())
+    >>> pressure, uplift = fc.plotting.uplift(fc.joints.uplift(gap, upstream_pressure=490e3))
+    >>> print(uplift.get_ylabel())
     uplift (kPa)
     """
     data = result_of(result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_arm"), ())
@@ -61,15 +61,14 @@ def uplift(result: Any, *, figure: Figure | SubFigure | None = None) -> Figure:
                                               and d not in ("diagram", "x", "y")])  # fmt: skip
     with Problems("fc.plotting.uplift") as problems:
         problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
-    figure = _style.figure_or_new(figure, SIZE)
-    left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
+    left, right = shown = _style.panel_row(axes, 2, SIZE, width_ratios=(1.0, 1.1))
     length, pressure = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
     mappable = _maps.field(left, np.asarray(plane.values, float), extent, length, pressure, positive=False)
     _maps.colour_bar(left, mappable, axis_label(plane, pressure))
     label_axes(left, plane, length)
     _draw_diagrams(right, data, profile, extent, length, pressure)
-    return _style.root_figure(figure)
+    return shown
 
 
 def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, pressure: Any) -> None:
@@ -78,10 +77,9 @@ def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, p
     start, end = extent[:2] if dim == "x" else extent[2:]
     linear = profile.sel(diagram="linear").values
     falls = bool(linear[0] >= linear[-1])  # from the start of the axis
-    _style.style_axes(ax)
     for name in words(profile["diagram"]):
         arm = float(data["uplift_arm"].sel(diagram=name))
-        style = LINES[name]
+        style = {"color": _style.ink(), **LINES[name]}
         ax.plot(length(profile[dim].values), pressure(profile.sel(diagram=name).values), label=name, **style)
         place = float(length(start + arm if falls else end - arm))
         ax.plot([place], [0.0], marker="^", color=style["color"], clip_on=False, ls="", ms=6, zorder=3)
@@ -91,5 +89,5 @@ def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, p
     ax.set_ylabel(pressure.label("uplift"))
     lines = [line for line in ax.lines if not line.get_label().startswith("_")]
     _style.side_legend(
-        ax, [*lines, _style.legend_line("line of action", marker="^", ls="", color=_style.GREY)]
+        ax, [*lines, _style.legend_line("line of action", marker="^", ls="", color=_style.grey())]
     )

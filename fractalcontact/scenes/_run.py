@@ -232,11 +232,13 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
 
 def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     """Write the page about the joint as PDF; of an ensemble that of its first member."""
+    from matplotlib.figure import Figure
+
     from fractalcontact import plotting
 
-    first = of_member(tree, 0)
+    first, page = of_member(tree, 0), Figure()
     with DRAWING_LOCK, netcdf.written_whole(target) as temporary:
-        page = plotting.datasheet(first, notes=caveats(first))
+        plotting.datasheet(first, notes=caveats(first), figure=page)
         page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
 
 

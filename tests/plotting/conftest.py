@@ -6,3 +6,13 @@ import pytest
 def study():
     """A complete synthetic study; tests must not change it."""
     return plotting_synthetic.study()
+
+
+@pytest.fixture(autouse=True)
+def _style_of_the_files():
+    """Draw in the style of the files; close what pyplot keeps."""
+    from matplotlib import pyplot as plt
+
+    with plt.style.context("fractalcontact.plotting.report"):
+        yield
+    plt.close("all")

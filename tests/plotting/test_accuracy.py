@@ -11,8 +11,8 @@ from fractalcontact import plotting
 
 def test_error_against_time_curves():
     measured = synthetic.accuracy()
-    axes = plotting.error_against_time(measured).axes
-    for left, right, (name, part) in zip(axes[::2], axes[1::2], measured.children.items(), strict=True):
+    axes = plotting.error_against_time(measured)
+    for left, right, (name, part) in zip(*axes.T, measured.children.items(), strict=True):
         assert left.get_title(loc="left").startswith(f"{name}: sphere")
         unit = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", left.get_xlabel()).group(1)]
         for row, method in enumerate(part.method.values):
@@ -29,7 +29,7 @@ def test_distinct_styles_and_narrow_cost_axis():
     expected = synthetic.accuracy()["contact"].to_dataset().isel(method=[0] * 10)
     expected["method"] = [f"method {k}" for k in range(10)]
     expected["memory"] = expected["memory"] * 0 + 1e6 * (1 + 1e-5 * np.arange(expected.sizes["setting"]))
-    _, right = plotting.error_against_time(expected).axes
+    ((_, right),) = plotting.error_against_time(expected)
     styles = {(line.get_color(), line.get_marker()) for line in right.lines[::2]}
     assert len(styles) == 10
     low, high = right.get_xlim()

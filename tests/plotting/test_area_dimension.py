@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from plotting_figures import drawn, holds, render
+from plotting_figures import drawn, figure_of, holds, render
 
 from fractalcontact import plotting
 from fractalcontact.base.schema import label
@@ -48,7 +48,7 @@ def strengths():
 def test_area_of_every_load_at_one_shear():
     result = areas()
     for options, shear in (({}, 1), ({"shear": 7e-3}, 2)):
-        figure = plotting.area_dimension(result, **options)
+        figure = figure_of(plotting.area_dimension(result, **options))
         ax = figure.axes[0]
         curves = drawn(ax)
         assert len(curves) == 4
@@ -61,7 +61,7 @@ def test_area_of_every_load_at_one_shear():
 
 def test_strength_of_every_direction_and_shear():
     result = strengths()
-    figure = plotting.self_weight(result)
+    figure = figure_of(plotting.self_weight(result))
     curves = drawn(figure.axes[0])
     assert len(curves) == 5
     for direction in range(2):

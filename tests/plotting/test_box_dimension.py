@@ -16,7 +16,7 @@ def closed():
 
 def test_null_and_interval(closed):
     result = synthetic.box_dimension(closed)
-    by_load, by_shear = plotting.box_dimension(result).axes
+    by_load, by_shear = plotting.box_dimension(result)
 
     def lines(ax):
         fx = factor(ax.get_xlabel())
@@ -35,7 +35,7 @@ def test_null_and_interval(closed):
 
 def test_chosen_force(closed):
     result = synthetic.box_dimension(closed)
-    ax = plotting.box_dimension(result, normal_force=1e3).axes[1]
+    ax = plotting.box_dimension(result, normal_force=1e3)[1]
     assert np.allclose(ax.lines[0].get_ydata(), result.box_dimension.sel(step=2))
     assert "1 kN" in ax.get_title(loc="left")
 
@@ -44,9 +44,9 @@ def test_wide_or_missing_interval_is_open_point(closed):
     result = synthetic.box_dimension(closed).isel(shear=0, step=slice(1, None)).copy(deep=True)
     result["ci_high"].values[0] += 0.6
     result["ci_low"].values[1] = np.nan
-    (ax,) = plotting.box_dimension(result).axes
+    (ax,) = plotting.box_dimension(result)
     _, filled, hollow, _ = ax.lines
-    assert hollow.get_markerfacecolor() == "white"
+    assert hollow.get_markerfacecolor() == ax.get_facecolor()
     assert np.array_equal(hollow.get_ydata(), result.box_dimension.values[:2])
     assert np.array_equal(filled.get_ydata(), result.box_dimension.values[2:])
     assert len(ax.collections) == 1
@@ -60,11 +60,11 @@ def test_minkowski_dimension():
         },
         coords={"normal_force": ("step", np.array([1.0, 2.0]), {"units": "N"})},
     )
-    (ax,) = plotting.box_dimension(result).axes
+    (ax,) = plotting.box_dimension(result)
     assert ax.lines[0].get_ydata() == pytest.approx([0.5, 1.5])
     assert "inkowski" in ax.get_ylabel()
     empty = result.assign(minkowski_dimension=result["minkowski_dimension"] * np.nan)
-    assert plotting.box_dimension(empty).axes[0].texts[0].get_text() == "no contact"
+    assert plotting.box_dimension(empty)[0].texts[0].get_text() == "no contact"
 
 
 def test_local_slopes_and_null():
@@ -79,7 +79,7 @@ def test_local_slopes_and_null():
         },
         coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
     )
-    (ax,) = plotting.local_slopes(result).axes
+    (ax,) = plotting.local_slopes(result)
     lines = [line.get_ydata() for line in ax.lines]
     for line, want in zip(lines, (1.2, 0.5, 1.5, 1.0), strict=True):
         assert line == pytest.approx(np.full(4, want))
@@ -87,4 +87,4 @@ def test_local_slopes_and_null():
     assert low < 0
     assert high > 2
     steep = result.assign(local_slope=result["local_slope"] + 2.0)
-    assert plotting.local_slopes(steep).axes[0].get_ylim()[1] > 3.5
+    assert plotting.local_slopes(steep)[0].get_ylim()[1] > 3.5

@@ -16,21 +16,21 @@ def closed():
 
 
 def test_closure_laws_curves(closed):
-    curves = drawn(plotting.closure_laws(closed).axes[0])
+    curves = drawn(plotting.closure_laws(closed))
     for v in closed.shear:
         for name in ("closure", "interface_closure"):
             assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
 
 
 def test_marked_points(closed):
-    ax = plotting.closure_laws(closed, shear=1.6e-3, marked=[1, 3]).axes[0]
+    ax = plotting.closure_laws(closed, shear=1.6e-3, marked=[1, 3])
     expected = closed.sel(shear=1.6e-3).isel(step=[1, 3])
     assert holds(drawn(ax), expected.interface_closure, expected.normal_force)
     assert [text.get_text() for text in ax.texts] == ["A", "B"]
 
 
 def test_contact_area_raw_and_corrected(closed):
-    curves = drawn(plotting.contact_area(closed).axes[0])
+    curves = drawn(plotting.contact_area(closed))
     for v in closed.shear:
         expected = closed.sel(shear=v)
         assert holds(curves, expected.normal_force, expected.contact_fraction)
@@ -38,14 +38,14 @@ def test_contact_area_raw_and_corrected(closed):
 
 
 def test_contact_area_against_closure(closed):
-    curves = drawn(plotting.contact_area(closed, against="closure").axes[0])
+    curves = drawn(plotting.contact_area(closed, against="closure"))
     assert holds(curves, closed.closure.isel(shear=0), closed.contact_fraction.isel(shear=0))
 
 
 def test_long_legend_is_thinned():
     shears = np.linspace(8e-4, 8e-3, 10)
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=shears))
-    ax = plotting.closure_laws(closed).axes[0]
+    ax = plotting.closure_laws(closed)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert "0.8" in named
     assert "8" in named
@@ -58,8 +58,8 @@ def test_draw_into_given_axes(closed):
 
     sheet = Figure(layout="constrained")
     left, right = sheet.subplots(1, 2)
-    assert plotting.closure_laws(closed, ax=left) is sheet
-    assert plotting.contact_area(closed, ax=right) is sheet
+    assert plotting.closure_laws(closed, ax=left) is left
+    assert plotting.contact_area(closed, ax=right) is right
     assert len(sheet.axes) == 2
 
 
@@ -85,7 +85,7 @@ def test_theories_beside_the_contact_area():
     given = {"contact_modulus": 1e9, "nominal_pressure": [1e5, 5e5, 1e6]}
     pressed, theory = fc.contact.press(surface, **given), fc.contact.theories(surface, **given)
     for against in ("nominal_pressure", "normal_force"):
-        ax = plotting.contact_area(pressed, against=against, theory=theory).axes[0]
+        ax = plotting.contact_area(pressed, against=against, theory=theory)
         for name in theory.theory:
             expected = theory.contact_fraction.sel(theory=name)
             assert holds(drawn(ax), expected[against], expected)

@@ -4,7 +4,7 @@ import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
-from plotting_figures import CONTACT, OPEN, YIELDED, colours, render
+from plotting_figures import CONTACT, OPEN, YIELDED, colours, figure_of, render
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
@@ -15,7 +15,7 @@ def test_state_colours():
     state = closed.state.isel(shear=0, step=-1).copy()
     state.values[2, 5] = 2
     result = closed.isel(shear=0, step=-1).assign(state=state)
-    image = colours(plotting.contact_domains(result).axes[0])
+    image = colours(plotting.contact_domains(result)[0])
     assert np.array_equal(np.all(image == CONTACT, axis=-1), state.values == 1)
     assert np.array_equal(np.all(image == YIELDED, axis=-1), state.values == 2)
     assert np.array_equal(np.all(image == OPEN, axis=-1), state.values == 0)
@@ -23,7 +23,7 @@ def test_state_colours():
 
 def test_load_path_at_chosen_shear():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
-    axes = plotting.contact_domains(closed, shear=1.5e-3, panels=3).axes
+    axes = plotting.contact_domains(closed, shear=1.5e-3, panels=3)
     steps = [1, 3, 4]  # evenly over the closure, the unloaded step left out
     for ax, step in zip(axes, steps, strict=True):
         expected = closed.sel(shear=1.6e-3).isel(step=step)
@@ -35,7 +35,7 @@ def test_load_path_at_chosen_shear():
 
 def test_shear_path_at_chosen_force():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
-    axes = plotting.contact_domains(closed, normal_force=9e3).axes
+    axes = plotting.contact_domains(closed, normal_force=9e3)
     assert len(axes) == 3
     for ax, v in zip(axes, closed.shear, strict=True):
         assert np.array_equal(np.all(colours(ax) == CONTACT, axis=-1), closed.state.sel(shear=v, step=3) == 1)
@@ -47,16 +47,16 @@ def test_common_force_is_written_once():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3)))
     force = closed.normal_force.values * (1 + 1e-9 * np.arange(2)[:, None])
     closed = closed.assign_coords(normal_force=(("shear", "step"), force))
-    figure = plotting.contact_domains(closed, normal_force=1e4)
+    figure = figure_of(plotting.contact_domains(closed, normal_force=1e4))
     assert figure.get_suptitle() == "$F$ = 10 kN"
     force[1] *= 1.5
     closed = closed.assign_coords(normal_force=(("shear", "step"), force))
-    assert plotting.contact_domains(closed, normal_force=1e4).get_suptitle() == ""
+    assert figure_of(plotting.contact_domains(closed, normal_force=1e4)).get_suptitle() == ""
 
 
 def test_unit_of_loads():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4,)), forces=(40.0, 4e3, 2e4))
-    titles = [ax.get_title(loc="left") for ax in plotting.contact_domains(closed).axes]
+    titles = [ax.get_title(loc="left") for ax in plotting.contact_domains(closed)]
     for title, force in zip(titles, ("40 N", "4 kN", "20 kN"), strict=True):
         assert f"= {force}," in title
 

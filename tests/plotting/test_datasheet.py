@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from plotting_figures import render
+from plotting_figures import figure_of, render
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -35,7 +35,7 @@ def texts(figure):
 
 
 def test_panels_are_the_values(tree):
-    page = plotting.datasheet(tree, notes=["islands of few cells"])
+    page = figure_of(plotting.datasheet(tree, notes=["islands of few cells"]))
     axes = {ax.get_title(loc="left"): ax for ax in page.axes}
     closed, flow = tree["joints/closure"], tree["joints/transmissivity"]
     stiffness = axes["normal stiffness (MPa/mm)"].lines[1]
@@ -50,7 +50,7 @@ def test_panels_are_the_values(tree):
 
 
 def test_words_are_those_of_the_results(tree):
-    page = plotting.datasheet(tree, notes=["islands of few cells"])
+    page = figure_of(plotting.datasheet(tree, notes=["islands of few cells"]))
     shown = texts(page)
     coefficient = tree["joints/roughness_coefficient"].roughness_coefficient.values[0]
     for expected in (
@@ -65,13 +65,15 @@ def test_words_are_those_of_the_results(tree):
 
 
 def test_a_study_of_the_roughness_alone_has_a_page(tree):
-    page = plotting.datasheet(
-        xr.DataTree.from_dict(
-            {
-                "/joints/roughness_coefficient": fc.joints.roughness_coefficient(
-                    fc.surfaces.fbm((24, 24), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
-                )
-            }
+    page = figure_of(
+        plotting.datasheet(
+            xr.DataTree.from_dict(
+                {
+                    "/joints/roughness_coefficient": fc.joints.roughness_coefficient(
+                        fc.surfaces.fbm((24, 24), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
+                    )
+                }
+            )
         )
     )
     assert "JRC E" in texts(page)

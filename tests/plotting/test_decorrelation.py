@@ -31,7 +31,7 @@ def delta_dimensions():
 
 def test_correlation_and_length():
     result = decorrelation()
-    ax = plotting.correlation(result).axes[0]
+    ax = plotting.correlation(result)
     curves = [line for line in ax.lines if len(line.get_xdata()) == 3]
     for line, values in zip(curves, result["correlation"].values, strict=True):
         assert np.array_equal(line.get_ydata(), values)
@@ -48,7 +48,7 @@ def test_correlation_and_length():
 
 def test_delta_dimension_curves():
     result = delta_dimensions()
-    ax = plotting.delta_dimension(result).axes[0]
+    ax = plotting.delta_dimension(result)
     assert [list(line.get_ydata()) for line in ax.lines] == [list(result[name].values) for name in WAYS]
     assert ax.get_xscale() == "log"
 
@@ -59,8 +59,8 @@ def test_nan_and_single_shear():
         (delta_dimensions(), plotting.delta_dimension),
     ):
         missing = result.assign({name: v * np.nan for name, v in result.data_vars.items()})
-        draw(missing).canvas.draw()
-        draw(result.isel(shear=0)).canvas.draw()
+        draw(missing).figure.canvas.draw()
+        draw(result.isel(shear=0)).figure.canvas.draw()
 
 
 def test_wrong_result_is_refused():

@@ -10,7 +10,7 @@ from fractalcontact.base.errors import InvalidInput
 
 def test_rigid_dilatancy_curves():
     opening = synthetic.dilatancy(forces=())
-    ax = plotting.rigid_dilatancy(opening).axes[0]
+    ax = plotting.rigid_dilatancy(opening)
     for word in "ENWS":
         expected = opening.sel(direction=word)
         assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
@@ -20,7 +20,7 @@ def test_rigid_dilatancy_curves():
 
 def test_elastic_dilatancy_curves():
     opening = synthetic.dilatancy()
-    ax = plotting.elastic_dilatancy(opening, direction="N", reach=8e-4).axes[0]
+    ax = plotting.elastic_dilatancy(opening, direction="N", reach=8e-4)
     expected = opening.sel(direction="N").where(opening.shear < 8.1e-4, drop=True)
     assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
     for step in range(3):
@@ -35,7 +35,7 @@ def test_several_directions_are_refused():
 
 def test_direction_names_and_styles():
     opening = synthetic.dilatancy(forces=(), directions=("E", "NE", "30", "33.5"))
-    ax = plotting.rigid_dilatancy(opening).axes[0]
+    ax = plotting.rigid_dilatancy(opening)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert named[:4] == ["East", "NE", "30°", "33.5°"]
     styles = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:8:2]]

@@ -6,7 +6,7 @@ import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
-from plotting_figures import factor
+from plotting_figures import factor, figure_of
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -16,8 +16,8 @@ def test_curve_window_and_slope():
     curves, estimates = synthetic.curves(), synthetic.estimates()
     estimates["hurst"][:] = 0.78
     estimates["fractal_dimension"][:] = 2.22
-    axes = plotting.dimension_curves(curves, estimates).axes
-    upper, lower = axes[:3], axes[3:]
+    axes = plotting.dimension_curves(curves, estimates)
+    upper, lower = axes
     for ax, below, (name, curve) in zip(upper, lower, curves.items(), strict=True):
         scale = next(iter(curve.dims))
         fx = factor(below.get_xlabel())
@@ -41,7 +41,7 @@ def test_profile_panels_and_tick_labels():
     profile = fc.surfaces.fbm(200, 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
     names = ("spectrum", "variogram", "roughness_length", "variation", "cube_counts", "covering")
     curves = {name: getattr(fc.dimensions, name)(profile) for name in names}
-    figure = plotting.dimension_curves(curves, fc.dimensions.estimate(profile, list(names)))
+    figure = figure_of(plotting.dimension_curves(curves, fc.dimensions.estimate(profile, list(names))))
     titles = {ax.get_title(loc="left") for ax in figure.axes}
     assert titles >= {name.replace("_", " ") for name in names}
     figure.draw_without_rendering()
@@ -91,14 +91,14 @@ def test_slope_of_each_curve(name, hurst):
         },
         coords={"method": ["fit"]},
     )
-    upper, lower = plotting.dimension_curves({"fit": curve}, estimates).axes
+    (upper,), (lower,) = plotting.dimension_curves({"fit": curve}, estimates)
     assert lower.lines[1].get_ydata() == pytest.approx(slope)
     assert f"slope {slope:.2f}" in upper.texts[0].get_text()
 
 
 def test_intervals_of_the_dimension():
     estimates = synthetic.estimates()
-    ax = plotting.dimensions(estimates, truth=2.22, band=(2.15, 2.29)).axes[0]
+    ax = plotting.dimensions(estimates, truth=2.22, band=(2.15, 2.29))
     with_interval = estimates.isel(method=slice(0, -1))
     segments = np.array(ax.collections[0].get_segments())[:, :, 0]
     assert segments[:, 0] == pytest.approx((3 - with_interval.ci_high).values)

@@ -14,7 +14,7 @@ def surface():
 
 def test_curves_are_closed_and_hold_the_values(surface):
     result = fc.joints.directional_roughness(surface)
-    ax = plotting.directional_roughness(result).axes[0]
+    ax = plotting.directional_roughness(result)
     for line, name in zip(ax.lines, ("roughness_metric", "mean_dip"), strict=True):
         angle, radius = line.get_data()
         np.testing.assert_allclose(np.degrees(angle[:-1]), result.azimuth)
@@ -26,7 +26,7 @@ def test_curves_are_closed_and_hold_the_values(surface):
 
 def test_a_sector_stays_open_and_is_drawn_in_order(surface):
     result = fc.joints.directional_roughness(surface, azimuth=[40.0, 0.0, 20.0])
-    angle, radius = plotting.directional_roughness(result).axes[0].lines[0].get_data()
+    angle, radius = plotting.directional_roughness(result).lines[0].get_data()
     np.testing.assert_allclose(np.degrees(angle), [0, 20, 40], atol=1e-12)
     np.testing.assert_allclose(radius, result.roughness_metric[[1, 2, 0]])
 
@@ -38,4 +38,4 @@ def test_axes_that_are_not_polar_are_refused(surface):
     with pytest.raises(ValueError, match="polar axes"):
         plotting.directional_roughness(result, ax=Figure().add_subplot())
     polar = Figure().add_subplot(projection="polar")
-    assert plotting.directional_roughness(result, ax=polar) is polar.figure
+    assert plotting.directional_roughness(result, ax=polar) is polar

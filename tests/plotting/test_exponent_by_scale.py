@@ -14,7 +14,7 @@ def result():
 
 
 def test_points_and_window(result):
-    ax = plotting.scaling(result).axes[0]
+    ax = plotting.scaling(result)
     window = next(line for line in ax.lines if np.ptp(line.get_xdata()) > 0 and len(line.get_xdata()) == 2)
     assert window.get_ydata()[0] == pytest.approx(float(result.window_hurst))
     assert ax.get_xlabel() == "wavelength (mm)"
@@ -22,7 +22,7 @@ def test_points_and_window(result):
 
 
 def test_no_window_is_drawn_where_there_is_none(result):
-    ax = plotting.scaling(result.assign(window_hurst=np.nan)).axes[0]
+    ax = plotting.scaling(result.assign(window_hurst=np.nan))
     assert ax.get_legend_handles_labels()[1] == ["octave, 95 %"]
 
 

@@ -13,7 +13,7 @@ from fractalcontact.base.schema import label
 def test_map_and_area_distribution():
     state = synthetic.closure(synthetic.delta(synthetic.heights())).state.isel(shear=0, step=-1)
     result = synthetic.islands(state)
-    map_, areas = plotting.islands(result).axes
+    map_, areas = plotting.islands(result)
     image = colours(map_)
     assert np.array_equal(np.all(image == OPEN, axis=-1), result.label.values == 0)
     assert map_.get_title(loc="left") == f"{int(result.n_islands)} islands"
@@ -34,7 +34,7 @@ def test_several_masks():
     coords = {"island_step": ("island", step), "y": state.y, "x": state.x, "step": [3, 4]}
     coords["normal_force"] = ("step", [1e4, 3e4])
     both = label(xr.Dataset(data, coords=coords))
-    map_, curves = plotting.islands(both).axes
+    map_, curves = plotting.islands(both)
     assert np.array_equal(np.all(colours(map_) == OPEN, axis=-1), parts[1].label.values == 0)
     for line, part in zip(curves.lines, parts, strict=True):
         assert np.asarray(line.get_xdata()) * 1e-6 == pytest.approx(np.sort(part.area.values)[::-1])

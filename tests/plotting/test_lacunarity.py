@@ -15,7 +15,7 @@ def closed():
 
 def test_curves_and_null(closed):
     result = synthetic.lacunarity(closed)
-    by_load, by_shear = plotting.lacunarity(result, shear=8e-3).axes
+    by_load, by_shear = plotting.lacunarity(result, shear=8e-3)
     shown = [np.asarray(line.get_ydata()) for line in by_load.lines]
     for step in range(1, 5):
         expected = result.sel(shear=8e-3).isel(step=step)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plotting_figures import colours, render
+from plotting_figures import colours, figure_of, render
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -24,7 +24,7 @@ def sheared():
 
 def test_each_state_has_its_colour(sheared):
     step = sheared.isel(step=2)
-    image = colours(plotting.slip_domains(step).axes[0]).reshape(-1, 3)
+    image = colours(plotting.slip_domains(step)[0]).reshape(-1, 3)
     flags = step["slip_state"].values.ravel()
     shown = [np.unique(image[flags == flag], axis=0) for flag in (0, 1, 2)]
     assert [len(colour) for colour in shown] == [1, 1, 1]
@@ -34,7 +34,7 @@ def test_each_state_has_its_colour(sheared):
 
 
 def test_titles_and_legend(sheared):
-    figure = plotting.slip_domains(sheared)
+    figure = figure_of(plotting.slip_domains(sheared))
     titles = [ax.get_title(loc="left") for ax in figure.axes][:5]
     share = 100 * float(sheared["stick_area"][1] / sheared["contact_area"])
     assert "0 N" in titles[0]
@@ -47,14 +47,14 @@ def test_titles_and_legend(sheared):
 
 
 def test_fewer_panels_and_no_contact(sheared):
-    assert sum(ax.axison for ax in plotting.slip_domains(sheared, panels=3).axes) == 3
+    assert sum(ax.axison for ax in plotting.slip_domains(sheared, panels=3)) == 3
     empty = sheared.isel(step=[0]).copy()
     empty["slip_state"] = empty["slip_state"] * 0
-    assert "no contact" in plotting.slip_domains(empty).axes[0].get_title(loc="left")
+    assert "no contact" in plotting.slip_domains(empty)[0].get_title(loc="left")
 
 
 def test_loops_are_the_values_of_the_result(sheared):
-    left, right = plotting.slip_loops(sheared).axes
+    left, right = plotting.slip_loops(sheared)
     x, y = left.lines[0].get_data()
     np.testing.assert_allclose(y, sheared["tangential_force"])
     assert left.get_xlabel() == "tangential displacement (µm)"
@@ -67,7 +67,7 @@ def test_loops_of_a_joint():
     face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=2e-6, rng=1)
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
     pushed = fc.joints.partial_slip(crack, shear=[1e-4, 3e-4], normal_force=50, tangential_force=[0, 20, -20])
-    figure = plotting.slip_loops(pushed)
+    figure = figure_of(plotting.slip_loops(pushed))
     left, right = figure.axes
     assert len(left.lines) == len(right.lines) == 2
     np.testing.assert_allclose(left.lines[1].get_xdata(), 1e6 * pushed["tangential_displacement"][1])

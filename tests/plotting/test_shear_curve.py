@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plotting_figures import drawn, holds, render
+from plotting_figures import drawn, figure_of, holds, render
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -28,7 +28,7 @@ def criterion(face):
 
 
 def test_curves_are_the_values(test_result):
-    figure = plotting.shear_curve(test_result)
+    figure = figure_of(plotting.shear_curve(test_result))
     for ax, name in zip(figure.axes, ("shear_stress", "dilatancy"), strict=True):
         for i in range(2):
             one = test_result.isel(nominal_pressure=i)
@@ -37,7 +37,7 @@ def test_curves_are_the_values(test_result):
 
 
 def test_a_criterion_beside_a_test_shares_colours_and_units(test_result, criterion):
-    figure = plotting.shear_curve(test_result, beside=criterion)
+    figure = figure_of(plotting.shear_curve(test_result, beside=criterion))
     stress = figure.axes[0]
     dashed = [line for line in stress.lines if line.get_linestyle() == "--"]
     assert len(dashed) == 2
@@ -53,7 +53,7 @@ def test_peaks_are_points_on_the_envelope(face, test_result):
     envelope = fc.joints.strength_envelope(
         face, nominal_pressure=[1e6, 3e7], wall_strength=1e8, basic_friction_angle=30
     )
-    ax = plotting.strength_envelope(envelope, tests=test_result).axes[0]
+    ax = plotting.strength_envelope(envelope, tests=test_result)
     points = next(line for line in ax.lines if line.get_marker() == "o")
     np.testing.assert_allclose(points.get_xdata(), [2, 20])
     np.testing.assert_allclose(points.get_ydata(), test_result.peak_shear_strength / 1e6)

@@ -11,7 +11,7 @@ from fractalcontact import plotting
 def test_plan_and_section():
     surface = synthetic.heights()
     slid = synthetic.delta(surface, shears=(8e-3,))
-    plan, cut = plotting.sliding_scheme(surface, slid).axes
+    plan, cut = plotting.sliding_scheme(surface, slid)
     start, moved = plan.patches
     assert start.get_x() - moved.get_x() == pytest.approx(8.0)  # to West
     assert start.get_y() == pytest.approx(moved.get_y())
@@ -25,7 +25,7 @@ def test_plan_and_section():
 
 def test_block_stays_above_lower_surface():
     surface = synthetic.heights()
-    _, cut = plotting.sliding_scheme(surface, synthetic.delta(surface)).axes
+    _, cut = plotting.sliding_scheme(surface, synthetic.delta(surface))
     ground, block = (np.array([line.get_xdata(), line.get_ydata()]) for line in cut.lines[:2])
     below = np.interp(block[0, 1:-1], *ground)
     assert (block[1, 1:-1] >= below - 1e-9).all()

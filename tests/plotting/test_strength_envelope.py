@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plotting_figures import drawn, holds, render
+from plotting_figures import drawn, figure_of, holds, render
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -22,7 +22,7 @@ def result():
 
 
 def test_curves_are_the_strengths_in_order_of_the_stress(result):
-    figure = plotting.strength_envelope(result)
+    figure = figure_of(plotting.strength_envelope(result))
     ax = figure.axes[0]
     ordered = result.sortby("nominal_pressure")
     for name in result.criterion.values:
@@ -37,7 +37,7 @@ def test_curves_are_the_strengths_in_order_of_the_stress(result):
 
 
 def test_axes_start_at_zero_and_share_their_unit(result):
-    ax = plotting.strength_envelope(result.isel(criterion=[0])).axes[0]
+    ax = plotting.strength_envelope(result.isel(criterion=[0]))
     assert ax.get_xlim()[0] == ax.get_ylim()[0] == 0
     assert ax.get_xlabel().endswith("(MPa)")
     assert ax.get_ylabel().endswith("(MPa)")

@@ -4,7 +4,7 @@ import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
-from plotting_figures import MISSING, OPEN, colours, factor, render
+from plotting_figures import MISSING, OPEN, colours, factor, figure_of, render
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
@@ -23,7 +23,7 @@ def test_extent_and_light():
     x = np.linspace(1e-3, 3e-3, 41)
     bump = np.exp(-((x - 2e-3) ** 2 + (x[:, None] - 2e-3) ** 2) / 2e-7)
     plane = label(xr.DataArray(1e-5 * bump, dims=("y", "x"), coords={"y": x, "x": x}, name="height"))
-    ax = plotting.surface(plane).axes[0]
+    ax = plotting.surface(plane)
     half = 0.5 * (x[1] - x[0]) * 1e3
     assert ax.images[0].get_extent() == pytest.approx([1 - half, 3 + half, 1 - half, 3 + half])
     assert ax.get_aspect() == 1.0
@@ -34,7 +34,7 @@ def test_extent_and_light():
 
 def test_colour_bar_of_heights():
     surface = synthetic.heights()
-    figure = plotting.surface(surface)
+    figure = figure_of(plotting.surface(surface))
     bar = figure.axes[1]
     assert bar.get_ylabel() == "height (mm)"
     assert bar.get_ylim() == pytest.approx((float(surface.min()) * 1e3, float(surface.max()) * 1e3), rel=0.25)
@@ -42,12 +42,12 @@ def test_colour_bar_of_heights():
 
 def test_outliers_are_cut():
     z = np.random.default_rng(0).standard_normal((60, 60))
-    bar = plotting.surface(plane_of(z)).axes[1]
+    bar = plotting.surface(plane_of(z)).figure.axes[1]
     assert bar.get_ylabel() == "height (m)"
     assert bar.get_ylim() == pytest.approx((z.min(), z.max()))
     assert not bar.patches  # no pointed end
     z[3, 4] = 1e6
-    bar = plotting.surface(plane_of(z)).axes[1]
+    bar = plotting.surface(plane_of(z)).figure.axes[1]
     low, high = np.array(bar.get_ylim()) * factor(bar.get_ylabel())
     assert low == pytest.approx(z.min())
     assert high < 5
@@ -57,7 +57,7 @@ def test_outliers_are_cut():
 def test_missing_heights_are_grey():
     surface = synthetic.heights().copy()
     surface.values[:5, :7] = np.nan
-    image = colours(plotting.surface(surface).axes[0])
+    image = colours(plotting.surface(surface))
     assert np.allclose(image[:5, :7], MISSING)
     assert np.isfinite(image).all()
 
@@ -67,9 +67,9 @@ def test_large_planes_are_averaged():
     fine = np.repeat(means, 2, axis=0)
     fine[::2] -= 0.25
     fine[1::2] += 0.25
-    image = colours(plotting.field(plane_of(fine, (0.5, 1.0))).axes[0])
+    image = colours(plotting.field(plane_of(fine, (0.5, 1.0))))
     assert image.shape == (1600, 3, 3)
-    assert np.allclose(image, colours(plotting.field(plane_of(means)).axes[0]))
+    assert np.allclose(image, colours(plotting.field(plane_of(means))))
 
 
 def test_zero_pressure_is_pale():
@@ -77,7 +77,7 @@ def test_zero_pressure_is_pale():
     pressure = label(
         xr.DataArray(np.maximum(surface.values, 0) * 1e10, coords=surface.coords, name="pressure")
     )
-    figure = plotting.field(pressure)
+    figure = figure_of(plotting.field(pressure))
     image = colours(figure.axes[0])
     assert np.array_equal(np.all(image == OPEN, axis=-1), pressure.values == 0)
     assert figure.axes[1].get_ylabel() == "contact pressure (MPa)"

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 from fractalcontact import plotting
 
@@ -14,7 +15,7 @@ POWERS = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-
 def shown(values, units):
     """Return the unit on the colour bar of a field, and the range of numbers on it."""
     plane = xr.DataArray(np.atleast_2d(values), dims=("y", "x"), name="field", attrs={"units": units})
-    bar = plotting.field(plane).axes[1]
+    bar = plotting.field(plane, ax=Figure().add_subplot()).figure.axes[1]
     return bar.get_ylabel().removeprefix("field").strip(" ()"), bar.get_ylim()
 
 

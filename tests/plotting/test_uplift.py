@@ -13,7 +13,7 @@ def test_profiles_and_lines_of_action(edge):
     result = fc.joints.uplift(
         fc.surfaces.from_array(gap, 1.0), upstream_pressure=490e3, upstream=edge, drains=[(4.5, 7.5)]
     )
-    ax = fc.plotting.uplift(result).axes[1]
+    ax = fc.plotting.uplift(result)[1]
     dim = "x" if edge == "W" else "y"
     for name in ("joint", "linear", "bilinear"):
         one = result.sel(diagram=name)
