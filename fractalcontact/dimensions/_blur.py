@@ -82,6 +82,10 @@ class BlurredFit:
     gain : float
         Decrease of the deviance, less the penalty, against the surface without blur, and without noise
         unless it was asked for.
+    penalised : float
+        Deviance with the penalty of the parameters.
+    inside : ndarray of bool, shape (blocks,)
+        Blocks of modes used.
     """
 
     hurst: float
@@ -97,6 +101,8 @@ class BlurredFit:
     scatter: float
     flatness: float
     gain: float
+    penalised: float
+    inside: Array
 
     @property
     def is_good(self) -> bool:
@@ -176,6 +182,8 @@ def fit_blurred(
         scatter=scatter,
         flatness=min(_flatness(power, frame, window.inside), -abs(_asymmetry(power, frame, window.inside))),
         gain=plain[0] - best.penalised if plain else np.inf,
+        penalised=best.penalised,
+        inside=window.inside,
     )
 
 

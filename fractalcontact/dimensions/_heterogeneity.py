@@ -4,6 +4,10 @@ The interval of a Gaussian family counts every point of the surface. Where a few
 roughness (worn tops, patches, a step, outliers), the effective number of points is smaller; where the
 exponent itself differs between blocks, no single one is correct. Second differences of different blocks are
 nearly independent, so the scatter between blocks is tested by chi square.
+
+A step or a scratch is rough along a narrow line only. It adds its power to all waves across it, so that no
+exponent of the whole surface is that of the ground. The small blocks of cells that it crosses stand above the
+others; the increments of the rest are those of the ground.
 """
 
 from __future__ import annotations
@@ -20,6 +24,13 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 _FALSE_ALARM = 1e-4  # probability of a false alarm on a surface of the family
 _SHARE = 0.5  # of the increments of a full block that a block must have
+_EDGE = 8  # of a block, in points
+_LEAST_BLOCKS = 8  # along each axis
+_FAR, _NEAR = 4.5, 2.0  # deviations above the rest from which a block, and one beside it, is left out
+_LINE, _ON_LINE = 5, 2.2  # blocks of a short line, and deviations above the rest of their mean
+_LEFT = 0.35  # of the blocks that must be left
+_THICK = 0.4  # share of the blocks left out whose neighbours are all left out: more is a patch, no line
+_QUANTILES, _NORMAL_QUANTILES = (0.1, 0.25), (-1.2815515655446004, -0.6744897501960817)
 
 
 @dataclass(frozen=True)
@@ -109,3 +120,71 @@ def _block_covariance(moments: Moments, spacing: tuple[float, ...], hurst: float
 def _chi_square(values: Array, weights: Array) -> float:
     mean = float(np.sum(weights * values) / np.sum(weights))
     return float(np.sum(weights * (values - mean) ** 2))
+
+
+def step_cells(heights: Array) -> Array | None:
+    """Return the cells that steps or scratches cross, (ny, nx) of bool; None if there are none.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (ny, nx)
+        Complete heights.
+    """
+    down, across = (n // _EDGE for n in heights.shape)
+    if min(down, across) < _LEAST_BLOCKS:
+        return None
+    squares = np.zeros(heights.shape)
+    for axis in (0, 1):
+        bend = np.diff(heights, 2, axis=axis)
+        inner = [slice(None), slice(None)]
+        inner[axis] = slice(1, -1)
+        squares[tuple(inner)] += bend * bend
+    blocks = squares[: down * _EDGE, : across * _EDGE].reshape(down, _EDGE, across, _EDGE).mean(axis=(1, 3))
+    with np.errstate(divide="ignore"):
+        logs = np.log(blocks)
+    logs = np.where(np.isfinite(logs), logs, logs[np.isfinite(logs)].min(initial=0.0))
+    # the lower blocks tell what the ground is like, however many are crossed
+    low, quarter = np.quantile(logs, _QUANTILES)
+    deviation = (quarter - low) / (_NORMAL_QUANTILES[1] - _NORMAL_QUANTILES[0])
+    middle = quarter - _NORMAL_QUANTILES[1] * deviation
+    if not deviation > 0.0:
+        return None
+    excess = (logs - middle) / deviation
+    out = excess > _FAR
+    out |= _neighbours(out, any_of=True) & (excess > _NEAR)
+    out |= _lines(excess)
+    thick = _neighbours(out, any_of=False) & out
+    if not out.any() or out.mean() > 1.0 - _LEFT or thick.sum() > _THICK * out.sum():
+        return None
+    cells = np.zeros(heights.shape, dtype=bool)
+    rows = np.minimum(np.arange(heights.shape[0]) // _EDGE, down - 1)
+    columns = np.minimum(np.arange(heights.shape[1]) // _EDGE, across - 1)
+    cells[:] = out[rows[:, None], columns]
+    return cells
+
+
+def _lines(excess: Array) -> Array:
+    """Return the blocks of short lines, in any direction, that stand above the rest on average."""
+    out = np.zeros(excess.shape, dtype=bool)
+    reach = _LINE // 2
+    padded = np.pad(excess, reach)
+    ny, nx = excess.shape
+    for angle in np.arange(8) * np.pi / 8.0:
+        steps = [
+            (reach + round(k * float(np.sin(angle))), reach + round(k * float(np.cos(angle))))
+            for k in range(-reach, reach + 1)
+        ]
+        total = sum(np.clip(padded[y : y + ny, x : x + nx], -_NEAR, _FAR) for y, x in steps)
+        found = total > _LINE * _ON_LINE
+        for y, x in steps:
+            marked = np.zeros(padded.shape, dtype=bool)
+            marked[y : y + ny, x : x + nx] = found
+            out |= marked[reach : reach + ny, reach : reach + nx]
+    return out & (excess > 0.0)
+
+
+def _neighbours(blocks: Array, *, any_of: bool) -> Array:
+    """Return where any, or all, of the blocks at and around each are set; there are none beyond the edge."""
+    padded = np.pad(blocks, 1, constant_values=False)
+    shifted = [padded[y : y + blocks.shape[0], x : x + blocks.shape[1]] for y in range(3) for x in range(3)]
+    return np.asarray(np.any(shifted, axis=0) if any_of else np.all(shifted, axis=0))

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._heterogeneity import heterogeneity
+from fractalcontact.dimensions._heterogeneity import heterogeneity, step_cells
 from fractalcontact.dimensions._increment_covariance import (
     NODES,
     complete_covariance,
@@ -39,6 +39,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 FIRST_BELOW = 0.45  # first differences where the pilot estimate is below, second differences above
 _UNLIKELY = (np.inf, 10.83, 13.82, 16.27)  # 99.9 % quantile of chi square, 0 to 3 degrees of freedom
 _SMALLEST_HURST = 0.02
+_CHOSEN = 0.04  # largest error of H, and more, measured where the roughest blocks are left out
 
 
 def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
@@ -77,7 +78,41 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     if reason:
         return Estimate(fit.hurst, rms_increment=fit.rms_increment * unit, reason=reason, **window)
     error, low, high, note = _interval(surface, moments, unit, fit, lags)
+    if surface.axes == 2 and asked is None and "not equally rough" in note and not surface.is_lazy:
+        ground = without_steps(surface.heights, surface.plane_spacing, fit.hurst)
+        if ground is not None:
+            return replace(ground, rms_increment=ground.rms_increment * surface.unit, **window)
     return Estimate(fit.hurst, error, low, high, rms_increment=fit.rms_increment * unit, note=note, **window)
+
+
+def without_steps(heights: Array, spacing: tuple[float, float], whole: float) -> Estimate | None:
+    """Return the estimate of the ground between steps or scratches; None where there are none.
+
+    Leaving the roughest blocks out also leaves out some that are rough by chance: the interval reaches half
+    of the way to `whole`, the exponent of the whole surface, up to a limit. None as well where the rest does
+    not follow one power law.
+    """
+    if np.isnan(heights).any() or (cells := step_cells(heights)) is None:
+        return None
+    ground = np.where(cells, np.nan, heights)
+    moments = increment_moments([(ground, len(ground))], (ground.shape[0], ground.shape[1]))
+    fit = closed_form(moments, spacing)
+    if not 0.0 < fit.hurst < 1.0 or fit.inflation > 1.0 or abs(fit.noise_z) > SIGNIFICANT:
+        return None
+    if heterogeneity(moments, spacing, fit.hurst).note:
+        return None
+    allowance = min(0.5 * abs(fit.hurst - whole), _CHOSEN)
+    low, high = normal_interval(fit.hurst, fit.standard_error)
+    return Estimate(
+        fit.hurst,
+        fit.standard_error,
+        low - allowance,
+        high + allowance,
+        rms_increment=fit.rms_increment,
+        window="increments over 1, 2 and 4 spacings beside the steps",
+        note=f"steps, scratches or spikes cross {100.0 * float(cells.mean()):.0f} % of the surface, which "
+        f"are left out; with them the exponent is {whole:.2f}",
+    )
 
 
 def _interval(

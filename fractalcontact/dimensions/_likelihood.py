@@ -13,16 +13,22 @@ import numpy as np
 
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_modes, _profile_likelihood
 from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
-from fractalcontact.dimensions._exponent_by_scale import Run, free_blocks, longest_run, octaves
+from fractalcontact.dimensions._exponent_by_scale import (
+    frame_blocks,
+    free_blocks,
+    longest_run,
+    octaves,
+    run_estimate,
+    several_exponents,
+)
 from fractalcontact.dimensions._heterogeneity import heterogeneity
 from fractalcontact.dimensions._increment_moments import Moments, increment_moments
-from fractalcontact.dimensions._increments import closed_form
+from fractalcontact.dimensions._increments import closed_form, without_steps
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._periodic_modes import PeriodicModes
 from fractalcontact.dimensions._quantisation import quantisation, quantisation_note
 from fractalcontact.dimensions._records import (
     CONSTANT,
-    NORMAL,
     SIGNIFICANT,
     Estimate,
     joined,
@@ -56,7 +62,6 @@ _ROUNDING = 1e-26  # relative rounding of the mean square in transforms
 _PERIODIC_WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
 _FREE_WINDOW = "all modes that vary along both axes"
 _BLURRED_WINDOW = "the modes that a model of blur and noise fits"
-_RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
 _ASKED = "asked for"
 _SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
@@ -123,6 +128,16 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     fit = modes.fit(pilot, noise)
     levelled, stride, hurst = _without_offsets(heights), _stride(scales, max(surface.spacing)), fit.hurst
     blocks = heterogeneity(_moments(levelled, stride), surface.plane_spacing, hurst)
+    if blocks.note and scales is None and spread is None and not noise and not surface.finest_scale:
+        ground = without_steps(heights, surface.plane_spacing, hurst)
+        if ground is not None:
+            return replace(
+                ground,
+                scale_min=min(surface.spacing),
+                scale_max=4.0 * max(surface.spacing),
+                rms_increment=ground.rms_increment * surface.unit,
+                misfit=fit.misfit,
+            )
     other = None
     # unequal parts count for fewer modes
     is_bent = abs(fit.misfit) > SIGNIFICANT * blocks.widening
@@ -200,6 +215,10 @@ def _with_blur(
     fit = fit_blurred(power, frame, noise=noise, spread=spread, chosen=inside)
     if fit is None or not _is_seen(fit, surface.axes, spread):
         return None, fit is None or fit.is_even
+    if scales is None and spread is None and not noise:
+        several = several_exponents(fit, frame_blocks(power, frame), surface)
+        if several is not None:
+            return (several, max(1, round(0.5 * several.scale_min / max(surface.spacing)))), True
     estimate = _blurred_estimate(fit, surface, fit.amplitude / max(1.0 - fit.hurst, 1e-9))
     stride = max(_stride(scales, max(surface.spacing)), round(_BEYOND * fit.spread))
     return (replace(estimate, window=_BLURRED_WINDOW if scales is None else _ASKED), stride), True
@@ -250,24 +269,7 @@ def _longest_run(modes: SurfaceModes, heights: Array, surface: Surface) -> tuple
     inside = (modes.order >= run.low * (1 - 1e-9)) & (modes.order <= run.high * (1 + 1e-9))
     if modes.is_uneven(inside, run.fit.hurst):
         return None
-    return _run_estimate(run, surface), max(1, round(0.5 * run.low))
-
-
-def _run_estimate(run: Run, surface: Surface) -> Estimate:
-    """Return the estimate of the window of scales that has one exponent."""
-    dx = surface.spacing[1]
-    low, high = run.low * dx, run.high * dx
-    return Estimate(
-        run.fit.hurst,
-        0.5 * (run.fit.high - run.fit.low) / NORMAL,
-        run.fit.low,
-        run.fit.high,
-        scale_min=low,
-        scale_max=high,
-        window=_RUN_WINDOW,
-        note=f"no single exponent holds at all scales: {run.fit.hurst:.2f} is that of waves from {low:.3g} "
-        f"to {high:.3g} m, the longest run of octaves that one exponent fits (see `scaling`)",
-    )
+    return run_estimate(run, surface), max(1, round(0.5 * run.low))
 
 
 def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
@@ -395,6 +397,10 @@ def _profile_modes(
         return undefined(reason), none
     fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=_chosen(frame, surface, scales))
     if fit is not None and _is_seen(fit, surface.axes, spread):
+        if scales is None and spread is None and not noise:
+            several = several_exponents(fit, frame_blocks(modes, frame), surface)
+            if several is not None:
+                return several, none
         amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
         estimate = _blurred_estimate(fit, surface, amplitude / max(1.0 - fit.hurst, 1e-9))
         longest = heights.size * dx if scales is None else scales[1]
@@ -403,7 +409,7 @@ def _profile_modes(
     record = octaves(free_blocks(heights, (1.0,)))
     run = longest_run(record)
     if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
-        return _run_estimate(run, surface), none
+        return run_estimate(run, surface), none
     if fit is None or noise or not (fit.is_good and fit.gain > _WEAK and fit.hurst < 1.0):
         return None, none
     return None, (max(fit.low, 0.0), min(fit.high, 1.0))

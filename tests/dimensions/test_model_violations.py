@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
+from fractalcontact.base.spectra import aliased_power_law
 
 SIZE, SPACING, STEP = 96, 1e-4, 1e-5
 
@@ -43,9 +44,26 @@ def estimated(heights, method, **options):
     )
 
 
+def four_steps(heights, rng, height):
+    y, x = np.indices(heights.shape)
+    generator = np.random.default_rng(rng)
+    for _ in range(4):
+        angle, at = generator.uniform(0, np.pi), generator.uniform(0.2, 0.8, 2) * heights.shape
+        heights = heights + height * (np.cos(angle) * (x - at[1]) + np.sin(angle) * (y - at[0]) > 0)
+    return heights
+
+
+def rolled_off(hurst, rng, longest=8, n=128):
+    """A crop of a surface whose waves longer than `longest` spacings have one power."""
+    waves = 2 * np.pi * np.fft.fftfreq(2 * n)
+    with np.errstate(divide="ignore"):
+        power = aliased_power_law((waves[:, None], waves), hurst)
+    corner = float(aliased_power_law((np.zeros(1), np.array([2 * np.pi / longest])), hurst)[0])
+    white = np.fft.fft2(np.random.default_rng(rng).standard_normal((2 * n, 2 * n)))
+    return np.fft.ifft2(white * np.sqrt(np.minimum(power, corner))).real[:n, :n]
+
+
 DEFECTS = {
-    "an oblique step": (0.7, lambda s: oblique_step(brownian(0.7, s)), "parts|share"),
-    "outliers": (0.7, lambda s: with_spikes(brownian(0.7, s), s), "parts"),
     "8 bits": (0.9, lambda s: rounded(brownian(0.9, s), 255), "rounded to steps"),
     "5 bits": (0.7, lambda s: rounded(brownian(0.7, s), 31), "rounded to steps"),
 }
@@ -60,6 +78,48 @@ def test_defects_widen_interval_to_true_exponent(name, method):
         assert abs(result - hurst) > 0.02  # the estimate itself is wrong ...
         assert low - 0.05 <= hurst <= high + 0.05  # ... and its interval is not that of one that is right
         assert any(word in note for word in words.split("|"))
+
+
+@pytest.mark.parametrize("method", ["likelihood", "increments"])
+@pytest.mark.parametrize("defect", ["an oblique step", "outliers", "four steps"])
+def test_steps_and_spikes_are_left_out(method, defect):
+    """Steps of five increments, or of twenty, and spikes of fifty."""
+    for seed in (1, 3):
+        hurst = 0.3 if defect == "four steps" else 0.7
+        ground = brownian(hurst, seed, (128, 128)) if hurst == 0.3 else brownian(hurst, seed)
+        heights = {
+            "an oblique step": lambda ground: oblique_step(ground),
+            "outliers": lambda ground, seed=seed: with_spikes(ground, seed),
+            "four steps": lambda ground, seed=seed: four_steps(ground, seed, 5 * STEP),
+        }[defect](ground)
+        result, low, high, note = estimated(heights, method)
+        assert abs(result - hurst) < 0.04
+        assert low < hurst < high
+        assert high - low < 0.25
+        assert "left out" in note
+
+
+@pytest.mark.parametrize("rng", [1, 2, 3])
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+def test_roll_off_leaves_window_of_shorter_waves(hurst, rng):
+    """Once taken for blur and noise: 0.01 for 0.3, and 0.4 for 0.8."""
+    surface = fc.surfaces.from_array(rolled_off(hurst, rng), SPACING)
+    result = fc.dimensions.estimate(surface).isel(method=0)
+    assert float(result.ci_low) - 0.01 < hurst < float(result.ci_high) + 0.01
+    assert float(result.ci_high - result.ci_low) < 0.1
+    assert float(result.scale_max) <= 16.0 * SPACING
+    assert "no single exponent holds at all scales" in result.hurst.attrs["comment"]
+
+
+@pytest.mark.parametrize("rng", [0, 1])
+def test_sum_of_two_surfaces_has_the_exponent_of_each(rng):
+    rough, smooth = (brownian(hurst, rng + seed, (256, 256)) for hurst, seed in ((0.3, 0), (0.9, 100)))
+    surface = fc.surfaces.from_array(rough + smooth * 12.0 ** (0.3 - 0.9), SPACING)
+    result = fc.dimensions.estimate(surface).isel(method=0)
+    assert "two exponents" in result.hurst.attrs["comment"]
+    assert float(result.ci_low) < 0.3 < float(result.ci_high)
+    assert float(result.ci_high - result.ci_low) < 0.06
+    assert float(result.scale_max) < 128 * SPACING
 
 
 @pytest.mark.parametrize("method", ["likelihood", "increments"])
