@@ -27,6 +27,7 @@ MEMBER = "member"
 LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
 # the arguments of a call that grow where results are joined along a dim
+SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part
 _ALONG: Mapping[str, tuple[str, ...]] = {
     "shear": ("shear",),
     "direction": ("direction",),
@@ -155,6 +156,8 @@ def joined(entries: Sequence[Mapping[str, Any]], dim: str) -> dict[str, Any]:
 
 def _joined(values: Sequence[Any], dim: str, key: str) -> Any:
     first = values[0]
+    if key == SHARED and all(value == first for value in values):
+        return first
     if key in _ALONG.get(dim, ()) and all(isinstance(value, list) for value in values):
         return [item for value in values for item in value]
     if key == "dims" and dim in first:

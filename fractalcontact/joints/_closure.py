@@ -13,10 +13,11 @@ import xarray as xr
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import plain
 from fractalcontact.base.references import PAPER, joined_references
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._compass import Direction, direction_coords, is_single, read_directions
@@ -334,17 +335,72 @@ class ShearedContact:
 
 
 def press_sheared(
-    crack: Crack, shears: Array, towards: Direction, pressing: Pressing, progress: bool, *, factor: int = 1
+    crack: Crack,
+    shears: Array,
+    towards: Direction,
+    pressing: Pressing,
+    progress: bool,
+    *,
+    factor: int = 1,
+    pressed: xr.Dataset | None = None,
 ) -> dict[str, Array]:
     """Press the crack together at every shear along the same path of load, with every `factor`-th height.
+
+    What a result of `closure` has `pressed` already is taken from it.
 
     Returns
     -------
     dict of ndarray
         As `ShearedContact.press`, with the shear as first axis.
     """
-    results = [
-        ShearedContact(crack, float(shear), towards, pressing, factor).press(pressing.load, pressing.keep)
-        for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear")
-    ]
+    results = []
+    for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear"):
+        columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
+        if columns is None:
+            contact = ShearedContact(crack, float(shear), towards, pressing, factor)
+            columns = contact.press(pressing.load, pressing.keep)
+        results.append(columns)
     return {name: np.stack([result[name] for result in results]) for name in results[0]}
+
+
+def check_pressed(
+    problems: Problems, crack: Any, pressed: Any, keep: Any, bulk: Any, solver: dict[str, Any]
+) -> None:
+    """Check that a result of `closure` is that of this crack, pressed in this way; None passes."""
+    if pressed is None or not isinstance(crack, Crack):
+        return
+    expected = "a result of `joints.closure` for the same crack, bulk part and solver"
+    entry = provenance_of(pressed) if isinstance(pressed, xr.Dataset) else {}
+    stated, wanted = entry.get("parameters", {}), {"crack": crack, "bulk": bulk, **solver}
+    differing = [name for name in wanted if _content(stated.get(name)) != _content(plain(wanted[name]))]
+    is_closure = entry.get("call") == "fractalcontact.joints.closure"
+    if problems.require(is_closure, "pressed", expected, pressed):
+        problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
+    problems.require(solver.get("hardness") is None, "pressed", "nothing with a hardness", pressed)
+    problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
+
+
+def _content(summary: Any) -> Any:
+    """Return the summary of an argument without its provenance, which states run times."""
+    if not isinstance(summary, dict):
+        return summary
+    return {name: _content(value) for name, value in summary.items() if name != "provenance"}
+
+
+def _held_columns(
+    pressed: xr.Dataset, shear: float, towards: Direction, load: fc.contact.LoadPath
+) -> dict[str, Array] | None:
+    """Return the columns of `ShearedContact.press` from a result of `closure`; None if it lacks a load."""
+    names, shears = np.atleast_1d(pressed["direction"].values), pressed["shear"].values
+    if towards.name not in names or shear not in shears:
+        return None
+    place: dict[str, Any] = {"direction": int(np.flatnonzero(names == towards.name)[0])}
+    place |= {"shear": int(np.flatnonzero(shears == shear)[0])}
+    at_shear = pressed.isel(place, missing_dims="ignore")
+    held = at_shear[load.control].values
+    steps = [np.flatnonzero(held == value) for value in load.values]
+    if not all(found.size for found in steps):
+        return None
+    at_load = at_shear.isel(step=[int(found[0]) for found in steps])
+    columns = {name: at_load[name].values for name in (*SCALARS, "bulk_closure", "interface_closure")}
+    return columns | {"rms_slope": np.full(len(steps), float(at_load["rms_slope"]))}

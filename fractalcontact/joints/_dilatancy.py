@@ -19,6 +19,7 @@ from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._closure import (
     Pressing,
     ShearedContact,
+    check_pressed,
     check_pressing,
     press_sheared,
     pressing_references,
@@ -45,6 +46,7 @@ def _check(
     direction: Any,
     normal_force: Any,
     normal_stiffness: Any,
+    pressed: Any,
     bulk: Any,
     keep: Any,
     **solver: Any,
@@ -52,8 +54,11 @@ def _check(
     check_sliding(problems, crack, shear, direction)
     if normal_force is None:
         unused = {"keep": keep, "normal_stiffness": normal_stiffness, "bulk": bulk, **solver}
-        _check_defaults(problems, unused)
+        _check_defaults(problems, unused | {"pressed": pressed})
         return
+    check_pressed(problems, crack, pressed, keep, bulk, solver)
+    one_of = normal_stiffness is None or pressed is None
+    problems.require(one_of, "pressed", "nothing beside `normal_stiffness`", pressed)
     problems.number("normal_stiffness", normal_stiffness, above=0, optional=True)
     load = problems.construct(fc.contact.LoadPath, "normal_force", normal_force)
     check_pressing(problems, crack, load, bulk, keep, solver)
@@ -78,6 +83,7 @@ def dilatancy(
     direction: str | float | Sequence[str | float] = COMPASS,
     normal_force: float | Sequence[float] | None = None,
     normal_stiffness: float | None = None,
+    pressed: xr.Dataset | None = None,
     bulk: str = "flat_block",
     keep: Sequence[str] = (),
     influence: str | None = None,
@@ -105,6 +111,9 @@ def dilatancy(
         rigid dilatancy, and no contact is solved.
     normal_stiffness : float, optional
         Stiffness k of the spring per nominal area, Pa/m; `normal_force` is then N0. None: constant force.
+    pressed : Dataset, optional
+        A result of `closure` for the same crack and options: the shears at which it holds all the forces are
+        taken from it, the others pressed.
     bulk, keep, influence, disc_radius, hardness, tolerance, method
         As for `closure`; refused without a force.
     progress : bool
@@ -149,22 +158,22 @@ def dilatancy(
     )
     load = fc.contact.LoadPath.from_keywords(normal_force=normal_force)
     pressing = Pressing(load, options, bulk, word_tuple(keep), WHERE)
-    pressed = []
+    by_direction = []
     for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):
         if normal_stiffness is None:
-            columns = press_sheared(crack, shears, towards, pressing, progress)
+            columns = press_sheared(crack, shears, towards, pressing, progress, pressed=pressed)
         else:
             stiffness = normal_stiffness * crack.nominal_area
             columns = press_against_spring(crack, shears, lifted, towards, pressing, stiffness, progress)
-        pressed.append(columns)
+        by_direction.append(columns)
         warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
-    warn_steep(pressed, WHERE, stacklevel=4)
-    result = _with_forces(rigid, crack, pressed, has_spring=normal_stiffness is not None)
+    warn_steep(by_direction, WHERE, stacklevel=4)
+    result = _with_forces(rigid, crack, by_direction, has_spring=normal_stiffness is not None)
     if normal_stiffness is not None:
         result = result.assign(normal_stiffness=float(normal_stiffness))
         result["initial_force"] = "step", float_array(pressing.load.values)
     result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
-    residual = float(np.max([columns["residual"].max() for columns in pressed]))
+    residual = float(np.max([columns["residual"].max() for columns in by_direction]))
     return result.assign_attrs(achieved_residual=residual, references=pressing_references(crack, options))
 
 

@@ -32,7 +32,7 @@ from fractalcontact.scenes._inputs import (
 )
 from fractalcontact.scenes._plan import Stage
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import PARTIAL_SLIP, public_function
+from fractalcontact.scenes._stages import CONTACT_MAPS, PARTIAL_SLIP, public_function
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -236,6 +236,7 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
         push = partial(call, stage.row.function, crack, keep=stage.keep, **options)
         return StageWork(tuple(partial(push, shear=[shear]) for shear in shears), ("shear",), (len(shears),))
     if name == "elastic_dilatancy":
+        options |= _pressed(scene, results, options)
         directions = _as_list(options.pop("direction", ("E", "N", "W", "S")))
         shears = _as_list(options.pop("shear"))
         parts = (
@@ -257,6 +258,16 @@ def _closure_work(crack: Crack, options: dict[str, Any], stage: Stage) -> StageW
         for path in paths
     )
     return StageWork(tuple(parts), ("shear", "step"), (len(shears), len(paths)))
+
+
+def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
+    """Return the closure as the argument `pressed` of the elastic dilatancy, where both press alike."""
+    if "joints/closure" not in results:
+        return {}
+    of_closure, free = joint_options(scene, "closure"), (*LOADS, "shear", "direction")
+    own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
+    alike = own == other and "hardness" not in own and "normal_force" in of_closure
+    return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
 
 
 def _as_list(value: Any) -> Sequence[Any]:

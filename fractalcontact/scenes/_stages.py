@@ -23,7 +23,18 @@ ONE_DIRECTION = (*ONE_LOAD, "delta_surface", "delta_dimension", "decorrelation_l
 
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
 _FROM_SCENE = frozenset(
-    ("surface", "crack", "mask", "valid", "gap", "dilatancy", "keep", "progress", "basic_friction_angle")
+    (
+        "surface",
+        "crack",
+        "pressed",
+        "mask",
+        "valid",
+        "gap",
+        "dilatancy",
+        "keep",
+        "progress",
+        "basic_friction_angle",
+    )
 )
 
 
@@ -125,7 +136,7 @@ _ROWS = (
     _joint("elimination", function="closure"),
     _joint("area_dimension"),
     _joint(PARTIAL_SLIP, keeps=SLIP_MAPS),
-    _joint("elastic_dilatancy", function="dilatancy"),
+    _joint("elastic_dilatancy", (*_FACES, "joints/closure"), function="dilatancy"),
     _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
     _joint("roughness_coefficient", _SURFACE, takes_surface=True),
     _joint("directional_roughness", _SURFACE, takes_surface=True),

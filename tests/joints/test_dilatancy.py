@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fractalcontact as fc
 
@@ -168,6 +169,53 @@ def test_dilatancy_and_closure_agree(crack):
     np.testing.assert_array_equal(opening.state[0], closing.state)
     assert opening.state.dims == ("direction", "shear", "step", "y", "x")
     assert opening.state.dtype == np.int8
+
+
+def test_what_the_closure_has_pressed_is_not_pressed_again(crack, monkeypatch):
+    closing = fc.joints.closure(crack, shear=[8e-5, 2e-4], direction="S", normal_force=[10.0, 100.0, 1e3])
+    both = {"shear": [0.0, 8e-5, 2e-4], "direction": ["S", "E"], "normal_force": [10.0, 1e3]}
+    alone = fc.joints.dilatancy(crack, **both)
+    press, pressed = fc.contact.press, []
+    monkeypatch.setattr(fc.contact, "press", lambda *a, **k: pressed.append(1) or press(*a, **k))
+    shared = fc.joints.dilatancy(crack, pressed=closing, **both)
+    assert len(pressed) == 4  # shear 0 towards S, all three towards E
+    towards = {"shear": [8e-5, 2e-4], "direction": "S"}
+    held = closing.interface_closure.isel(step=[0, 2])
+    np.testing.assert_array_equal(shared.interface_closure.sel(towards), held)
+    np.testing.assert_array_equal(shared.sel(direction="E").dilatancy, alone.sel(direction="E").dilatancy)
+    np.testing.assert_allclose(shared.dilatancy, alone.dilatancy, rtol=1e-6, atol=1e-15)
+    assert shared.sizes == alone.sizes
+    assert set(shared.variables) == set(alone.variables)
+    pressed.clear()
+    fc.joints.dilatancy(crack, pressed=closing, **both | {"normal_force": [20.0]})  # a force it does not hold
+    assert len(pressed) == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tolerance": 1e-6}, "one with another tolerance"),
+        ({"bulk": "uniform_pressure"}, "one with another bulk"),
+        ({"keep": ("state",)}, "nothing beside `keep`"),
+        ({"normal_stiffness": 1e9}, "nothing beside `normal_stiffness`"),
+        ({"hardness": 1e9}, "nothing with a hardness"),
+        ({"pressed": xr.Dataset()}, "a result of `joints.closure`"),
+        ({"pressed": 3.0}, "a result of `joints.closure`"),
+        ({"normal_force": None}, "nothing without normal_force"),
+    ],
+)
+def test_another_closure_is_refused(crack, change, message):
+    given = {"shear": [8e-5], "direction": "S", "normal_force": [10.0]}
+    closing = fc.joints.closure(crack, **given)
+    with pytest.raises(ValueError, match=message):
+        fc.joints.dilatancy(crack, **{"pressed": closing, **given, **change})
+
+
+def test_closure_of_another_crack_is_refused(crack):
+    given = {"shear": [8e-5], "direction": "S", "normal_force": [10.0]}
+    other = fc.joints.Crack(2 * crack.lower, young=E, poisson=NU, block=crack.block)
+    with pytest.raises(ValueError, match="one with another crack"):
+        fc.joints.dilatancy(crack, pressed=fc.joints.closure(other, **given), **given)
 
 
 def test_unmated_faces(make_face, rough):

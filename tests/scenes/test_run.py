@@ -69,6 +69,18 @@ def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch, err
     assert '"figures": {"run_time"' in again.attrs["provenance"]
 
 
+def test_dilatancy_takes_what_the_closure_has_pressed(study):
+    tree, _ = study
+    closing, opening = tree["joints/closure"], tree["joints/elastic_dilatancy"]
+    shear = np.intersect1d(closing["shear"], opening["shear"])
+    held = closing["interface_closure"].sel(shear=shear)
+    forces = closing["normal_force"].sel(shear=shear).values
+    found = opening["interface_closure"].sel(direction=str(closing["direction"].values), shear=shear)
+    steps = [int(np.flatnonzero(forces[0] == force)[0]) for force in opening["normal_force"].values]
+    assert shear.size
+    np.testing.assert_array_equal(found, held.isel(step=steps))  # to the last bit: not pressed twice
+
+
 def test_every_group_passes_the_cf_checker(study, compliance, tmp_path):
     tree, _ = study
     for number, node in enumerate(tree.subtree):
