@@ -112,7 +112,7 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     """Fit the cosine modes of a surface with free edges; `spread` in spacings is that of a known blur."""
     heights = _cropped(surface.heights)
     if surface.finest_scale:
-        heights = _without_small_gaps(heights)
+        heights = _without_small_gaps(heights, surface.plane_spacing)
     dx = surface.spacing[1]
     pilot = _pilot(heights, surface.plane_spacing)
     window = None if scales is None else (scales[0] / dx, scales[1] / dx)
@@ -466,19 +466,19 @@ def _between(lengths: Array, scales: Scales) -> Array:
     return np.asarray((lengths >= scales[0] * (1 - 1e-9)) & (lengths <= scales[1] * (1 + 1e-9)))
 
 
-def _without_small_gaps(heights: Array) -> Array:
-    """Fill the gaps of a gridded surface with the nearest heights, unless they are many.
+def _without_small_gaps(heights: Array, spacing: tuple[float, float]) -> Array:
+    """Fill the gaps of a gridded surface by harmonic interpolation, unless they are many.
 
     The model of the gaps has the short waves that gridding has removed; with it one fit in six of surfaces
-    of H 0.9 did not converge. Only waves longer than most gaps are used.
+    of H 0.9 did not converge. Only waves longer than most gaps are used. Nearest heights would meet in steps
+    inside a larger hole, whose power falls as that of H = 0.5: with a hole of 3 % of the area they lowered H
+    from 0.9 to 0.84.
     """
-    missing = np.isnan(heights)
-    if not 0 < np.count_nonzero(missing) <= _SMALL_GAPS * heights.size:
+    observed = np.isfinite(heights)
+    if not 0 < np.count_nonzero(~observed) <= _SMALL_GAPS * heights.size:
         return heights
-    from scipy.ndimage import distance_transform_edt
-
-    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    return np.asarray(heights[tuple(nearest)])
+    values = heights[observed]
+    return _cosine_modes.Filling(observed, spacing)(values - values.mean())
 
 
 def _cropped(heights: Array) -> Array:

@@ -18,6 +18,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 COLLINEAR = 1e-7  # of the length of a cloud: points that are less wide lie on a line
 THICKEST = 0.7  # of the width of a cloud: thicker ones have no plane of their own
 PLANES = ("fit", "xy")
+KEEP_FRAME = ("surfaces.fill", "surfaces.despike")  # functions whose result is in the plane of their surface
 LARGEST = 1e100  # m: squares of it can be represented
 
 
@@ -71,6 +72,11 @@ def frame_of(plane: xr.Dataset | xr.DataArray) -> tuple[Array, Array] | None:
     """Return rotation and centre of a plane, None if it has none."""
     is_fit = isinstance(plane, xr.Dataset) and {"rotation_matrix", "centre"} <= set(plane.data_vars)
     source: Any = plane if is_fit else provenance_of(plane)
+    while isinstance(source, dict) and str(source.get("call", "")).endswith(KEEP_FRAME):
+        source = source.get("parameters", {}).get("surface", {}).get("provenance", {})
+    if isinstance(source, dict) and source.get("plane") == "xy" and isinstance(plane, xr.DataArray):
+        axes = plane.ndim + 1
+        return np.eye(axes), np.zeros(axes)
     if "rotation_matrix" not in source or "centre" not in source:
         return None
     rotation, centre = (np.asarray(source[name], dtype=np.float64) for name in ("rotation_matrix", "centre"))

@@ -107,8 +107,9 @@ def from_points(
         Unit of the points: "m", "mm", "um" ...
     plane : {"fit", "xy"}, Dataset or DataArray, optional
         "fit": rotate into the best-fit plane (see `fit_plane`); "xy": heights are z, as in a table that was
-        levelled before. A result of `fit_plane`, or a surface gridded before, puts two faces into one plane.
-        Default: "xy" for points on a uniform grid, "fit" for others.
+        levelled before. A result of `fit_plane` or a surface gridded before puts two faces into one plane;
+        without a `spacing`, such a surface gives its cells as well. Default: "xy" for points on a uniform
+        grid, "fit" for others.
     largest_gap : float, optional
         Longest edge of a triangle, in metres, that is bridged. Default: three times the median of the
         longest edges; of a mesh, all triangles.
@@ -149,18 +150,19 @@ def from_points(
     """
     values, triangles = finite_points(points, units), _triangles(points, triangles)
     frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
+    cells = _cells_of(plane) if spacing is None else None
+    step = spacing if cells is None else cells[-1].spacing
     if values.shape[1] == 2:
-        gridded = _profile(values, spacing, largest_gap)
-    elif (lattice := _lattice(values, spacing)) is not None:
+        gridded = _profile(values, step, largest_gap, cells)
+    elif (lattice := _lattice(values, step, cells)) is not None:
         gridded = lattice
     else:
         given = None if triangles is None else _finite_triangles(point_array(points), triangles)
-        gridded = _triangulated(values, spacing, given, largest_gap)
+        gridded = _triangulated(values, step, given, largest_gap, cells)
     facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
     core = ("y", "x")[2 - gridded.heights.ndim :]
-    surface = xr.DataArray(
-        gridded.heights, dict(zip(core, gridded.centres, strict=True)), core, name="height"
-    )
+    centres = gridded.centres if cells is None else [plane[dim].values for dim in core]
+    surface = xr.DataArray(gridded.heights, dict(zip(core, centres, strict=True)), core, name="height")
     if gridded.finest is not None:
         surface = surface.assign_coords(finest_scale=gridded.finest)
     parameters: dict[str, Any] = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
@@ -192,11 +194,31 @@ def _in_plane(points: Array, plane: Any, spacing: float | None) -> tuple[dict[st
     return entries, (points - centre) @ rotation.T
 
 
-def _lattice(points: Array, spacing: float | None) -> Gridded | None:
-    """Return heights of points that are on a uniform grid; None if they are not."""
+def _cells_of(plane: Any) -> tuple[_Axis, ...] | None:
+    """Return the cells (y, x) of a surface whose plane is used; None for any other plane."""
+    if not isinstance(plane, xr.DataArray) or not set(plane.dims) <= {"y", "x"}:
+        return None
+    axes = []
+    for dim in plane.dims:
+        centres = np.asarray(plane[dim].values, dtype=np.float64)
+        axes.append(_Axis(float(centres[0]), float(np.ptp(centres)) / (centres.size - 1), centres.size))
+    return tuple(axes) if np.ptp([axis.spacing for axis in axes]) <= EXACT * axes[0].spacing else None
+
+
+def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | None) -> Gridded | None:
+    """Return heights of points that are on a uniform grid, that of `cells` if given; None if they are not."""
     axes = _regular_axes(points, spacing)
     if axes is None:
         return None
+    if cells is not None:
+        # of the points, those of the cells
+        inside = np.ones(len(points), dtype=bool)
+        for axis, column in zip(cells, (1, 0), strict=True):
+            place = (points[:, column] - axis.first) / axis.spacing
+            if float(np.abs(place - np.rint(place)).max()) > OFF_NODE:
+                return None
+            inside &= (np.rint(place) >= 0) & (np.rint(place) < axis.count)
+        axes, points = cells, points[inside]
     shape = tuple(axis.count for axis in axes)
     index = np.ravel_multi_index(
         tuple(axis.index(points[:, column]) for axis, column in zip(axes, (1, 0), strict=True)), shape
@@ -261,9 +283,11 @@ def _regular_axis(positions: Array, most: int) -> _Axis | None:
     return None
 
 
-def _profile(points: Array, spacing: float | None, largest_gap: float | None) -> Gridded:
+def _profile(
+    points: Array, spacing: float | None, largest_gap: float | None, cells: tuple[_Axis, ...] | None
+) -> Gridded:
     """Return heights of a profile: as measured if the points are uniform, else interpolated linearly."""
-    axes = _regular_axes(points, spacing)
+    axes = _regular_axes(points, spacing) if cells is None else None
     x, inverse, repeats = np.unique(points[:, 0], return_inverse=True, return_counts=True)
     if axes is not None:
         index, (axis,) = axes[0].index(points[:, 0]), axes
@@ -284,8 +308,8 @@ def _profile(points: Array, spacing: float | None, largest_gap: float | None) ->
     # of a uniform profile the distance itself; long distances count by their length
     distance = float(np.sqrt(np.average(near**2, weights=near)))
     step = _step(spacing, float(near.mean()), distance)
-    (centres,) = _centres(x[[0]], x[[-1]], step)
-    heights = np.interp(centres, x, z)
+    centres = _centres(x[[0]], x[[-1]], step)[0] if cells is None else cells[0].centres
+    heights = np.interp(centres, x, z, left=np.nan, right=np.nan)
     left = np.clip(np.searchsorted(x, centres, side="right") - 1, 0, x.size - 2)
     heights[~bridged[left]] = np.nan
     facts = {"point_distance": distance, "largest_gap": longest}
@@ -302,7 +326,11 @@ def _finite_triangles(points: Any, triangles: Any) -> Array:
 
 
 def _triangulated(
-    points: Array, spacing: float | None, given: Array | None, largest_gap: float | None
+    points: Array,
+    spacing: float | None,
+    given: Array | None,
+    largest_gap: float | None,
+    cells: tuple[_Axis, ...] | None,
 ) -> Gridded:
     """Return heights that are linear in triangles, NaN outside them."""
     origin = points[:, :2].min(axis=0)
@@ -326,7 +354,10 @@ def _triangulated(
     mean_distance = math.sqrt(float(areas[kept].sum()) / np.count_nonzero(kept))
     # between the corners of a triangle of a mesh any number of cells may be asked for
     step = _step(spacing, mean_distance, distance if given is None else 0.0)
-    y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step)
+    if cells is None:
+        y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step)
+    else:
+        y, x = (axis.centres for axis in cells)
     heights = triangle_heights(flat, points[:, 2], triangles[kept], y - origin[1], x - origin[0])
     facts: dict[str, Any] = {"point_distance": distance}
     if given is not None:

@@ -254,3 +254,40 @@ def test_scales_asked_for_below_the_resolved_ones_widen_the_interval():
     fine = fc.dimensions.estimate(surface, scales=(float(surface.finest_scale) / 3.0, 1.0)).isel(method=0)
     assert float(fine.ci_low) <= 0.5 <= float(fine.ci_high)
     assert "gridded from points" in fine.hurst.attrs["comment"]
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2])
+def test_second_face_on_the_cells_of_the_first(tilt):
+    """Without a spacing, a surface given as the plane gives its cells too, also after filling."""
+    lower = np.c_[scattered(4000), np.zeros(4000)]
+    upper = np.c_[scattered(5000, 1.3) - 0.1, np.zeros(5000)]
+    for points, height in ((lower, 0.0), (upper, 0.03)):
+        points[:, 2] = tilt * points[:, 0] + height
+    first = fc.surfaces.fill(fc.surfaces.from_points(lower, 0.05, plane="fit" if tilt else "xy"))
+    second = fc.surfaces.from_points(upper, plane=first)
+    np.testing.assert_array_equal(second.x, first.x)
+    np.testing.assert_array_equal(second.y, first.y)
+    np.testing.assert_allclose(second - first, 0.03 / np.hypot(1.0, tilt), atol=1e-12)
+
+
+def test_second_lattice_on_the_cells_of_the_first():
+    """Points on a uniform grid stay as they are; cells beyond them are missing."""
+    y, x = np.meshgrid(np.arange(30.0), np.arange(40.0), indexing="ij")
+    z = RNG.normal(size=x.shape)
+    first = fc.surfaces.from_points(np.c_[x.ravel(), y.ravel(), z.ravel()])
+    part = (x >= 5) & (y <= 20)
+    second = fc.surfaces.from_points(np.c_[x[part], y[part], 1.0 + z[part]], plane=first)
+    np.testing.assert_array_equal(second.where(part, 0.0), np.where(part, 1.0 + z, 0.0))
+    assert int(second.isnull().sum()) == int((~part).sum())
+    assert "finest_scale" not in second.coords
+
+
+def test_second_profile_on_the_positions_of_the_first():
+    x = np.sort(RNG.uniform(0.0, 0.2, 400))
+    first = fc.surfaces.from_points(np.c_[x, np.sin(40.0 * x)], plane="xy")
+    second = fc.surfaces.from_points(np.c_[x[100:], 1.0 + np.sin(40.0 * x[100:])], plane=first)
+    np.testing.assert_array_equal(second.x, first.x)
+    inside = (first.x > x[100]).values
+    same = first.notnull().values & (first.x > x[101]).values
+    np.testing.assert_allclose((second - first).values[same], 1.0, atol=1e-12)
+    assert np.isnan(second.values[~inside]).all()
