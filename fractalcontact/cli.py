@@ -176,15 +176,16 @@ def _answer(options: argparse.Namespace) -> int:
 
 
 def _init(options: argparse.Namespace) -> int:
-    """Write a commented scene; an existing file stays."""
-    from fractalcontact.base.datasets import datasets_folder
+    """Write a commented scene and the schema that its first line names; an existing scene stays."""
+    from fractalcontact.base.datasets import SCHEMA, datasets_folder
 
     target = Path(options.scene)
     if target.exists() or not target.parent.is_dir():
         expected = "the name of a new file in an existing folder"
         raise InvalidInput("fractalcontact init", [f"scene: expected {expected}, got {target.name!r}"])
     target.write_text((datasets_folder() / "new_scene.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    print(f"written: {target}\nfractalcontact run {target} -o out")
+    target.with_name(SCHEMA).write_bytes((datasets_folder() / SCHEMA).read_bytes())
+    print(f"written: {target}, and {SCHEMA} for editors\nfractalcontact run {target} -o out")
     return 0
 
 

@@ -96,6 +96,7 @@ CALLS = {
     ),
     "joints.size_effect": lambda _: fc.joints.size_effect(10.0, contact_dimension=1.7),
     "scenes.contents": lambda _: fc.scenes.contents(study()[1] / "result.nc"),
+    "scenes.json_schema": lambda _: fc.scenes.json_schema(),
     "scenes.load": lambda _: str(fc.scenes.load(scene()).tables),
     "scenes.validate": lambda _: str(fc.scenes.validate(scene()).tables),
     "scenes.plan": lambda _: str(fc.scenes.plan(fc.scenes.load(scene()))),

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+SCHEMA = "fractalcontact.schema.json"  # of scenes, for editors
+
 
 def datasets_folder() -> Path:
     """Return the folder: inside the installed package, or beside it in a checkout."""

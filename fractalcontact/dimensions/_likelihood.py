@@ -63,6 +63,12 @@ _PERIODIC_WINDOW = "all modes of the band: cut-offs and roll-off found from the 
 _FREE_WINDOW = "all modes that vary along both axes"
 _BLURRED_WINDOW = "the modes that a model of blur and noise fits"
 _ASKED = "asked for"
+_INTERPOLATED = 0.01  # share of heights on a line with their neighbours
+_LINEAR = (
+    "many heights lie exactly on lines between their neighbours: they were interpolated, and the short waves "
+    "are those of the interpolation; grid the points with fractalcontact.surfaces.from_points, or give "
+    "`scales` from eight distances of the points on"
+)
 _SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
 _PERIODIC_FAMILY = "periodic family: power law between cut-offs"
@@ -88,9 +94,20 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
         return undefined(CONSTANT)
     if surface.is_plane:
         return plane()
+    is_interpolated = scales is None and not surface.finest_scale and surface.linear_share > _INTERPOLATED
     surface, wave_note = without_waves(surface)
     estimate = _fitted(surface, scales, noise, psf)
-    return replace(estimate, note=joined(wave_note, estimate.note))
+    estimate = replace(estimate, note=joined(wave_note, estimate.note))
+    if is_interpolated and not estimate.reason:
+        return replace(
+            estimate,
+            standard_error=np.nan,
+            ci_low=np.nan,
+            ci_high=np.nan,
+            reason=_LINEAR,
+            note=joined(_LINEAR, estimate.note),
+        )
+    return estimate
 
 
 def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) -> Estimate:

@@ -14,7 +14,7 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
-from fractalcontact.scenes._scene import LOADS, MaterialTable, Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
 from fractalcontact.scenes._stages import ONE_LOAD, PARTIAL_SLIP, STAGES, public_function
 
 if TYPE_CHECKING:
@@ -27,8 +27,11 @@ PRESSING = ("closure", "elimination", "area_dimension", "elastic_dilatancy", "se
 FRICTION_ANGLE = {"strength_envelope": "basic_friction_angle", "shear_curve": "residual_friction_angle"}
 
 
-def read_surface(table: SurfaceTable, folder: Path) -> xr.DataArray:
-    """Return the surface that a table describes; with `member`, this member of its ensemble alone."""
+def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None = None) -> xr.DataArray:
+    """Return the surface that a table describes; with `member`, this member of its ensemble alone.
+
+    `lower` is the surface whose plane and cells an upper face with ``plane = "surface"`` takes.
+    """
     from fractalcontact import surfaces
 
     surface: xr.DataArray
@@ -37,7 +40,10 @@ def read_surface(table: SurfaceTable, folder: Path) -> xr.DataArray:
     elif table.sample is not None:
         surface = surfaces.sample(table.sample)
     else:
-        surface = surfaces.read(locate(str(table.read), folder), **table.options)
+        options = dict(table.options)
+        if options.get("plane") == OF_SURFACE:
+            options["plane"] = lower
+        surface = surfaces.read(locate(str(table.read), folder), **options)
     source = surface.attrs["references"]
     if table.despike:
         surface = surfaces.despike(surface)

@@ -279,7 +279,7 @@ def _heights(results: Results, stage: str) -> xr.DataArray:
 
 
 def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
-    upper = read_surface(scene.upper or scene.surface, scene.folder)
+    upper = read_surface(scene.upper or scene.surface, scene.folder, lower)
     if scene.joint.register:
         return call("joints.register", lower, upper)
     return as_dataset(upper.rename("height"))

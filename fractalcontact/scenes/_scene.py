@@ -11,6 +11,8 @@ from typing import Any
 from fractalcontact.scenes._stages import DATASHEET, PRESS, StageType
 
 Table = Mapping[str, Any]
+OF_SURFACE = "surface"  # plane of an upper face: plane and cells of the table [surface]
+PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 LOADS = ("closure", "normal_force", "nominal_pressure")
 
 

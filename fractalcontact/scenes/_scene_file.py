@@ -17,7 +17,15 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.validation import NONE, Problems, did_you_mean
 from fractalcontact.scenes._plan import check_loads
-from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, WANT_KEYS, MaterialTable, Scene, Table
+from fractalcontact.scenes._scene import (
+    LOADS,
+    MATERIAL_KEYS,
+    PLANES,
+    WANT_KEYS,
+    MaterialTable,
+    Scene,
+    Table,
+)
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,
     JOINT_STAGES,
@@ -29,7 +37,10 @@ from fractalcontact.scenes._stages import (
 
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
 SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
-READING = ("read", "sample", "channel", "units", "spacing", "columns", "plane", "level", "despike", "fill")
+READING = (
+    "read", "sample", "channel", "units", "spacing", "first_row", "columns", "plane", "level", "despike",
+    "fill",
+)  # fmt: skip
 SETTINGS = ("title", "paper", "error", "budget")
 TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
@@ -61,6 +72,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
 }
 
 
+PAIRS = ("young", "poisson")  # one value, or that of each body
 RIGID = ("delta_surface", "delta_dimension", "rigid_dilatancy", "decorrelation_length")
 
 
@@ -221,7 +233,7 @@ def _check(scene: Scene, problems: Problems) -> None:
         _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
     if "joint" in scene.tables:
         problems.boolean("joint.register", scene.table("joint").get("register", False))
-        _check_stages(scene.table("joint"), "joint", _joint_keys(), JOINT_STAGES, problems)
+        _check_stages(scene.table("joint"), "joint", joint_keys(), JOINT_STAGES, problems)
     if "domains" in scene.tables:
         _check_stages(scene.table("domains"), "domains", (), DOMAIN_STAGES, problems)
     _check_want(scene, problems)
@@ -260,6 +272,7 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         _check_keys(table, READING, name, problems)
         if sources == ["read"]:
             problems.path(f"{name}.read", table["read"])
+            problems.choice(f"{name}.plane", table.get("plane"), PLANES[name], optional=True)
         else:
             problems.choice(f"{name}.sample", table["sample"], SAMPLES)
     for flag in ("despike", "fill"):
@@ -272,17 +285,17 @@ def _check_material(table: Table, problems: Problems) -> None:
     _check_keys(table, MATERIAL_KEYS, "material", problems)
     for entry in fields(MaterialTable):
         if entry.name in table:
-            several = entry.name in ("young", "poisson", "yield_pressure")
+            several = entry.name in (*PAIRS, "yield_pressure")
             check = problems.numbers if several else problems.number
             check(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
-    for name in ("young", "poisson"):
+    for name in PAIRS:
         value = table.get(name)
         if isinstance(value, list):
             expected = "one value, or [lower, upper]"
             problems.require(len(value) in (1, 2), f"material.{name}", expected, value)
 
 
-def _joint_keys() -> tuple[str, ...]:
+def joint_keys() -> tuple[str, ...]:
     """Return the keys of `[joint]`: the block, `register`, and the arguments of all stages."""
     stages = (STAGES[f"joints/{name}"] for name in JOINT_STAGES)
     return tuple(dict.fromkeys(["block", "register", *(key for row in stages for key in row.arguments())]))

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.results import provenance_of
 from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._scene import OF_SURFACE
 
 WHERE = "fractalcontact.scenes.template"
 QUESTIONS = ("roughness", "contact", "joint")
@@ -85,6 +87,10 @@ def template(
     facts = _facts(scan, options)
     tables = [("surface", _file_table(scan, folder, options, facts["missing"] and question != "roughness"))]
     if question == "joint":
+        if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
+            options = {key: value for key, value in options.items() if key != "spacing"} | {
+                "plane": OF_SURFACE
+            }
         tables.append(("upper", _file_table(str(upper), folder, options, facts["missing"])))
     if question != "roughness":
         tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
@@ -111,6 +117,7 @@ def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str
         "extent": extent,
         "slope": float(statistics["rms_slope"]),
         "missing": bool(surface.isnull().any()),
+        "in_plane": "gridding" in provenance_of(surface),
     }
 
 

@@ -121,7 +121,7 @@ def _is_valid(problems: Problems, *keys: str) -> bool:
 
 def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArray]:
     """Return the valid surfaces of the scene; of an ensemble one."""
-    surfaces = {}
+    surfaces: dict[str, xr.DataArray] = {}
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
         if table is None or (name == "upper" and not (_is_valid(problems, "want") and scene.want.joints)):
             continue
@@ -131,7 +131,8 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
         if _is_valid(problems, name):
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
-                surfaces[name] = read_surface(table, scene.folder) if flat is None else flat
+                lower = surfaces.get("surface")
+                surfaces[name] = read_surface(table, scene.folder, lower) if flat is None else flat
     return surfaces
 
 

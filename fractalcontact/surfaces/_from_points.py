@@ -161,8 +161,10 @@ def from_points(
         gridded = _triangulated(values, step, given, largest_gap, cells)
     facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
     core = ("y", "x")[2 - gridded.heights.ndim :]
-    centres = gridded.centres if cells is None else [plane[dim].values for dim in core]
-    surface = xr.DataArray(gridded.heights, dict(zip(core, centres, strict=True)), core, name="height")
+    centres = dict(zip(core, gridded.centres, strict=True))
+    if cells is not None and isinstance(plane, xr.DataArray):
+        centres = {dim: np.asarray(plane[dim].values) for dim in core}  # the same to the last bit
+    surface = xr.DataArray(gridded.heights, centres, core, name="height")
     if gridded.finest is not None:
         surface = surface.assign_coords(finest_scale=gridded.finest)
     parameters: dict[str, Any] = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.interpolate import griddata
 from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
@@ -208,3 +209,26 @@ def test_large_smooth_surface_is_estimated(shape, noise):
     assert np.isfinite(hurst)
     assert np.isnan(low) or low <= 0.7
     assert "in the model" in note
+
+
+@pytest.mark.parametrize("step", [1e-4, 2e-4, 3e-4])
+def test_linear_interpolation_has_no_interval(step):
+    """Points gridded finely by hand look smooth; without their distance no interval can hold the truth."""
+    heights = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.8, rms_increment=3e-5, rng=4).values
+    flat = np.random.default_rng(4).choice(256 * 256, 64**2, replace=False)
+    row, column = np.unravel_index(flat, heights.shape)
+    y, x = np.meshgrid(*(np.arange(2e-3, 23e-3, step),) * 2, indexing="ij")
+    gridded = griddata(np.c_[row, column] * 1e-4, heights[row, column], (y, x))
+    result = fc.dimensions.estimate(gridded, spacing=step).isel(method=0)
+    assert np.isnan(result.ci_low)
+    assert np.isnan(result.standard_error)
+    assert "interpolated" in result.ci_low.attrs["reason"]
+    resolved = fc.dimensions.estimate(gridded, spacing=step, scales=(3.2e-3, 0.1)).isel(method=0)
+    assert float(resolved.ci_low) - 0.035 <= 0.8 <= float(resolved.ci_high)
+
+
+@pytest.mark.parametrize("step", [1e-5, 1e-6, 1e-7])
+def test_rounded_heights_do_not_count_as_interpolated(step):
+    heights = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.8, rms_increment=3e-6, rng=4).values
+    result = fc.dimensions.estimate(step * np.rint(heights / step), spacing=1e-4)
+    assert "interpolated" not in result.hurst.attrs["comment"]

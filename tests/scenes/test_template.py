@@ -62,6 +62,24 @@ def test_joint_of_two_faces(scans):
     assert float(joints["closure"]["contact_fraction"].isel(shear=0, step=-1)) > 0.9
 
 
+def test_joint_of_two_tilted_clouds(scans):
+    """The upper cloud is gridded on the plane and the cells of the lower one: its distance stays."""
+    rng, side = np.random.default_rng(1), 96 * 0.2
+    for name, distance in (("a.xyz", 0.0), ("b.xyz", 0.5)):
+        x, y = rng.uniform(0.0, side, (2, 12000))
+        np.savetxt(name, np.c_[x, y, 0.3 * x + 0.05 * np.sin(x) + distance], fmt="%.9f")
+    text = fc.scenes.template("joint", "a.xyz", "b.xyz", young=3e10, units="mm", spacing=4e-4)
+    upper = tomllib.loads(text)["upper"]
+    assert upper["plane"] == "surface"
+    assert "spacing" not in upper
+    (scans / "two.toml").write_text(text.replace("register = true", "register = false"), encoding="utf-8")
+    scene = fc.scenes.validate("two.toml")
+    tree = fc.scenes.run(scene, progress=False)
+    distance = tree["joints/faces/height"] - tree["surfaces/height"]
+    assert float(distance.mean()) == pytest.approx(0.5e-3 / np.hypot(1.0, 0.3), rel=0.01)
+    assert float(distance.std()) < 1e-5
+
+
 def test_scan_with_gaps_is_filled_where_it_is_pressed(scans):
     gapped = fc.open("lower.nc")
     fc.save(gapped.where((gapped.x > 1e-3) | (gapped.y > 1e-3)), "gaps.nc")

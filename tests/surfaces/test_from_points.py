@@ -220,6 +220,16 @@ def test_interval_of_gridded_points_holds_the_truth(arrangement, hurst):
     assert sum(held) >= 3  # of intervals of 95 %
 
 
+@pytest.mark.parametrize("seed", [3, 8])
+def test_a_hole_changes_the_exponent_little(seed):
+    """A hole of 3 % of the area takes few waves away, and its filling adds none; steps lowered H by 0.23."""
+    whole, holed = (
+        fc.dimensions.estimate(fc.surfaces.from_points(measured_points(kind, 0.9, seed), plane="xy"))
+        for kind in ("random", "gap")
+    )
+    assert float(abs(whole.hurst - holed.hurst)[0]) < 0.08
+
+
 def test_without_the_finest_scale_the_dimension_is_wrong():
     """Gridding at half the distance of the points makes a smooth surface: the reason for the window."""
     surface = fc.surfaces.from_points(measured_points("random", 0.7, 1), 2e-4, plane="xy")
@@ -283,11 +293,13 @@ def test_second_lattice_on_the_cells_of_the_first():
 
 
 def test_second_profile_on_the_positions_of_the_first():
-    x = np.sort(RNG.uniform(0.0, 0.2, 400))
+    x = np.sort(np.random.default_rng(2).uniform(0.0, 0.2, 400))
     first = fc.surfaces.from_points(np.c_[x, np.sin(40.0 * x)], plane="xy")
     second = fc.surfaces.from_points(np.c_[x[100:], 1.0 + np.sin(40.0 * x[100:])], plane=first)
     np.testing.assert_array_equal(second.x, first.x)
     inside = (first.x > x[100]).values
-    same = first.notnull().values & (first.x > x[101]).values
-    np.testing.assert_allclose((second - first).values[same], 1.0, atol=1e-12)
+    difference = (second - first).values
+    same = np.isfinite(difference)
+    np.testing.assert_allclose(difference[same], 1.0, atol=1e-12)
+    assert same.sum() > 0.6 * first.size
     assert np.isnan(second.values[~inside]).all()
