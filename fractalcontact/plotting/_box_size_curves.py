@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SIZES = ("box_length", "radius_length", "box_size", "radius")
 MAX_CURVES = 6  # more curves than this cross the curves of their random nulls illegibly
+TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
 STEEP = 1.5  # ratio of values above which lacunarity is drawn on a logarithmic axis
 
 
@@ -83,7 +84,12 @@ def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name:
     steep = name == "lacunarity" and shown.size > 0 and shown.max() > STEEP * shown.min()
     _style.log_scale(ax, x=boxes, y=curves if steep else None)
     if name == "local_slope" and shown.size:
-        ax.set_ylim(min(-0.05, shown.min() - 0.05), max(2.05, shown.max() + 0.05))
+        ax.set_ylim(-0.05, 2.05)
+        beyond = shown[(shown < -TOLERANCE) | (shown > 2 + TOLERANCE)]
+        if beyond.size:  # no dimension in a plane: the slope between counts of a few boxes
+            ends = dict.fromkeys(f"{value:.2g}" for value in (beyond.min(), beyond.max()))
+            note = f"outside, of few boxes: {' to '.join(ends)}"
+            ax.text(0.98, 0.02, note, transform=ax.transAxes, ha="right", color=_style.grey(), size="small")
     _style.plain_ticks(ax)
     size_name = "radius" if over == "radius" else "box size"
     ax.set_xlabel(scale.label(size_name) if size.endswith("_length") else f"{size_name} (cells)")

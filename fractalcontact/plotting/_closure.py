@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from fractalcontact.base.units import Scale
 
 RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
+LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 
 
@@ -30,6 +32,7 @@ def closure_laws(
     shear: float | None = None,
     marked: Sequence[int] = (),
     key: bool = True,
+    log: bool = False,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw normal force against closure, one curve per shear displacement.
@@ -48,6 +51,8 @@ def closure_laws(
         Steps to mark A, B, C ... on that curve.
     key : bool
         Add a legend of the shear displacements.
+    log : bool
+        Logarithmic axes, which show every decade of the load.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -89,10 +94,11 @@ def closure_laws(
     if len(marked) and len(force):
         row = 0 if shear is None or len(force) == 1 else nearest(data["shear"], shear)
         steps = [int(step) for step in marked]
+        _set_scales(ax, length(total), newton(force), log=log)
         mark_points(ax, length(inner[row, steps]), newton(force[row, steps]), colours[row])
     ax.set_xlabel(length.label("closure"))
     ax.set_ylabel(axis_label(data["normal_force"], newton))
-    _start_at_zero(ax, total, force)
+    _set_scales(ax, length(total), newton(force), log=log)
     if key:
         _shear_legend(ax, data, colours)
     if inner_name != "closure":
@@ -110,7 +116,12 @@ def closure_laws(
 
 @_style.checked
 def contact_area(
-    result: Any, *, against: str = "normal_force", theory: Any = None, ax: Axes | None = None
+    result: Any,
+    *,
+    against: str = "normal_force",
+    theory: Any = None,
+    log: bool = False,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
 
@@ -126,6 +137,8 @@ def contact_area(
         Variable on the x axis: normal_force, nominal_pressure or closure.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
+    log : bool
+        Logarithmic axes, which show every decade of the load; a dotted line is proportional to the load.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -171,7 +184,9 @@ def contact_area(
     ax.set_xlabel(axis_label(data[against], scale))
     ax.set_ylabel(percent.label("real / nominal contact area"))
     entries = [] if theory is None else _draw_theories(ax, theory, against, scale, percent)
-    _start_at_zero(ax, loads, raw)
+    _set_scales(ax, scale(loads), percent(raw), log=log)
+    if log and against != "closure":
+        entries += _proportional_line(ax, scale(loads), percent(raw))
     _shear_legend(ax, data, colours)
     if corrected:
         lines = [
@@ -211,13 +226,50 @@ def _shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
 def mark_points(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
     """Mark points of a curve with circled letters, beginning with letter number `first`.
 
-    The letters are centred on their points, so that none covers another curve.
+    A letter is centred on its point, so that none covers another curve, or above it where another letter is.
     """
-    ax.plot(x, y, "o", mfc=ax.get_facecolor(), mec=colour, mew=1.2, ms=10.5, zorder=4, clip_on=False)
+    ax.plot(x, y, "o", color=colour, ms=3, zorder=4, clip_on=False)
+    to_points = ax.transData + ax.figure.dpi_scale_trans.inverted()
+    placed = [tuple(np.array(text.xyann) + 72 * to_points.transform(text.xy)) for text in _letters(ax)]
     for number, (a, b) in enumerate(zip(x, y, strict=True), first):
-        if np.isfinite(a) and np.isfinite(b):
-            ax.annotate(_style.letter(number), (a, b), fontsize="x-small", weight="bold", ha="center",
-                        va="center_baseline", zorder=5, annotation_clip=False)  # fmt: skip
+        if not (np.isfinite(a) and np.isfinite(b)):
+            continue
+        point, lift = 72 * to_points.transform((a, b)), 0.0
+        while any(math.hypot(point[0] - x0, point[1] + lift - y0) < LETTER for x0, y0 in placed):
+            lift += LETTER
+        placed.append((point[0], point[1] + lift))
+        circle = {"boxstyle": "circle,pad=0.25", "fc": ax.get_facecolor(), "ec": colour, "lw": 1.2}
+        leader = {"arrowstyle": "-", "color": colour} if lift else None
+        text = ax.annotate(_style.letter(number), (a, b), (0.0, lift), textcoords="offset points",
+                           size=LETTER / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
+                           annotation_clip=False, bbox=circle, arrowprops=leader)  # fmt: skip
+        text.set_gid(LETTER_NAME)
+        text.set_in_layout(False)
+
+
+def _letters(ax: Axes) -> list[Any]:
+    """Return the letters that are marked on Axes."""
+    return [text for text in ax.texts if text.get_gid() == LETTER_NAME]
+
+
+def _proportional_line(ax: Axes, x: Any, y: Any) -> list[Any]:
+    """Draw the line of proportional growth through the middle of the curves; return its legend entry."""
+    used = (x > 0) & (y > 0)
+    if not used.any():
+        return []
+    ends = np.array([x[used].min(), x[used].max()])
+    style: dict[str, Any] = {"ls": ":", "lw": 1.0, "color": _style.grey()}
+    ax.plot(ends, ends * np.exp(np.median(np.log(y[used] / x[used]))), **style)
+    return [_style.legend_line("proportional\nto the load", **style)]
+
+
+def _set_scales(ax: Axes, x: Any, y: Any, *, log: bool) -> None:
+    """Make both axes logarithmic, or start them at zero."""
+    if log:
+        _style.log_scale(ax, x=x, y=y)
+        _style.plain_ticks(ax)
+    else:
+        _start_at_zero(ax, x, y)
 
 
 def _start_at_zero(ax: Axes, x: Any, y: Any) -> None:

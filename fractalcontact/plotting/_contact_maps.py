@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import extent_of, result_of
 from fractalcontact.plotting._paths import load_text, select_path, shear_text
-from fractalcontact.plotting._surface import plane_scale
+from fractalcontact.plotting._surface import draw_outline, plane_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
 
 COLUMNS = 3
+ZOOM = 1 / 6  # edge of the magnified window over the shorter side
+POINTS = 1.0  # of a screen: a map whose cells are narrower is magnified
 
 
 @_style.checked
@@ -27,9 +30,12 @@ def contact_domains(
     shear: float | None = None,
     normal_force: float | None = None,
     panels: int = 6,
+    zoom: float | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     """Draw maps of the contact state for increasing load at one shear, or increasing shear at one force.
+
+    A further column magnifies a window, framed in the last map of each row, where the most contacts are.
 
     Parameters
     ----------
@@ -41,6 +47,9 @@ def contact_domains(
         Normal force (N) at which the shear path is shown; the nearest step is taken.
     panels : int
         Largest number of maps. Along a load path they are spread evenly over the closure.
+    zoom : float, optional
+        Edge (m) of the window, 0 for none. Default: a sixth of the shorter side if the cells of a map are
+        narrower than a typographic point, else none; none on given `axes`.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -66,8 +75,18 @@ def contact_domains(
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
     count, columns = path.sizes[dim], number_of_columns(path.sizes[dim])
     width = _style.WIDTH * columns / COLUMNS
+    window = _window(path["state"], zoom, axes, width / columns)
+    rows = -(-count // columns)
     size = (max(width, 3.0), maps_height(path, count, width))
-    shown = _style.panels(axes, (-(-count // columns), columns), size, count=count)
+    zooms: Any
+    if window is None:
+        shown, zooms = _style.panels(axes, (rows, columns), size, count=count), []
+    else:
+        size = (size[0] * (columns + 1) / columns, size[1])
+        grid = _style.panels(axes, (rows, columns + 1), size)
+        zooms, shown = grid[:, -1], grid[:, :-1].ravel()[:count]
+        for unused in grid[:, :-1].ravel()[count:]:
+            unused.remove()
     sheet = _style.sheet_of(axes, shown)
     common = shear_text(path, data) if dim == "step" else load_text(path, data)
     for number, ax in enumerate(shown):
@@ -76,6 +95,9 @@ def contact_domains(
         if sheet is None and common:  # no room above the panels of others
             name = f"{common},  {name}" if name else common
         _state_map(ax, state["state"], number if count > 1 else None, name)
+    for row, ax in enumerate(zooms):
+        last = min((row + 1) * columns, count) - 1
+        _magnify(ax, shown[last], path["state"].isel({dim: last}), window, _style.letter(last))
     if "x" in path.coords:
         extent, length = extent_of(path["state"]), plane_scale(path["state"])
         _maps.scale_bar(shown[(count - 1) // columns * columns], extent, length)
@@ -83,7 +105,39 @@ def contact_domains(
         sheet.suptitle(common, x=0.01, ha="left", fontsize="medium")
     if bool((path["state"] > 1).any()):
         _maps.flag_legend(shown, sheet, ("open", "contact", "yielded"), _style.STATE_COLOURS)
-    return shown
+    return np.concatenate([shown, zooms]) if len(zooms) else shown
+
+
+def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width: float) -> Any:
+    """Return the cells (rows, columns) of the window to magnify in maps of so many inches, or None."""
+    shape, extent = state.shape[-2:], extent_of(state)
+    cell = (extent[1] - extent[0]) / shape[1]
+    if zoom is None:
+        if axes is not None and not hasattr(axes, "subplots"):
+            return None
+        zoom = min(shape) * cell * ZOOM if 72 * width < POINTS * shape[1] else 0.0
+    size = round(zoom / cell)
+    if size < 1 or size >= min(shape):
+        return None
+    touching = np.asarray(state.transpose(..., "y", "x").values).reshape(-1, *shape)[-1] > 0
+    sums = np.pad(touching.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    inside = sums[size:, size:] - sums[:-size, size:] - sums[size:, :-size] + sums[:-size, :-size]
+    row, column = np.unravel_index(int(np.argmax(inside)), inside.shape)
+    return slice(int(row), int(row) + size), slice(int(column), int(column) + size)
+
+
+def _magnify(ax: Axes, of: Axes, plane: xr.DataArray, window: Any, letter: str) -> None:
+    """Draw the window of a map on its own, and frame it in the map."""
+    part = plane.transpose("y", "x")[window]
+    length = plane_scale(plane)
+    _maps.state(ax, np.asarray(part.values), extent_of(part), length)
+    _maps.bare_frame(ax)
+    draw_outline(of, extent_of(part), length, edgecolor=_style.RED, linewidth=1.0)
+    for spine in ax.spines.values():
+        spine.set(color=_style.RED, linewidth=1.0)
+    edge = extent_of(part)[1] - extent_of(part)[0]
+    size = f",  {quantity_text(edge, 'm')} wide" if "x" in plane.coords else ""
+    ax.set_title(rf"$\bf{{{letter}}}$  magnified{size}", fontsize="medium")
 
 
 def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> None:

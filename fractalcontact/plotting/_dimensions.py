@@ -214,11 +214,13 @@ def dimensions(
     *,
     truth: float | None = None,
     band: tuple[float, float] | None = None,
+    band_name: str = "for comparison",
     ax: Axes | None = None,
 ) -> Axes:
     r"""Draw the fractal dimension estimated by each method with its 95 % interval.
 
-    A method without a validated interval is drawn as an open circle.
+    A method without a validated interval is drawn as an open circle. A fit beyond the range of fractals is
+    drawn at the limit as a triangle that points out of the range.
 
     Parameters
     ----------
@@ -229,6 +231,8 @@ def dimensions(
         True dimension, drawn as a line.
     band : pair of float, optional
         Range of dimensions for comparison, shaded.
+    band_name : str
+        What the range is, for the legend.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -253,6 +257,8 @@ def dimensions(
     data = result_of(
         estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",), "estimates"
     )
+    from matplotlib.patches import Patch
+
     names = words(data["method"])
     ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
     value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))
@@ -263,18 +269,28 @@ def dimensions(
     rows = np.arange(len(names))[::-1]
     has_interval = np.isfinite(low) & np.isfinite(high)
     ax.hlines(rows[has_interval], low[has_interval], high[has_interval], color=_style.BLUE, lw=2.2)
-    ax.plot(value[has_interval], rows[has_interval], "o", color=_style.BLUE, ms=6)
-    ax.plot(value[~has_interval], rows[~has_interval], "o", mfc=_style.tone(0.0), mec=_style.BLUE, ms=6)
+    fitted = table(data, "fitted_hurst", ("method",)) if "fitted_hurst" in data else hurst
+    beyond = (hurst >= 1) | (fitted > 1), (hurst <= 0) | (fitted < 0)
+    smooth, rough = (np.isfinite(value) & side for side in beyond)
+    inside = ~(smooth | rough)
+    hollow: dict[str, Any] = {"ls": "", "mfc": _style.tone(0.0), "mec": _style.BLUE, "ms": 6}
+    closed = has_interval & inside
+    ax.plot(value[closed], rows[closed], "o", color=_style.BLUE, ms=6)
+    ax.plot(value[~has_interval & inside], rows[~has_interval & inside], marker="o", **hollow)
+    for side, marker in ((smooth, "<"), (rough, ">")):
+        ax.plot(value[side], rows[side], marker=marker, **hollow)
     entries = (
         [_style.legend_line("95 % interval", color=_style.BLUE, lw=2.2, marker="o")]
         if has_interval.any()
         else []
     )
-    if not has_interval.all():
-        entries.append(
-            _style.legend_line("no interval", ls="", marker="o", mfc=_style.tone(0.0), mec=_style.BLUE, ms=6)
-        )
+    if (~has_interval & inside).any():
+        entries.append(_style.legend_line("no interval", marker="o", **hollow))
+    if not inside.all():
+        marker = "<" if smooth.any() else ">"
+        entries.append(_style.legend_line("at the limit:\nno dimension", marker=marker, **hollow))
     if band is not None:
+        entries.append(Patch(facecolor=_style.pale(), lw=0, label=band_name))
         ax.axvspan(*band, color=_style.pale(), lw=0, zorder=0)
     if truth is not None:
         ax.axvline(truth, color=_style.ink(), lw=0.9, ls=":")

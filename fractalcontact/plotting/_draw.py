@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.netcdf import written_whole
@@ -37,7 +39,7 @@ from fractalcontact.plotting._partial_slip import slip_domains, slip_loops
 from fractalcontact.plotting._self_weight import self_weight
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
-from fractalcontact.plotting._style import drawn_for_files, figure_of
+from fractalcontact.plotting._style import drawn_for_files, figure_of, needs_log_axis
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
 
 if TYPE_CHECKING:
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
+PAPER_BAND = (2.15, 2.29)  # fractal dimensions that the paper gives for its surface
 # names of the same figures in a study that is not compared with the paper
 JOINT = {
     1: "surface",
@@ -125,7 +128,8 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
             yield f"figure_{number}_{name}" if paper else JOINT[number], _later(paper_figure, tree, number)
     estimates = group(tree, "dimensions")
     if estimates is not None and "method" in estimates.dims:
-        yield "dimensions", _later(dimensions, estimates)
+        band = PAPER_BAND if paper else None
+        yield "dimensions", functools.partial(dimensions, estimates, band=band, band_name="1998 paper")
     curves = _scaling_curves(tree)
     if curves:
         yield "dimension_curves", _later(dimension_curves, curves, estimates)
@@ -142,8 +146,8 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
         ("joints/decorrelation_length", "correlation", correlation),
         ("joints/directional_roughness", "directional_roughness", directional_roughness),
         ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
-        ("contact", "closure_law", closure_laws),
-        ("contact", "contact_area", contact_area),
+        ("contact", "closure_law", _closure_laws),
+        ("contact", "contact_area", _contact_area),
         ("partial_slip", "slip_loops", slip_loops),
         ("joints/partial_slip", "joint_slip_loops", slip_loops),
     ):
@@ -192,6 +196,20 @@ def _friction(data: xr.Dataset) -> Any:
     several = "step" in data.dims and data.sizes.get("direction", 1) > 1
     direction = words(data["direction"])[0] if several else None
     return friction(data, direction=direction, reach=evenly_sampled_reach(data))
+
+
+def _closure_laws(data: xr.Dataset) -> Any:
+    return closure_laws(data, log=_has_decades_of_load(data))
+
+
+def _contact_area(data: xr.Dataset) -> Any:
+    return contact_area(data, log=_has_decades_of_load(data))
+
+
+def _has_decades_of_load(data: xr.Dataset) -> bool:
+    """Return True where linear axes would hide all loads but the largest."""
+    force = np.asarray(data["normal_force"].values, float) if "normal_force" in data else np.empty(0)
+    return needs_log_axis(force[force > 0])
 
 
 def _lacunarity(data: xr.Dataset) -> Any:

@@ -18,6 +18,7 @@ Extent = tuple[float, float, float, float]
 
 MOST_CELLS = 1600  # along an edge; a finer plane is averaged first, since no screen shows more
 SHADED_SLOPE = 0.5  # rms slope after the exaggeration of the shading
+SHADING = 0.9  # change of brightness from no light to full light
 CLIPPED = 0.2  # per cent of the values at either end that may lie outside the colour bar
 
 
@@ -48,8 +49,10 @@ def colour_limits(values: Array, clipped: float = CLIPPED) -> tuple[float, float
     return low, high, beyond[lowest < low, highest > high]
 
 
-def relief(ax: Axes, heights: Array, extent: Extent, length: Scale, height: Scale) -> Any:
-    """Draw heights (m) as a shaded relief lit from the north-west; return the mappable of a colour bar."""
+def relief(
+    ax: Axes, heights: Array, extent: Extent, length: Scale, height: Scale, *, shaded: bool = False
+) -> Any:
+    """Draw heights (m), if wanted lit from the north-west; return the mappable of a colour bar."""
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LightSource, Normalize
@@ -62,10 +65,11 @@ def relief(ax: Axes, heights: Array, extent: Extent, length: Scale, height: Scal
     )
     missing = ~np.isfinite(heights)
     filled = np.where(missing, low, heights)
-    spacing = (extent[3] - extent[2]) / heights.shape[0], (extent[1] - extent[0]) / heights.shape[1]
     image = colours(norm(height(filled)))[..., :3]
-    light = _light(LightSource(azdeg=315, altdeg=45), filled, spacing)
-    image = np.clip(image * (0.35 + 0.85 * light[..., None]), 0.0, 1.0)
+    if shaded:
+        spacing = (extent[3] - extent[2]) / heights.shape[0], (extent[1] - extent[0]) / heights.shape[1]
+        light = _light(LightSource(azdeg=315, altdeg=45), filled, spacing)
+        image = np.clip(image * (1.0 + SHADING * (light - light.mean()))[..., None], 0.0, 1.0)
     image[missing] = matplotlib.colors.to_rgb(_style.MISSING)
     draw_image(ax, image, extent, length)
     mappable = ScalarMappable(norm, colours)

@@ -153,7 +153,7 @@ def _dilatancy(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
     if maps is not None:
         data = result_of(maps, "paper_figure", ("state",), ("shear", "step"))
         path, dim = select_path(data, None, force, PANELS, "paper_figure")
-        below = maps_height(path, path.sizes[dim], width)
+        below = maps_height(path, path.sizes[dim], 0.75 * width)  # a column of windows is added
     upper: Any
     lower: Any
     if axes is None or hasattr(axes, "subfigures"):

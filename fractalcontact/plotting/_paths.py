@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting._inputs import nearest, table
 from fractalcontact.plotting._style import spread_indices
-from fractalcontact.plotting._units import name_of, scale_of, units_of
+from fractalcontact.plotting._units import name_of, scale_of
 
-SMALL = 0.1  # a load below this many units of its path is written in a unit of its own
 SAME = 5e-3  # loads with a smaller relative difference count as equal
 LOADS = {"normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
@@ -49,8 +47,6 @@ def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
         if values.size == 0 or np.ptp(values) > SAME * abs(values[0]):
             continue
         scale = scale_of((state if path is None else path)[name])
-        if abs(float(scale(values[0]))) < SMALL:
-            scale = scale_for(units_of(state[name]), values[0])
         return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}"
     return ""
 

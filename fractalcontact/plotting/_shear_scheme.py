@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 AZIMUTHS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
+SECTION_SHAPE = 1.9  # width over height
 LABEL_WIDTH = 0.18  # of the width of the section, needed by the label of the lift
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -51,8 +52,9 @@ class ShearStep:
 def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels | None = None) -> AxesArray:
     """Draw the sliding block from above and a section through the crack along the sliding direction.
 
-    The section shows the given surfaces, with heights exaggerated. The block is lifted by the largest height
-    of the delta-surface, as for rigid bodies. They touch at one point, which is seldom in the section.
+    The section shows the given surfaces, its heights exaggerated as its title says. The block is lifted by
+    the largest height of the delta-surface, as for rigid bodies. They touch at one point, which is seldom in
+    the section.
 
     Parameters
     ----------
@@ -83,16 +85,17 @@ def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels 
     >>> delta = fc.joints.delta_surface(crack, shear=4e-4, direction="E")
     >>> plan, section = fc.plotting.sliding_scheme(lower, delta)
     >>> print(section.get_title())
-    section along the sliding direction, East
+    section along the sliding direction, East, heights × 10
     """
     lower, step = plane_of(surface, "sliding_scheme", "height", "surface"), shear_step_of(delta)
     facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height", "upper")
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.0), width_ratios=(1.0, 1.9))
     _draw_plan(left, lower, step)
-    _draw_section(right, lower, facing, step, r"$\delta_\mathrm{r}$" if upper is None else "lift")
+    name = r"$\delta_\mathrm{r}$" if upper is None else "lift"
+    times = _draw_section(right, lower, facing, step, name)
     left.set_title("plan view")
     direction = f", {direction_name(step.direction)}" if step.direction else ""
-    right.set_title(f"section along the sliding direction{direction}")
+    right.set_title(f"section along the sliding direction{direction}, heights × {times:g}")
     return shown
 
 
@@ -142,8 +145,11 @@ def _draw_direction(
 
 def _draw_section(
     ax: Axes, lower: xr.DataArray, facing: xr.DataArray, step: ShearStep, lift_name: str
-) -> None:
-    """Draw lower surface and lifted block along the line through the centre of the block."""
+) -> float:
+    """Draw lower surface and lifted block along the line through the centre of the block.
+
+    Return how many times the heights are exaggerated.
+    """
     ax.grid(False)
     left, right, bottom, top = extent_of(step.block)
     # through the middle cell of the block, so that a section along x or y meets cell centres
@@ -159,14 +165,18 @@ def _draw_section(
     span = max(float(np.nanmax(lower_height) - np.nanmin(lower_height)), 1e-9 * float(np.ptp(position)))
     low = float(np.nanmin(lower_height)) - 0.5 * span
     block_top = float(np.nanmax(upper_height)) + step.lift + 0.5 * span
-    along, up = scale_for("m", position), scale_for("m", (low, block_top + 0.6 * span))
+    top, length = block_top + 0.6 * span, float(position[-1] - position[0])
+    times = _one_digit(length / (top - low) / SECTION_SHAPE)
+    low = top - length / times / SECTION_SHAPE
+    along, up = scale_for("m", position), scale_for("m", (low, top))
     ax.fill_between(along(position), float(up(low)), up(lower_height), color=LOWER, lw=0)
     ax.plot(along(position), up(lower_height), color=_style.ink(), lw=0.9)
     block_bottom = up(upper_height + step.lift)
     ax.fill_between(along(upper_position), block_bottom, float(up(block_top)), color=UPPER, lw=0)
     ax.plot(along(upper_position), block_bottom, color=_style.ink(), lw=0.9)
     ax.set_xlim(float(along(position[0])), float(along(position[-1])))
-    ax.set_ylim(float(up(low)), float(up(block_top + 0.6 * span)))
+    ax.set_ylim(float(up(low)), float(up(top)))
+    ax.set_aspect(times * up.factor / along.factor)
     middle = (float(along(np.mean(upper_position))), float(up(block_top - 0.08 * span)))
     ax.text(*middle, "upper", ha="center", va="top", color="white")
     ax.text(0.02, 0.04, "lower", transform=ax.transAxes)
@@ -174,6 +184,13 @@ def _draw_section(
     _draw_dimensions(ax, (along, up), step, lift_name, corner)
     ax.set_xlabel(along.label("position along the sliding direction"))
     ax.set_ylabel(up.label("height"))
+    return times
+
+
+def _one_digit(value: float) -> float:
+    """Return the largest number of one digit that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(np.floor(value / power * (1 + 1e-9)) * power)
 
 
 def _draw_dimensions(

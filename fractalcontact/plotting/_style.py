@@ -207,7 +207,7 @@ def grey() -> Any:
 
 def pale() -> Any:
     """Return the colour of an area in the background."""
-    return tone(0.14)
+    return tone(0.11)
 
 
 def tone(share: float) -> Any:

@@ -22,12 +22,16 @@ POSITIVE = ("pressure", "gap")
 
 @_style.checked
 def surface(
-    surface: Any, *, block: xr.DataArray | None = None, title: str = "", ax: Axes | None = None
+    surface: Any,
+    *,
+    block: xr.DataArray | None = None,
+    shaded: bool = False,
+    title: str = "",
+    ax: Axes | None = None,
 ) -> Axes:
-    """Draw a map of heights as a shaded relief, lit from the north-west (upper left).
+    """Draw a map of heights.
 
-    Colour shows height. Shading shows slope, exaggerated until it is visible, and is not to scale. If a few
-    heights lie far outside the range of all others, the colour bar is cut and ends in a point.
+    If a few heights lie far outside the range of all others, the colour bar is cut and ends in a point.
 
     Parameters
     ----------
@@ -35,6 +39,9 @@ def surface(
         Heights (m), dims (y, x); leading dims of length one are dropped. NaN is drawn grey.
     block : DataArray, optional
         Any array with the x and y (m) of the sliding block, whose outline is drawn.
+    shaded : bool
+        Light the surface from the north-west (upper left), its slopes exaggerated to an rms of 0.5. The
+        colours are then those of the bar on average only.
     title : str
     ax : Axes, optional
         Default: those of a new figure.
@@ -61,7 +68,7 @@ def surface(
     ax = _style.axes_or_new(ax, SIZE)
     length, height = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
-    mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height)
+    mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height, shaded=shaded)
     if outline is not None:
         draw_outline(ax, outline, length)
     _maps.colour_bar(ax, mappable, axis_label(plane, height))

@@ -16,14 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FLOW_LINES = ("-", (0, (4, 2)))
-MEAN_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}
+# broad and pale, so that it is seen where the hydraulic aperture lies on it
+MEAN_LINE: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
 
 
 @_style.checked
 def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the hydraulic aperture against load, one curve per shear displacement and flow direction.
 
-    The aperture is zero where contacts block the flow from side to side. Thin dotted lines show the
+    The aperture is zero where contacts block the flow from side to side. Broad pale lines show the
     mechanical aperture (mean gap) if the result has it.
 
     Parameters

@@ -86,5 +86,7 @@ def test_local_slopes_and_null():
     low, high = ax.get_ylim()
     assert low < 0
     assert high > 2
-    steep = result.assign(local_slope=result["local_slope"] + 2.0)
-    assert plotting.local_slopes(steep)[0].get_ylim()[1] > 3.5
+    steep = result.assign(local_slope=result["local_slope"] * [[1.0, 1.0, 3.5, -1.0]])
+    (ax,) = plotting.local_slopes(steep)
+    assert ax.get_ylim() == pytest.approx((-0.05, 2.05))  # no dimension is beyond 0 ... 2
+    assert ax.texts[0].get_text().endswith("-1.5 to 5.2")

@@ -93,3 +93,28 @@ def test_theories_beside_the_contact_area():
     assert "Bush,\nGibson,\nThomas" in named
     with pytest.raises(InvalidInput, match="'closure'"):
         plotting.contact_area(pressed, against="closure", theory=theory)
+
+
+def test_logarithmic_axes_show_every_decade_with_a_line_proportional_to_the_load(closed):
+    loaded = closed.isel(step=slice(1, None))
+    ax = plotting.contact_area(loaded, log=True)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    x, y = next(line for line in ax.lines if line.get_linestyle() == ":").get_data()
+    assert x == pytest.approx(np.array([0.1, 30.0]))  # kN
+    assert y[1] / y[0] == pytest.approx(300.0)
+    laws = plotting.closure_laws(loaded, log=True)
+    assert (laws.get_xscale(), laws.get_yscale()) == ("log", "log")
+    assert plotting.closure_laws(loaded).get_xscale() == "linear"
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-3, 1.0])
+def test_letters_do_not_overlap(closed, factor):
+    near = closed.assign({name: factor * closed[name] for name in ("closure", "interface_closure")})
+    near = near.assign_coords(normal_force=factor * near.normal_force)
+    ax = plotting.closure_laws(near.isel(shear=0), marked=[0, 1, 2, 3, 4])
+    ax.set_xlim(0, 1e3)
+    render(ax)
+    boxes = [text.get_bbox_patch().get_window_extent() for text in ax.texts]
+    centres = np.array([[box.x0 + box.x1, box.y0 + box.y1] for box in boxes]) / 2
+    apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[np.triu_indices(len(boxes), 1)]
+    assert apart.min() > 0.7 * boxes[0].width

@@ -8,6 +8,7 @@ from plotting_figures import CONTACT, OPEN, YIELDED, colours, figure_of, render
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.schema import label
 
 
 def test_state_colours():
@@ -57,7 +58,7 @@ def test_common_force_is_written_once():
 def test_unit_of_loads():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4,)), forces=(40.0, 4e3, 2e4))
     titles = [ax.get_title(loc="left") for ax in plotting.contact_domains(closed)]
-    for title, force in zip(titles, ("40 N", "4 kN", "20 kN"), strict=True):
+    for title, force in zip(titles, ("0.04 kN", "4 kN", "20 kN"), strict=True):
         assert f"= {force}," in title
 
 
@@ -72,3 +73,35 @@ def test_shear_or_force_must_be_chosen():
 def test_mask_without_coordinates():
     mask = xr.DataArray(np.eye(12, dtype=bool), dims=("y", "x"), name="state")
     render(plotting.contact_domains(mask))
+
+
+def speckled(cells, spot):
+    """Return a map of single cells in contact and one spot, 80 µm apart."""
+    flags = np.zeros((cells, cells), dtype=np.int8)
+    flags[::20, ::20] = 1
+    flags[spot] = 1
+    x = 8e-5 * (np.arange(cells) + 0.5)
+    coords = {"y": x, "x": x, "normal_force": ("step", [5.0])}
+    return label(xr.Dataset({"state": (("step", "y", "x"), flags[None])}, coords))
+
+
+def test_dots_are_magnified_where_the_most_contacts_are():
+    full, window = plotting.contact_domains(speckled(240, np.s_[100:110, 181:191]), zoom=40 * 8e-5)
+    image = colours(window)
+    assert image.shape == (40, 40, 3)
+    assert np.all(image == CONTACT, axis=-1).sum() >= 100  # the whole spot, and some of the cells
+    (frame,) = full.patches
+    left, bottom = frame.get_xy()
+    assert frame.get_width() == pytest.approx(3.2)
+    assert left <= 181 * 0.08
+    assert left + 3.2 >= 191 * 0.08
+    assert bottom <= 100 * 0.08
+    assert bottom + 3.2 >= 110 * 0.08
+    assert "3.2 mm" in window.get_title(loc="left")
+    render(full)
+
+
+def test_only_maps_of_small_cells_are_magnified():
+    assert len(plotting.contact_domains(speckled(240, 0))) == 2
+    assert len(plotting.contact_domains(speckled(240, 0), zoom=0)) == 1
+    assert len(plotting.contact_domains(speckled(24, 0))) == 1

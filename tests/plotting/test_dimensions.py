@@ -104,3 +104,15 @@ def test_intervals_of_the_dimension():
     assert segments[:, 0] == pytest.approx((3 - with_interval.ci_high).values)
     assert segments[:, 1] == pytest.approx((3 - with_interval.ci_low).values)
     assert [t.get_text() for t in ax.get_yticklabels()] == ["default", "spectrum", "variogram", "cube counts"]
+
+
+def test_an_estimate_at_its_limit_is_no_point_and_the_band_is_named(study):
+    estimates = study["dimensions"].to_dataset().copy(deep=True)
+    estimates["hurst"][-1], estimates["fractal_dimension"][-1] = 1.0, 2.0
+    ax = plotting.dimensions(estimates, band=(2.15, 2.29), band_name="1998 paper")
+    by_marker = {line.get_marker(): line.get_xdata() for line in ax.lines if len(line.get_xdata())}
+    assert list(by_marker["<"]) == [2.0]
+    assert 2.0 not in [*by_marker.get("o", ())]
+    words = [text.get_text() for text in ax.artists[0].get_texts()]
+    assert "at the limit:\nno dimension" in words
+    assert "1998 paper" in words

@@ -3,7 +3,7 @@
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
-from plotting_figures import render
+from plotting_figures import factor, render
 
 from fractalcontact import plotting
 
@@ -37,3 +37,13 @@ def test_zero_shear_and_other_directions():
     render(plotting.sliding_scheme(surface, synthetic.delta(surface, shears=(0.0,))))
     render(plotting.sliding_scheme(surface, slid.assign_coords(direction="N", azimuth=90.0)))
     render(plotting.sliding_scheme(surface, slid.assign_coords(direction="30", azimuth=30.0)))
+
+
+def test_heights_are_exaggerated_as_the_title_says():
+    surface = synthetic.heights()
+    _, cut = plotting.sliding_scheme(surface, synthetic.delta(surface))
+    cut.figure.draw_without_rendering()
+    (x, y), (right, top) = cut.transData.transform([(0, 0), (1, 1)])
+    units = [factor(label) for label in (cut.get_xlabel(), cut.get_ylabel())]
+    times = ((top - y) / units[1]) / ((right - x) / units[0])
+    assert cut.get_title(loc="left").endswith(f"heights × {times:.0f}")

@@ -1,5 +1,6 @@
 """Maps of heights and other fields."""
 
+import matplotlib
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
@@ -23,13 +24,25 @@ def test_extent_and_light():
     x = np.linspace(1e-3, 3e-3, 41)
     bump = np.exp(-((x - 2e-3) ** 2 + (x[:, None] - 2e-3) ** 2) / 2e-7)
     plane = label(xr.DataArray(1e-5 * bump, dims=("y", "x"), coords={"y": x, "x": x}, name="height"))
-    ax = plotting.surface(plane)
+    ax = plotting.surface(plane, shaded=True)
     half = 0.5 * (x[1] - x[0]) * 1e3
     assert ax.images[0].get_extent() == pytest.approx([1 - half, 3 + half, 1 - half, 3 + half])
     assert ax.get_aspect() == 1.0
     light = colours(ax).sum(axis=-1)
     assert light[26, 14] > light[14, 26]  # row 26 is north of the top, column 14 west of it
     assert ax.get_xlabel() == "$x$ (mm)"
+
+
+def test_colours_are_those_of_the_bar():
+    surface = synthetic.heights()
+    drawn = {shaded: plotting.surface(surface, shaded=shaded) for shaded in (False, True)}
+    bar = drawn[False].figure.axes[1]
+    low, high = (1e-3 * end for end in bar.get_ylim())
+    expected = matplotlib.colormaps["cividis"](np.clip((surface.values - low) / (high - low), 0, 1))[..., :3]
+    assert np.allclose(colours(drawn[False]), expected, atol=1e-12)
+    ratio = colours(drawn[True]).sum(axis=-1) / expected.sum(axis=-1)
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)  # shading changes them, but not on average
+    assert ratio.std() > 0.05
 
 
 def test_colour_bar_of_heights():
