@@ -182,7 +182,8 @@ def _heights(heights: Array) -> dict[str, float]:
     values, reference, scale = shifted(observed)
     mean = float(values.mean())
     values -= mean
-    variance = float(np.mean(values**2))
+    squares = values * values  # higher powers as products: numpy takes ten times as long for values**3
+    variance = float(np.mean(squares))
     result["mean_height"] = reference + scale * mean
     result["rms_height"] = scale * math.sqrt(variance)
     result["mean_absolute_height"] = scale * float(np.mean(np.abs(values)))
@@ -190,8 +191,8 @@ def _heights(heights: Array) -> dict[str, float]:
     result["valley_depth"] = -scale * float(values.min())
     result["peak_to_valley"] = float(observed.max() - observed.min())
     if result["peak_to_valley"] > 0.0:
-        result["skewness"] = float(np.mean(values**3)) / variance**1.5
-        result["kurtosis"] = float(np.mean(values**4)) / variance**2
+        result["skewness"] = float(np.mean(squares * values)) / variance**1.5
+        result["kurtosis"] = float(np.mean(squares * squares)) / variance**2
     return result
 
 
