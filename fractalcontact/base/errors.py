@@ -70,5 +70,9 @@ class SmallStrainWarning(FractalContactWarning):
     """The slopes of a pressed surface are beyond small strains; see the variable `rms_slope`."""
 
 
+class LoadedWarning(FractalContactWarning):
+    """A dask array is loaded into memory by a function that needs all of it."""
+
+
 def _count(number: int) -> str:
     return "1 problem" if number == 1 else f"{number} problems"

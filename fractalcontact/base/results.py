@@ -20,14 +20,15 @@ from __future__ import annotations
 import inspect
 import json
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, LoadedWarning
 from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.references import NO_REFERENCES
@@ -35,6 +36,7 @@ from fractalcontact.base.schema import label
 from fractalcontact.base.surface_argument import with_surface
 from fractalcontact.base.validation import Problems, check_flags, did_you_mean
 
+MASKS = ("mask", "masks", "valid")
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
@@ -60,6 +62,7 @@ def public_result(
     achieved_error: str | None = None,
     check: Callable[..., None] | None = None,
     error: type[InvalidInput] = InvalidInput,
+    in_blocks: bool = False,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
 
@@ -77,6 +80,8 @@ def public_result(
         already, and left out unless it names them.
     error : type, default InvalidInput
         The exception that lists the problems.
+    in_blocks : bool
+        The function reads dask arrays block by block, or returns one. Any other warns that it loads them.
     """
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
@@ -105,6 +110,8 @@ def public_result(
             start = time.perf_counter()
             given, words, notes = with_surface(name, signature, arguments, options)
             bound = checked(*given, **words)
+            if not in_blocks:
+                announce_loading(name, bound.arguments)
             result = function(*bound.args, **bound.kwargs)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
@@ -130,6 +137,17 @@ def public_result(
         return public
 
     return decorate
+
+
+def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:
+    """Warn that a function loads the dask arrays among its arguments; masks are read block by block."""
+    for argument, value in arguments.items():
+        if argument in MASKS or not isinstance(value, (xr.DataArray, xr.Dataset)) or not value.chunks:
+            continue
+        message = (
+            f"{name}: the dask arrays of `{argument}` are loaded into memory, {value.nbytes / 1e6:.3g} MB"
+        )
+        warnings.warn(message, LoadedWarning, stacklevel=4)
 
 
 def _set_run_time(dataset: xr.Dataset, seconds: float) -> None:

@@ -8,18 +8,20 @@ said in the `history` of the result.
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, ScaleWarning
 from fractalcontact.base.grid import METRES, plane_coords
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.validation import Problems, float_array
 
 SURFACE, SPACING = "surface", "spacing"
+WIDE = 20.0  # m: a surface without units that is wider may be in millimetres
 
 
 def with_surface(
@@ -62,6 +64,7 @@ def usual_form(where: str, value: Any, spacing: Any = None) -> tuple[Any, list[s
     if value.dims[-len(core) :] != core:
         value = value.transpose(..., *core)
         notes.append(f"transposed to ({', '.join(map(str, value.dims))})")
+    _warn_of_unit(where, value, core)
     for dim in core:
         value, done = _ascending_metres(value, dim)
         notes += done
@@ -70,6 +73,23 @@ def usual_form(where: str, value: Any, spacing: Any = None) -> tuple[Any, list[s
         value = in_metres(value.astype(np.float64), unit).assign_attrs(value.attrs | {"units": "m"})
         notes.append(f"heights converted from {unit}")
     return value, notes
+
+
+def _warn_of_unit(where: str, value: xr.DataArray, core: tuple[str, ...]) -> None:
+    """Warn where coordinates without a unit, which count as metres, look like millimetres."""
+    for dim in core:
+        axis = value.coords.variables.get(dim)
+        if axis is None or "units" in axis.attrs or axis.dtype.kind not in "fiu" or axis.size < 2:
+            continue
+        extent = abs(float(axis.values[-1]) - float(axis.values[0]))
+        if WIDE < extent < np.inf:
+            message = (
+                f"{where}: {dim} extends over {extent:.3g} and states no unit, so it is taken as metres; if "
+                f"it is in millimetres, set surface.{dim}.attrs['units'] = 'mm' (also of the heights), else "
+                "'m'"
+            )
+            warnings.warn(message, ScaleWarning, stacklevel=5)
+            return
 
 
 def _only_height(dataset: xr.Dataset) -> xr.DataArray | None:

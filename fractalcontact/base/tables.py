@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from html import escape
 
 from tabulate import tabulate
 
@@ -65,6 +66,12 @@ def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
         maxheadercolwidths=[size - GAP for size in widths] if body else None,  # heads are padded
     )
     return "\n".join(line.rstrip() for line in text.replace(GLUE, " ").splitlines())
+
+
+def html_table(title: str, rows: Sequence[tuple[str, str]]) -> str:
+    """Return a small table of names and values for a notebook."""
+    body = tabulate(rows, tablefmt="html", disable_numparse=True)
+    return f"<div><b>{escape(title)}</b>{body}</div>"
 
 
 def _column_widths(rows: Sequence[Sequence[str]], width: int) -> list[int]:

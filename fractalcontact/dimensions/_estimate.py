@@ -14,7 +14,7 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import joined_references
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions import (
     _covering_area,
@@ -55,6 +55,7 @@ _FIELDS = (
     "misfit",
 )
 _NAMES = (*_FIELDS, "fractal_dimension", "topothesy", "run_time", "method", "increment_lag")
+IN_BLOCKS = ("increments", "spectrum", "variogram")  # methods that read dask arrays block by block
 
 
 def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: Any) -> None:
@@ -78,6 +79,7 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: 
 @public_result(
     title="Hurst exponent and fractal dimension of a surface",
     check=_check,
+    in_blocks=True,
 )
 def estimate(
     surface: xr.DataArray,
@@ -139,6 +141,8 @@ def estimate(
     """
     surfaces, window = read_surfaces(surface), read_scales(scales)
     names = ("default",) if methods is None else word_tuple(methods)
+    if set(names) - set(IN_BLOCKS):
+        announce_loading("fractalcontact.dimensions.estimate", {"surface": surface})
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):
         for column, name in enumerate(names):

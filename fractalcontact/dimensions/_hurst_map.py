@@ -34,7 +34,7 @@ def _check(problems: Problems, *, surface: Any, window: Any, step: Any) -> None:
     problems.require(least * (1 - 1e-9) <= window <= most * (1 + 1e-9), "window", expected, window)
 
 
-@public_result(title="Map of the Hurst exponent", check=_check)
+@public_result(title="Map of the Hurst exponent", check=_check, in_blocks=True)
 def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None) -> xr.Dataset:
     """Estimate the Hurst exponent in square windows that move over a surface.
 

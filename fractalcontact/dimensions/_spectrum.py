@@ -36,6 +36,7 @@ def _check(problems: Problems, *, surface: Any, window: Any, tile: Any) -> None:
     achieved_error="relative standard error of each value sqrt(2 / mode_count), where no window mixes the "
     "modes",
     check=_check,
+    in_blocks=True,
 )
 def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
     """Return the radially averaged power spectral density of a surface.

@@ -39,6 +39,7 @@ def _check(problems: Problems, *, surface: Any, max_lag: Any) -> None:
     references=METHODS["variogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
+    in_blocks=True,
 )
 def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the variogram: half the mean square height increment against the lag.
@@ -90,6 +91,7 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
     references=METHODS["madogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
+    in_blocks=True,
 )
 def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the madogram: half the mean absolute height increment along both axes.
@@ -131,6 +133,7 @@ def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Datas
     references=METHODS["second_variogram"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
+    in_blocks=True,
 )
 def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the mean square second difference of the heights against the lag, along both axes.

@@ -12,6 +12,8 @@ import xarray as xr
 from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import plain
+from fractalcontact.base.tables import html_table
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.joints._compass import (
     check_direction,
@@ -159,12 +161,27 @@ class Crack:
 
     def __repr__(self) -> str:
         """One line: the faces, the block and the material."""
+        return f"Crack({', '.join(f'{name}: {value}' for name, value in self._facts())})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the faces, the block and the material, which a notebook shows."""
+        return html_table("Crack", self._facts())
+
+    def _facts(self) -> list[tuple[str, str]]:
+        """Return what defines the crack, in words."""
         (ny, nx), (by, bx) = self.layout.face_cells, self.layout.cells
+        dy, dx = (quantity_text(step, "m") for step in self.layout.spacing)
         faces = "mated faces" if self.upper is None else "two faces"
-        block = f"block of {by} x {bx} cells, {self.block[0]:g} x {self.block[1]:g} m"
-        material = ", ".join(f"{name}={_words(getattr(self, name))}" for name in MATERIAL)
-        friction = f"basic_friction_angle={self.basic_friction_angle:g}"
-        return f"Crack({faces} of {ny} x {nx}, {block}, {material}, {friction})"
+        edges = " x ".join(quantity_text(edge, "m") for edge in self.block)
+        facts = [
+            ("faces", f"{faces} of {ny} x {nx} cells, {dy} x {dx} apart"),
+            ("block", f"{by} x {bx} cells, {edges}"),
+        ]
+        if self.young is not None:
+            facts.append(("young", _words(self.young, "Pa")))
+        if self.poisson is not None:
+            facts.append(("poisson", _words(self.poisson, "1")))
+        return [*facts, ("basic_friction_angle", quantity_text(self.basic_friction_angle, "degree"))]
 
     @property
     def nominal_area(self) -> float:
@@ -225,10 +242,10 @@ def _one_or_two(value: Any) -> float | Pair | None:
     return float(numbers[0]) if numbers.size == 1 else (float(numbers[0]), float(numbers[1]))
 
 
-def _words(value: float | Pair | None) -> str:
+def _words(value: float | Pair, units: str) -> str:
     if isinstance(value, tuple):
-        return f"({value[0]:g}, {value[1]:g})"
-    return "None" if value is None else f"{value:g}"
+        return f"{quantity_text(value[0], units)} (lower), {quantity_text(value[1], units)} (upper)"
+    return quantity_text(value, units)
 
 
 def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Block | None:

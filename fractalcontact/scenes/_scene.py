@@ -8,9 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fractalcontact.base.tables import html_table
 from fractalcontact.scenes._stages import DATASHEET, PRESS, StageType
 
 Table = Mapping[str, Any]
+SHOWN = 6  # values of a list that are shown in full
 OF_SURFACE = "surface"  # plane of an upper face: plane and cells of the table [surface]
 PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 LOADS = ("closure", "normal_force", "nominal_pressure")
@@ -108,7 +110,7 @@ MATERIAL_KEYS = tuple(entry.name for entry in fields(MaterialTable))
 WANT_KEYS = tuple(entry.name for entry in fields(WantTable))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """A study as it was declared: the input and the wanted results.
 
@@ -134,9 +136,19 @@ class Scene:
     name: str
     tables: Table
     folder: Path
-    checked: Table | None = field(
-        default=None, repr=False, compare=False
-    )  # a copy of the tables that were valid
+    checked: Table | None = field(default=None, compare=False)  # a copy of the tables that were valid
+
+    def __repr__(self) -> str:
+        """Return the name, then each table on a line."""
+        return "\n".join([f"Scene {self.name!r}", *(f"  {name}: {text}" for name, text in self._facts())])
+
+    def _repr_html_(self) -> str:
+        """Return a table of the tables of the scene, which a notebook shows."""
+        return html_table(f"Scene {self.name!r}", self._facts())
+
+    def _facts(self) -> list[tuple[str, str]]:
+        """Return the settings and tables with their values in short."""
+        return [(key, _short(value)) for key, value in self.tables.items()]
 
     def table(self, name: str) -> Table:
         """Return one table as parsed; empty if the scene has none."""
@@ -207,6 +219,21 @@ class Scene:
         options |= own if isinstance(own, dict) else {}
         allowed = stage.arguments() if keys is None else tuple(keys)
         return {key: options[key] for key in allowed if key in options}
+
+
+def _short(value: Any) -> str:
+    """Return a value of a scene in words; of a long list the ends and the length."""
+    if isinstance(value, Mapping):
+        parts = (
+            f"{key} {{ {_short(item)} }}" if isinstance(item, Mapping) else f"{key} = {_short(item)}"
+            for key, item in value.items()
+        )
+        return ", ".join(parts)
+    if isinstance(value, (list, tuple)):
+        if len(value) > SHOWN:
+            return f"[{_short(value[0])}, {_short(value[1])} ... {_short(value[-1])}] ({len(value)} values)"
+        return f"[{', '.join(map(_short, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _surface_table(table: Table) -> SurfaceTable:

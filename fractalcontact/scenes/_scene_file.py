@@ -36,7 +36,10 @@ from fractalcontact.scenes._stages import (
 )
 
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
-SAMPLES = ("concrete_crack", "jacksboro_fault_dem")
+SAMPLES = (
+    "concrete_crack", "jacksboro_fault_dem", "freiberg_gneiss_side_a", "freiberg_gneiss_side_b",
+    "afm_10um_di3", "wli_126um_opd1",
+)  # fmt: skip
 READING = (
     "read", "sample", "channel", "units", "spacing", "first_row", "columns", "plane", "level", "despike",
     "fill",

@@ -268,3 +268,14 @@ def read_npy(path: Path) -> Array:
             return np.asarray(np.load(io.BytesIO(file.read()), allow_pickle=False))
         except (OSError, EOFError, KeyError) as error:
             raise ValueError(str(error) or "it ends too early") from error
+
+
+def read_npz(path: Path) -> dict[str, Array]:
+    """Return the arrays of an npz file by name; raise ValueError if it is damaged or has no numbers."""
+    with open_bytes(path) as file:
+        check_unpacked(path.name, file)
+        try:
+            with np.load(file, allow_pickle=False) as archive:
+                return {name: np.asarray(archive[name]) for name in archive.files}
+        except (OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+            raise ValueError(str(error) or "it ends too early") from error

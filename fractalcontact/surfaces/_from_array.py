@@ -63,7 +63,9 @@ def _check(problems: Problems, *, heights: Any, spacing: Any, periodic: Any, uni
     problems.require(valid, "periodic", expected, periodic)
 
 
-@public_result(title="Surface heights", achieved_error="exact: heights as given", check=_check)
+@public_result(
+    title="Surface heights", achieved_error="exact: heights as given", check=_check, in_blocks=True
+)
 def from_array(
     heights: Any,
     spacing: float | Sequence[float],

@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -25,10 +25,10 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._files import (
     EmptyTable,
     NotATable,
-    Table,
     file_suffix,
     open_bytes,
     read_npy,
+    read_npz,
     read_table,
 )
 from fractalcontact.surfaces._fit_plane import check_frame
@@ -48,6 +48,7 @@ from fractalcontact.surfaces._read_points import (
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
+T = TypeVar("T")
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *ALWAYS_POINTS)
@@ -132,11 +133,11 @@ def read(
     Parameters
     ----------
     path : path-like
-        NetCDF (`.nc`), numpy (`.npy`), text (`.csv`, `.txt` ...) with a table of heights, whose rows are y,
-        or with points (two or three columns, `.xyz`, `.pts`), a mesh or cloud (`.ply`, `.stl`, `.obj`,
+        NetCDF (`.nc`), numpy (`.npy`, `.npz`), text (`.csv`, `.txt` ...) with a table of heights, whose rows
+        are y, or with points (two or three columns, `.xyz`, `.pts`), a mesh or cloud (`.ply`, `.stl`, `.obj`,
         `.las`; extra `mesh`), a raster (GeoTIFF, ESRI ASCII, Surfer; extra `geo`), an instrument's file
-        (extra `io`), or one of these with `.gz`. `.npy` and tables of heights need `spacing`; points are
-        gridded by `from_points`.
+        (extra `io`), or one of these with `.gz`. `.npy` and tables of heights need `spacing`, `.npz` needs it
+        or arrays `x` and `y`; points are gridded by `from_points`.
     channel : str or int, optional
         Channel of an instrument's file, variable of a NetCDF file, or band of a raster (from 0). Default:
         the first height channel.
@@ -228,7 +229,9 @@ def file_content(
     if suffix in (*MESHES, *CLOUDS):
         return _gridded_points(point_content(path, columns), path, units, spacing, plane)
     if suffix == ".npy":
-        return _table_content(path, None, units, spacing, first_row)
+        return _array_content(path, _loaded(read_npy, path), units, spacing, first_row)
+    if suffix == ".npz":
+        return _archive_content(path, channel, units, spacing, first_row)
     with open_bytes(path) as file:
         head = file.read(8)
     if head.startswith(RASTERS):
@@ -279,7 +282,10 @@ def _text_content(
         problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if spacing is None:
         return _instrument_content(path, channel, units, spacing, first_row)
-    return _table_content(path, table, units, spacing, first_row)
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = "a grid of heights, one row to a line"
+        problems.require(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
+    return _heights_content(path, table.values, units, spacing, first_row)
 
 
 def _gridded_points(points: Points, path: Path, units: str | None, spacing: Any, plane: Any) -> FileContent:
@@ -304,31 +310,64 @@ def _gridded_points(points: Points, path: Path, units: str | None, spacing: Any,
     return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
 
 
-def _table_content(
-    path: Path,
-    table: Table | None,
-    units: str | None,
-    spacing: Any,
-    first_row: str | None,
-) -> FileContent:
-    """Return an array of numbers: a text table, or that of an npy file."""
+def _loaded(function: Callable[[Path], T], path: Path) -> T:
+    """Return what a function reads from a file; a damaged one is an `UnreadableFile`."""
     try:
-        values = read_npy(path) if table is None else table.values
+        return function(path)
     except UnreadableFile:
         raise
     except ValueError as error:
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
-    if table is None and values.ndim == 2 and values.shape[1] in (2, 3) and len(values) >= LEAST_POINTS:
+
+
+def _archive_content(
+    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
+) -> FileContent:
+    """Return an array of an npz file: the only one of heights, or that called `channel`.
+
+    One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
+    """
+    arrays = _loaded(read_npz, path)
+    names = [name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)]
+    default = names[0] if len(names) == 1 else "height"
+    name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = (
+            f"one of {', '.join(map(repr, names))} in {path.name!r}" if names else "an array of heights"
+        )
+        problems.require(name in names, "channel", expected, name)
+    values = arrays[str(name)]
+    axes = [np.ravel(arrays.get(dim, ())).astype(np.float64) for dim in ("y", "x")]
+    if spacing is None and [axis.size for axis in axes] == list(values.shape[-2:]):
+        steps = [np.diff(in_metres(axis, units or "m")) for axis in axes]
+        with Problems(WHERE, UnreadableFile) as problems:
+            for dim, step in zip(("y", "x"), steps, strict=True):
+                is_even = bool(np.ptp(step) <= 1e-6 * abs(step[0])) and step[0] != 0
+                problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
+        values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
+        spacing = [float(abs(step).mean()) for step in steps]
+    return _array_content(path, values, units, spacing, first_row)
+
+
+def _array_content(
+    path: Path, values: Array, units: str | None, spacing: Any, first_row: str | None
+) -> FileContent:
+    """Return an array of a numpy file: heights, or points in two or three columns."""
+    if values.ndim == 2 and values.shape[1] in (2, 3) and len(values) >= LEAST_POINTS:
         return _gridded_points(Points(values.astype(np.float64)), path, units, spacing, None)
+    return _heights_content(path, values, units, spacing, first_row)
+
+
+def _heights_content(
+    path: Path, values: Array, units: str | None, spacing: Any, first_row: str | None
+) -> FileContent:
+    """Return an array of heights without coordinates as a surface."""
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"the spacing in metres, which {path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
-        if table is not None:
-            expected = "a grid of heights, one row to a line"
-            problems.require(min(values.shape) > 1, "path", expected, f"shape {values.shape}")
         if not problems.messages:
             check_spacing(problems, spacing, check_heights(problems, values))
     heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, ScaleWarning
 
 SURFACE = fc.surfaces.fbm((24, 32), (2e-4, 1e-4), hurst=0.6, rms_increment=1e-5, rng=1)
 EXPECTED = fc.surfaces.describe(SURFACE)
@@ -82,3 +82,15 @@ def test_periodic_axis_in_other_units_stays_periodic():
 def test_what_cannot_be_a_surface(surface, options, problem):
     with pytest.raises(InvalidInput, match=problem):
         fc.surfaces.describe(surface, **options)
+
+
+def test_coordinates_without_a_unit_that_look_like_millimetres():
+    heights = 1e-2 * np.random.default_rng(3).normal(size=(40, 60))
+    coords = {"y": np.arange(40.0), "x": np.arange(60.0)}
+    plain = xr.DataArray(heights, coords, ("y", "x"))
+    with pytest.warns(ScaleWarning, match="y extends over 39 and states no unit"):
+        fc.surfaces.describe(plain)
+    for unit in ("mm", "m"):
+        labelled = plain.assign_coords({dim: (dim, coords[dim], {"units": unit}) for dim in coords})
+        fc.surfaces.describe(labelled)  # a warning is an error here
+    fc.surfaces.describe(plain.assign_coords(y=1e-3 * coords["y"], x=1e-3 * coords["x"]))

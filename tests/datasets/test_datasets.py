@@ -1,12 +1,16 @@
 """The shipped surfaces are what their scripts make, and have the published properties."""
 
 import importlib.util
+import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.datasets import datasets_folder
+from fractalcontact.base.errors import UnreadableFile
 
 
 def script(name):
@@ -120,3 +124,24 @@ def test_scene_of_1998_tests_every_claim_of_the_paper():
     table = fc.scenes.paper_table(tree)
     assert "not tested" not in table
     assert {"yes", "no"} <= {line.split()[-1] for line in table.splitlines() if line.strip()}
+
+
+@pytest.mark.parametrize("name", ["freiberg_gneiss_side_a", "freiberg_gneiss_side_b", "afm_10um_di3"])
+def test_measured_sample_states_its_source(name):
+    if "FRACTALCONTACT_DATA" not in os.environ:
+        pytest.skip("FRACTALCONTACT_DATA is not set")
+    surface = fc.surfaces.sample(name)
+    assert "MIT" in surface.attrs["provenance"]
+    assert "https://github.com/" in surface.attrs["provenance"]
+    page = Path(__file__).resolve().parents[2] / "gallery" / "measured_surfaces.rst"
+    assert json.loads(surface.attrs["provenance"])["file_sha256"] in page.read_text(encoding="utf-8")
+
+
+def test_measured_sample_that_is_missing_or_changed(tmp_path, monkeypatch):
+    monkeypatch.delenv("FRACTALCONTACT_DATA", raising=False)
+    with pytest.raises(UnreadableFile, match=r"FRACTALCONTACT_DATA names; made from .*MIT"):
+        fc.surfaces.sample("afm_10um_di3")
+    monkeypatch.setenv("FRACTALCONTACT_DATA", str(tmp_path))
+    np.save(tmp_path / "afm_10um_di3.npy", np.zeros((4, 4)))
+    with pytest.raises(UnreadableFile, match="SHA-256"):
+        fc.surfaces.sample("afm_10um_di3")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.base.errors import LoadedWarning
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +32,19 @@ def test_dask_surface_gives_same_results(rough, monkeypatch):
     np.testing.assert_allclose(tiles[1], tiles[0], rtol=1e-9)
     result = [fc.dimensions.estimate(s, "increments").hurst.values for s in (rough, lazy)]
     np.testing.assert_array_equal(*result)
+
+
+def test_functions_that_load_a_dask_array_say_so(rough):
+    """A warning names argument and size; the methods that read blocks, and functions that return dask, do not."""
+    pytest.importorskip("dask")
+    lazy = rough.chunk({"y": 7})
+    size = f"{rough.nbytes / 1e6:.3g} MB"
+    with pytest.warns(LoadedWarning, match=f"describe: the dask arrays of `surface` .* {size}"):
+        fc.surfaces.describe(lazy)
+    with pytest.warns(LoadedWarning, match="estimate"):
+        fc.dimensions.estimate(lazy)
+    fc.dimensions.estimate(lazy, ["increments", "spectrum"])  # a warning is an error here
+    assert fc.surfaces.from_array(lazy.data, 1e-4).chunks is not None
 
 
 def test_invalid_arguments_of_curves(rough):

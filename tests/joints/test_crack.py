@@ -64,7 +64,8 @@ def test_two_materials(make_face):
     one = fc.joints.Crack(make_face(np.zeros((4, 4))), young=(30e9, 30e9), poisson=0.2)
     assert one.contact_modulus == pytest.approx(15.625e9, rel=1e-15)
     assert one.contact_poisson == pytest.approx(0.2, rel=1e-15)
-    assert "young=(3e+10, 6e+10), poisson=(0.2, 0.3)" in repr(crack)
+    assert "young: 30 GPa (lower), 60 GPa (upper)" in repr(crack)
+    assert "<td>30 GPa (lower), 60 GPa (upper)" in crack._repr_html_()
     with pytest.raises(ValueError, match=r"young: expected one value or \(lower, upper\)"):
         fc.joints.Crack(make_face(np.zeros((4, 4))), young=(1e9, 2e9, 3e9), poisson=0.2)
 
@@ -134,4 +135,4 @@ def test_crack_is_frozen_and_can_be_pickled(make_face, rough):
     twin = pickle.loads(pickle.dumps(crack))
     assert twin.layout == crack.layout
     assert twin.block == crack.block
-    assert "block of 8 x 8" in repr(crack)
+    assert "block: 8 x 8 cells" in repr(crack)

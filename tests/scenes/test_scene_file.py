@@ -279,3 +279,14 @@ def test_problems_of_their_calls_are_found_before_anything_runs(write, word, tab
     text = SOUND.replace("[want]", f"[joint.{word}]\n{table}\n[want]")
     with pytest.raises(InvalidInput, match=named):
         fc.scenes.validate(write(text.replace('"closure", "rigid_dilatancy"', f'"{word}"')))
+
+
+def test_scene_in_words():
+    """One line for each table; long lists are shown by their ends; a notebook shows a table."""
+    scene = fc.scenes.load("concrete_crack")
+    lines = repr(scene).splitlines()
+    assert lines[0] == "Scene 'concrete_crack'"
+    assert "young = 3e+10" in next(line for line in lines if line.startswith("  material"))
+    assert "shear = [0, 8e-05 ... 0.01] (126 values)" in repr(scene)
+    assert "<td>yield" not in scene._repr_html_()
+    assert scene._repr_html_().count("<tr>") == len(scene.tables)
