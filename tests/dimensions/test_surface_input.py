@@ -35,7 +35,7 @@ def test_dask_surface_gives_same_results(rough, monkeypatch):
 
 
 def test_functions_that_load_a_dask_array_say_so(rough):
-    """A warning names argument and size; the methods that read blocks, and functions that return dask, do not."""
+    """A warning names argument and size; what reads blocks, or returns dask, gives none."""
     pytest.importorskip("dask")
     lazy = rough.chunk({"y": 7})
     size = f"{rough.nbytes / 1e6:.3g} MB"
