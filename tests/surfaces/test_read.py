@@ -418,40 +418,40 @@ def test_netcdf_with_a_provenance_of_another_origin(tmp_path):
     np.testing.assert_array_equal(fc.surfaces.read(tmp_path / "a.nc").values, HEIGHTS)
 
 
-HEIGHTS = 1e-3 * np.random.default_rng(8).normal(size=(12, 20))
+MAP = 1e-3 * np.random.default_rng(8).normal(size=(12, 20))
 
 
 def test_npz_is_read_like_npy(tmp_path):
     """The same array in either file gives the same surface."""
-    np.save(tmp_path / "a.npy", HEIGHTS)
-    np.savez(tmp_path / "a.npz", HEIGHTS)
+    np.save(tmp_path / "a.npy", MAP)
+    np.savez(tmp_path / "a.npz", MAP)
     one, other = (
         fc.surfaces.read(tmp_path / f"a{end}", spacing=1e-4, units="mm") for end in (".npy", ".npz")
     )
     np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(one, HEIGHTS / 1e3)
+    np.testing.assert_array_equal(one, MAP / 1e3)
     top = fc.surfaces.read(tmp_path / "a.npz", spacing=1e-4, first_row="top")
-    np.testing.assert_array_equal(top, HEIGHTS[::-1])
+    np.testing.assert_array_equal(top, MAP[::-1])
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_coordinates_of_an_npz(tmp_path, sign):
     """Coordinates x and y give the spacing, in the unit of the heights; descending ones are turned round."""
     y, x = np.arange(12)[::sign] * 0.2, np.arange(20) * 0.1
-    np.savez(tmp_path / "a.npz", x=x, y=y, z=HEIGHTS, mask=HEIGHTS > 0)
+    np.savez(tmp_path / "a.npz", x=x, y=y, z=MAP, mask=MAP > 0)
     surface = fc.surfaces.read(tmp_path / "a.npz", units="mm")
     np.testing.assert_allclose(np.diff(surface.x), 1e-4)
     np.testing.assert_allclose(np.diff(surface.y), 2e-4)
-    np.testing.assert_array_equal(surface, HEIGHTS[::sign] / 1e3)
+    np.testing.assert_array_equal(surface, MAP[::sign] / 1e3)
 
 
 @pytest.mark.parametrize(
     ("arrays", "options", "problem"),
     [
-        ({"z": HEIGHTS}, {}, "spacing"),
-        ({"a": HEIGHTS, "b": HEIGHTS}, {"spacing": 1e-4}, "one of 'a', 'b'"),
-        ({"a": HEIGHTS > 0}, {"spacing": 1e-4}, "an array of heights"),
-        ({"z": HEIGHTS, "y": np.arange(12.0), "x": np.arange(20.0) ** 2}, {}, "x: expected evenly"),
+        ({"z": MAP}, {}, "spacing"),
+        ({"a": MAP, "b": MAP}, {"spacing": 1e-4}, "one of 'a', 'b'"),
+        ({"a": MAP > 0}, {"spacing": 1e-4}, "an array of heights"),
+        ({"z": MAP, "y": np.arange(12.0), "x": np.arange(20.0) ** 2}, {}, "x: expected evenly"),
     ],
 )
 def test_npz_that_cannot_be_a_surface(tmp_path, arrays, options, problem):
