@@ -137,7 +137,9 @@ CALLS = {
         rough(), nominal_pressure=[1e5, 1e6], wall_strength=1e8, basic_friction_angle=30
     ),
     "joints.transmissivity": lambda: fc.joints.transmissivity(gap(), keep=("pressure", "flux")),
-    "joints.uplift": lambda: fc.joints.uplift(gap(), upstream_pressure=1e5, drains=[(1e-3, 2e-3)]),
+    "joints.uplift": lambda: fc.joints.uplift(
+        gap(), upstream_pressure=1e5, drains=[(1e-3, 2e-3)], total_stress=2e6
+    ),
     "joints.decorrelation_length": lambda: fc.joints.decorrelation_length(crack()),
     "domains.area_dimension": lambda: fc.domains.area_dimension(
         [state(), state().isel(x=slice(None, None, 2), y=slice(None, None, 2))]

@@ -325,7 +325,11 @@ QUANTITIES: dict[str, Quantity] = {
     "uplift_profile": Quantity("Pa", "uplift per area along the flow, mean across it"),
     "uplift_force": Quantity("N", "uplift force"),
     "mean_uplift": Quantity("Pa", "uplift force over the nominal area"),
-    "uplift_arm": Quantity("m", "distance of the line of action of the uplift from the upstream edge"),
+    "uplift_arm": Quantity("m", "distance of the line of action of the uplift from the upstream side"),
+    "uplift_x": Quantity("m", "x of the point where the uplift acts"),
+    "uplift_y": Quantity("m", "y of the point where the uplift acts"),
+    "effective_stress": Quantity("Pa", "normal stress on the contacts over the nominal area"),
+    "balance_error": Quantity("1", "effective stress plus uplift over the total stress, minus 1"),
     "wet_fraction": Quantity("1", "area under water pressure over nominal area"),
     "isolated_fraction": Quantity("1", "open area that no water reaches over nominal area"),
     # domains

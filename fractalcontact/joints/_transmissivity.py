@@ -20,11 +20,10 @@ from fractalcontact.joints._flow_network import (
     dissipation,
     held_ends,
     link_network,
-    nested_dissection,
-    pressures,
     spanning_cells,
     winding_cells,
 )
+from fractalcontact.joints._network_pressure import nested_dissection, pressures
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

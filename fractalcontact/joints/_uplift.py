@@ -1,39 +1,47 @@
-"""Uplift: the force of the water in a joint between an upstream and a downstream edge."""
+"""Uplift: the force of the water in a joint between an upstream and a downstream side."""
 
 from __future__ import annotations
 
+import itertools
+import math
+import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._flow_network import (
-    Held,
-    Network,
-    check_gap,
-    held_cells,
-    held_ends,
-    link_network,
-    nested_dissection,
-    pressures,
-)
+from fractalcontact.joints._flow_network import check_gap
+from fractalcontact.joints._network_pressure import HeldFlow, Side
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-RESULTS = ("diagram", "fluid_pressure", "uplift_profile", "uplift_force", "mean_uplift", "uplift_arm",
-           "wet_fraction", "isolated_fraction", "residual", "run_time")  # fmt: skip
-EDGES = ("W", "E", "S", "N")
+WHERE = "fractalcontact.joints.uplift"
+EDGES = {"W": ("x", 0.0), "E": ("x", 1.0), "S": ("y", 0.0), "N": ("y", 1.0)}  # axis, share of its extent
+OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
 LARGEST_PRESSURE = 1e12  # Pa
 SOFTEST = 1e3  # Pa/m
-HELD = 1e7  # conductance to a drain over that between its cell and the next ones
 BALANCE = 1e-10  # relative change of the pressures that ends the iteration with the opening
 MAX_ITERATIONS = 500
-RELAXATION = 0.7  # of the opening; 1 oscillates where the pressure opens the joint several times
+RELAXATION = 0.7  # of the opening, halved where the pressures oscillate: one that closes a bottleneck, say
+SMALLEST_RELAXATION = 0.02
+FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "uplift_profile")
+ON_PATH = ("effective_stress", "balance_error")
+RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "residual", *FORCES, *ON_PATH,
+           "iterations", "converged", "run_time")  # fmt: skip
+PLACE_ERROR = 1e-9  # of the search between two steps of the path
+SHOWN = 5  # in a warning
+STRESS_BALANCE = 1e-4  # of the total stress: a single cell that opens takes up more than the solver's error
+NO_UPLIFT = "NaN where no water presses on the joint"
+OFF_THE_PATH = (
+    "NaN where no effective stress on the path of the gap balances the total stress: the path ends too early "
+    "(balance_error below 0), or the water lifts the joint at its lowest stress (above 0)"
+)
 
 
 def _check(
@@ -43,11 +51,13 @@ def _check(
     upstream_pressure: Any,
     downstream_pressure: Any,
     upstream: Any,
+    downstream: Any,
     drains: Any,
     drain_pressure: Any,
     drain_diameter: Any,
     drain_share: Any,
     normal_stiffness: Any,
+    total_stress: Any,
 ) -> None:
     high = problems.number("upstream_pressure", upstream_pressure, above=0, at_most=LARGEST_PRESSURE)
     low = problems.number("downstream_pressure", downstream_pressure, at_least=0, at_most=LARGEST_PRESSURE)
@@ -56,13 +66,39 @@ def _check(
         problems.require(
             downstream_pressure < upstream_pressure, "downstream_pressure", expected, downstream_pressure
         )
-    problems.choice("upstream", upstream, EDGES)
     problems.number("drain_pressure", drain_pressure, at_least=0, at_most=LARGEST_PRESSURE, optional=True)
     problems.number("drain_diameter", drain_diameter, at_least=0)
     problems.number("drain_share", drain_share, at_least=0, at_most=1)
     problems.number("normal_stiffness", normal_stiffness, at_least=SOFTEST, optional=True)
-    if check_gap(problems, gap, RESULTS) and drains is not None:
+    problems.number("total_stress", total_stress, above=0, at_most=LARGEST_PRESSURE, optional=True)
+    both = normal_stiffness is not None and total_stress is not None
+    problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
+    if not check_gap(problems, gap, RESULTS):
+        return
+    sides = [_check_side(problems, "upstream", upstream, gap)]
+    sides += [_check_side(problems, "downstream", downstream, gap)] if downstream is not None else []
+    if all(sides):
+        high_side, low_side = _sides(upstream, downstream, gap)
+        differ = high_side.axis != low_side.axis or high_side.place != low_side.place
+        problems.require(differ, "downstream", "another edge or line than upstream", downstream)
+    if drains is not None:
         _check_drains(problems, drains, gap)
+    if total_stress is not None:
+        _check_path(problems, gap)
+
+
+def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray) -> bool:
+    expected = "'W', 'E', 'S', 'N', or a line as ('x', its x in m) or ('y', its y in m)"
+    if isinstance(value, str):
+        return problems.require(value in EDGES, name, expected, value)
+    is_pair = isinstance(value, (tuple, list)) and len(value) == 2 and value[0] in ("x", "y")
+    if not problems.require(is_pair, name, expected, value):
+        return False
+    if not problems.number(name, value[1], at_least=-LARGEST_PRESSURE, at_most=LARGEST_PRESSURE):
+        return False
+    axis = "yx".index(value[0])
+    place, extent = _from_edge(gap, axis, float(value[1])), read_grid(gap).extent[axis]
+    return problems.require(0.0 < place < extent, name, "a line inside the plane", value)
 
 
 def _check_drains(problems: Problems, drains: Any, gap: xr.DataArray) -> None:
@@ -76,17 +112,29 @@ def _check_drains(problems: Problems, drains: Any, gap: xr.DataArray) -> None:
         problems.add("drains", expected, f"an array of shape {points.shape}")
         return
     grid = read_grid(gap)
-    for column, (dim, spacing) in enumerate(zip("xy", grid.spacing[::-1], strict=True)):
-        centres = np.asarray(gap[dim].values, dtype=np.float64)
-        place = points.reshape(-1, 2)[:, column]
-        inside = (place >= centres[0] - 0.5001 * spacing) & (place <= centres[-1] + 0.5001 * spacing)
+    for column, axis in ((0, 1), (1, 0)):
+        place = _from_edge(gap, axis, points.reshape(-1, 2)[:, column]) / grid.spacing[axis]
+        inside = (place >= -1e-4) & (place <= gap.shape[axis - 2] + 1e-4)
         if not problems.require(bool(inside.all()), "drains", expected, drains):
             return
 
 
+def _check_path(problems: Problems, gap: xr.DataArray) -> None:
+    expected = "a gap over step whose nominal_pressure rises, as `joints.closure` returns it"
+    if "step" not in gap.dims[:-2] or "nominal_pressure" not in gap.coords or gap.sizes["step"] < 2:
+        problems.add("total_stress", expected, f"dims {gap.dims}, coordinates {list(gap.coords)}")
+        return
+    stresses = _path_stresses(gap)
+    rises = bool(np.isfinite(stresses).all() and (stresses >= 0).all() and (np.diff(stresses) > 0).all())
+    problems.require(rises, "total_stress", expected, stresses.reshape(-1, stresses.shape[-1])[0].tolist())
+
+
 @public_result(
     title="uplift in a joint",
-    references="US Army Corps of Engineers, Gravity Dam Design, EM 1110-2-2200 (1995)",
+    references=(
+        "US Army Corps of Engineers, Gravity Dam Design, EM 1110-2-2200 (1995); US Bureau of Reclamation, "
+        "Design of Gravity Dams (1976)"
+    ),
     check=_check,
 )
 def uplift(
@@ -94,60 +142,59 @@ def uplift(
     *,
     upstream_pressure: float,
     downstream_pressure: float = 0.0,
-    upstream: str = "W",
+    upstream: str | Sequence[Any] = "W",
+    downstream: str | Sequence[Any] | None = None,
     drains: Sequence[Any] | None = None,
     drain_pressure: float | None = None,
     drain_diameter: float = 0.0,
     drain_share: float = 1.0 / 3.0,
     normal_stiffness: float | None = None,
+    total_stress: float | None = None,
 ) -> xr.Dataset:
     """Return the uplift of the water that flows through a joint, beside that of the guidelines for dams.
 
-    The pressure follows the local cubic law, as in `transmissivity`. It acts on the open cells that an edge
-    or a drain reaches. It is compared with the diagrams that the guidelines assume on the whole area:
-    linear between the edges, and with drains bilinear, with a share of the difference left at the drains.
+    The pressure follows the local cubic law. It acts on the open cells that a side or a drain reaches, and is
+    compared with the diagrams that guidelines assume on the whole area: linear between the two sides, and
+    with drains bilinear, with a share of the difference left at the drains.
 
     Parameters
     ----------
     gap : DataArray, dims (..., y, x)
-        Local opening of the joint, m, without water pressure if `normal_stiffness` is given; no NaN. Cells
-        at or below zero are in contact. Nothing flows through the sides; periodic sides are joined.
+        Opening of the joint, m; no NaN. Cells at or below zero are in contact. Nothing flows through edges
+        without a pressure; periodic ones are joined.
     upstream_pressure, downstream_pressure : float
-        Water pressure at the two edges, Pa: unit weight times head above the joint.
-    upstream : {"W", "E", "S", "N"}
-        The upstream edge (E is +x, N is +y).
+        Water pressure at the two sides, Pa: unit weight times head above the joint.
+    upstream, downstream : {"W", "E", "S", "N"} or ("x" or "y", float)
+        The two sides: an edge (E is +x), or the line of cells at this x or y (m), beyond which the pressure
+        is the same. Default: W, and the edge opposite; of a line E or N.
     drains : sequence of (x, y), optional
-        Positions of drains, m. The open cells within `drain_diameter` (m), or the nearest cell, are held at
-        `drain_pressure` (Pa, by default `downstream_pressure`). One cell acts as a drain with a radius of 0.2
+        Drains, m. The open cells within `drain_diameter` (m), or the nearest cell, are held at
+        `drain_pressure` (Pa, default `downstream_pressure`). One cell is a drain with a radius of 0.2
         spacings (Peaceman 1978). A drain in contact has no effect.
     drain_share : float
-        Share of the pressure difference at the drains in the bilinear diagram.
+        Share of the pressure difference at the drains in the bilinear diagram: 1/3 after the USBR.
     normal_stiffness : float, optional
-        Stiffness of the joint, Pa/m: the pressure opens each open cell by pressure / stiffness, and flow and
-        opening are iterated to balance.
+        Pa/m. The pressure opens each open cell by pressure / stiffness, iterated to balance with the flow.
+    total_stress : float, optional
+        Normal stress of structure and joint together, Pa. `gap` is then a path over `step` with the
+        coordinate nominal_pressure, as `closure` returns it: on it the effective stress is found that, with
+        the mean uplift, balances the total one.
 
     Returns
     -------
-    Dataset over (...)
-        fluid_pressure (..., y, x) (Pa, NaN where no water comes from an edge or drain). Over (..., diagram),
-        which is "joint", "linear" and with drains "bilinear": uplift_force (N), mean_uplift (force over
-        nominal area, Pa), uplift_arm (m, distance of its line of action from the upstream edge) and
-        uplift_profile (Pa, force per area, along x or y). wet_fraction; isolated_fraction (open cells that no
-        water reaches, counted without pressure); residual (relative, of the linear system). run_time (s).
+    Dataset over (...), without `step` if balanced on a path
+        fluid_pressure (..., y, x) (Pa, NaN where no water comes). Over (..., diagram), "joint", and between
+        parallel sides "linear" and with drains "bilinear": uplift_force (N), mean_uplift (Pa, over the
+        nominal area), uplift_arm (m, of its line of action from the upstream side), uplift_x and uplift_y (m,
+        the point where it acts), uplift_profile (Pa).
+        wet_fraction; isolated_fraction (open, without water); residual (relative). run_time (s). If iterated:
+        iterations, converged; on a path also effective_stress (Pa), balance_error (of the total stress).
 
     Raises
     ------
     InvalidInput
-        `gap` is not an opening, a drain is outside it, or a pressure is out of order.
-
-    Notes
-    -----
-    The effective stress on the joint is the total normal stress minus `mean_uplift`. Pressures are exact for
-    layers across the flow.
-
-    References
-    ----------
-    EM 1110-2-2200 (1995); Peaceman (1978), SPE Journal 18:183.
+        `gap` is not an opening or not a path, a drain or line is outside it, or pressures are out of order.
+        An iteration that does not converge gives a ConvergenceWarning.
 
     Examples
     --------
@@ -158,55 +205,74 @@ def uplift(
     >>> [round(float(f / result.uplift_force.sel(diagram="linear")), 4) for f in result.uplift_force]
     [1.3889, 1.0]
     """
-    grid, side = read_grid(gap), _Edge(upstream)
-    values = np.asarray(gap.values, dtype=np.float64)
+    grid, low = read_grid(gap), float(downstream_pressure)
+    drop = upstream_pressure - low
+    drained = 0.0 if drain_pressure is None else (drain_pressure - low) / drop
+    is_drain = _drain_cells(gap, grid, drains, drain_diameter)
+    flow = HeldFlow(grid, _sides(upstream, downstream, gap), is_drain, drained)
+    if total_stress is not None:
+        gap = gap.transpose(..., "step", "y", "x")
+        states = _on_path(gap, flow, float(total_stress), (low, drop))
+        along = [name for name, coord in gap.coords.items() if "step" in coord.dims]
+        gap = gap.isel(step=0).drop_vars(along)
+    else:
+        soft = None if normal_stiffness is None else (low / normal_stiffness, drop / normal_stiffness)
+        planes = np.asarray(gap.values, dtype=np.float64).reshape(-1, *gap.shape[-2:])
+        states = [_opened(plane, flow, soft) for plane in planes]
     leading = tuple(str(dim) for dim in gap.dims[:-2])
-    drop = upstream_pressure - downstream_pressure
-    drained = 0.0 if drain_pressure is None else (drain_pressure - downstream_pressure) / drop
-    is_drain = side.turn(_drain_cells(gap, grid, drains, drain_diameter))
-    spacing = grid.spacing[side.axis], grid.spacing[1 - side.axis]
-    wraps = bool(grid.periodic[1 - side.axis]), False
-    order = nested_dissection(is_drain.shape, wraps)
-    opening = 0.0 if normal_stiffness is None else drop / normal_stiffness
-    base = 0.0 if normal_stiffness is None else downstream_pressure / normal_stiffness
-    planes, residuals = [], []
-    for plane in values.reshape(-1, *values.shape[-2:]):
-        turned = side.turn(plane)
-        p, residual = _balance(
-            turned, is_drain, drained, spacing[1] / spacing[0], wraps, order, (base, opening)
-        )
-        planes.append(side.turn_back(downstream_pressure + drop * p))
-        residuals.append(residual)
-    pressure = np.reshape(planes, values.shape)
-    knots = _diagrams(grid, side, is_drain, (upstream_pressure, downstream_pressure), drain_share)
-    result = _forces(pressure, grid, side, knots, leading)
-    outer = values.shape[:-2]
+    pressure = np.reshape([low + drop * state.pressure for state in states], gap.shape)
+    knots = _diagrams(flow, (upstream_pressure, low), drain_share)
+    result = _forces(pressure, flow, knots, leading)
+    for axis, name in enumerate(("uplift_y", "uplift_x")):
+        result[name] = result[name] - _from_edge(gap, axis, 0.0)
     result["fluid_pressure"] = ((*leading, "y", "x"), pressure)
-    wet = np.isfinite(pressure)
-    result["wet_fraction"] = (leading, wet.mean(axis=(-2, -1)))
-    result["isolated_fraction"] = (leading, ((values > 0) & ~wet).mean(axis=(-2, -1)))
-    result["residual"] = (leading, np.reshape(residuals, outer))
+    result["wet_fraction"] = leading, np.isfinite(pressure).mean(axis=(-2, -1))
+    iterated = normal_stiffness is not None or total_stress is not None
+    names = ("isolated_fraction", "residual", *(("iterations", "converged") if iterated else ()))
+    for name in (*names, *(ON_PATH if total_stress is not None else ())):
+        result[name] = leading, np.reshape([getattr(state, name) for state in states], gap.shape[:-2])
+    _explain(result)
+    _warn(states)
     plane_coords = {dim: gap[dim].variable for dim in ("y", "x")}
     return result.assign_coords(leading_coords(gap, leading, taken=RESULTS) | plane_coords).assign_attrs(
-        achieved_residual=max(residuals)
+        achieved_residual=max(state.residual for state in states)
     )
 
 
-class _Edge:
-    """The upstream edge: axis of the flow (0 for y), and how a plane is turned to flow along its rows."""
+def _explain(result: xr.Dataset) -> None:
+    """Give NaN where nothing balances, and the reasons of all NaN."""
+    if result["uplift_arm"].isnull().any():
+        for name in ("uplift_arm", "uplift_x", "uplift_y"):
+            result[name].attrs["reason"] = NO_UPLIFT
+    if "effective_stress" not in result or result["effective_stress"].notnull().all():
+        return
+    balances = result["effective_stress"].notnull()
+    for name in ("effective_stress", "wet_fraction", "isolated_fraction", *FORCES):
+        shown = balances | (result["diagram"] != "joint") if name in FORCES else balances
+        result[name] = result[name].where(shown).assign_attrs(reason=OFF_THE_PATH)
 
-    def __init__(self, name: str) -> None:
-        self.axis = 1 if name in ("W", "E") else 0
-        self.dim = "yx"[self.axis]
-        self.backwards = name in ("E", "N")
 
-    def turn(self, plane: Array) -> Array:
-        along = plane if self.axis == 1 else plane.T
-        return np.ascontiguousarray(along[:, ::-1] if self.backwards else along)
+def _from_edge(gap: xr.DataArray, axis: int, position: Any) -> Any:
+    """Return the distance (m) of a coordinate from the low edge of the plane."""
+    centres = np.asarray(gap["yx"[axis]].values, dtype=np.float64)
+    return position - centres[0] + 0.5 * read_grid(gap).spacing[axis]
 
-    def turn_back(self, plane: Array) -> Array:
-        along = plane[:, ::-1] if self.backwards else plane
-        return along if self.axis == 1 else along.T
+
+def _sides(upstream: Any, downstream: Any, gap: xr.DataArray) -> tuple[Side, Side]:
+    if downstream is None:
+        downstream = OPPOSITE[upstream if isinstance(upstream, str) else upstream[0]]
+    return _side(upstream, gap), _side(downstream, gap)
+
+
+def _side(value: Any, gap: xr.DataArray) -> Side:
+    grid = read_grid(gap)
+    if isinstance(value, str):
+        name, share = EDGES[value]
+        return Side("yx".index(name), share * grid.extent["yx".index(name)], True)
+    axis = "yx".index(value[0])
+    spacing = grid.spacing[axis]
+    cell = min(int(_from_edge(gap, axis, float(value[1])) / spacing), grid.shape[axis] - 1)
+    return Side(axis, (cell + 0.5) * spacing, False)
 
 
 def _drain_cells(gap: xr.DataArray, grid: Grid, drains: Any, diameter: float) -> Array:
@@ -222,100 +288,168 @@ def _drain_cells(gap: xr.DataArray, grid: Grid, drains: Any, diameter: float) ->
     return cells
 
 
-def _balance(
-    gap: Array,
-    is_drain: Array,
-    drained: float,
-    ratio: float,
-    wraps: tuple[bool, bool],
-    order: Array,
-    opening: tuple[float, float],
-) -> tuple[Array, float]:
-    """Return the pressure, 1 upstream and 0 downstream, that belongs to the gap it opens, and the residual.
+class State(NamedTuple):
+    """Pressure, 1 upstream and 0 downstream, and how it was found; stresses in Pa."""
 
-    `opening` is that of the downstream pressure and that of the pressure difference.
+    pressure: Array
+    residual: float
+    isolated_fraction: float
+    iterations: int = 0
+    converged: bool = True
+    effective_stress: float = math.nan
+    balance_error: float = math.nan
+
+
+def _opened(gap: Array, flow: HeldFlow, soft: tuple[float, float] | None) -> State:
+    """Return the pressure that belongs to the gap it opens.
+
+    `soft` is the opening (m) under the downstream pressure and that under the pressure difference.
     """
-    p, residual = _plane_pressure(gap, is_drain, drained, ratio, wraps, order)
-    opened = np.zeros_like(gap)
-    for _ in range(MAX_ITERATIONS if opening[1] > 0 else 0):
-        wanted = np.where(np.isfinite(p), opening[0] + opening[1] * p, 0.0)
-        opened += RELAXATION * (wanted - opened)
+    p, residual = flow.pressure(gap)
+    isolated = _isolated(gap, p)
+    if soft is None:
+        return State(p, residual, isolated)
+    opened, relaxation, last = np.zeros_like(gap), RELAXATION, math.inf
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        wanted = np.where(np.isfinite(p), soft[0] + soft[1] * p, 0.0)
+        opened += relaxation * (wanted - opened)
         previous = p
-        p, residual = _plane_pressure(gap + opened, is_drain, drained, ratio, wraps, order)
-        if not np.nanmax(np.abs(p - previous), initial=0.0) > BALANCE:
-            break
-    return p, residual
+        p, residual = flow.pressure(gap + opened)
+        change = float(np.nanmax(np.abs(p - previous), initial=0.0))
+        if not change > BALANCE:
+            return State(p, residual, isolated, iteration)
+        if change > last:  # it oscillates
+            relaxation = max(0.5 * relaxation, SMALLEST_RELAXATION)
+        last = change
+    return State(p, residual, isolated, MAX_ITERATIONS, converged=False)
 
 
-def _plane_pressure(
-    gap: Array, is_drain: Array, drained: float, ratio: float, wraps: tuple[bool, bool], order: Array
-) -> tuple[Array, float]:
-    """Return the pressure in a plane, NaN where no water comes, and the relative residual."""
-    largest = float(gap.max())
-    if not largest > 0:
-        return np.full(gap.shape, np.nan), 0.0
-    cells = np.maximum(gap / largest, 0.0) ** 3
-    network = link_network(cells, ratio, wraps)
-    held = _held(network, HELD * (ratio + 1.0 / ratio) * cells * is_drain, drained)
-    wet = held_cells(network, held)
-    if not wet.any():
-        return np.full(gap.shape, np.nan), 0.0
-    pressure, residual = pressures(network, wet, order, held)
-    return np.where(wet.reshape(gap.shape), pressure, np.nan), residual
+def _isolated(gap: Array, pressure: Array) -> float:
+    return float(((gap > 0) & np.isnan(pressure)).mean())
 
 
-def _held(network: Network, conductance: Array, drained: float) -> Held:
-    ends = held_ends(network)
-    return Held(
-        ends.conductance + conductance,
-        ends.inflow + conductance * drained,
-        ends.energy + conductance * drained**2,
-    )
+def _path_stresses(gap: xr.DataArray) -> Array:
+    """Return the effective stress along the path of each gap, shape (..., step)."""
+    stress = gap["nominal_pressure"].broadcast_like(gap.isel(y=0, x=0, drop=True)).transpose(..., "step")
+    return np.asarray(stress.values, dtype=np.float64)
 
 
-def _diagrams(
-    grid: Grid, side: _Edge, is_drain: Array, ends: tuple[float, float], share: float
-) -> dict[str, tuple[Array, Array]]:
-    """Return distance from the upstream edge and pressure at the knots of the diagrams of guidelines."""
-    length = grid.extent[side.axis]
-    high, low = ends
-    knots = {"linear": (np.array([0.0, length]), np.array([high, low]))}
-    if is_drain.any():
-        place = (float(np.nonzero(is_drain)[1].mean()) + 0.5) * grid.spacing[side.axis]
-        knots["bilinear"] = np.array([0.0, place, length]), np.array([high, low + share * (high - low), low])
+def _on_path(gap: xr.DataArray, flow: HeldFlow, total: float, water: tuple[float, float]) -> list[State]:
+    """Return the state of every gap, dims (..., step, y, x), at which its path balances the total stress."""
+    steps, stresses = gap.sizes["step"], _path_stresses(gap)
+    planes = np.asarray(gap.values, dtype=np.float64).reshape(-1, steps, *gap.shape[-2:])
+    pairs = zip(planes, stresses.reshape(-1, steps), strict=True)
+    return [_balanced(path, stress, flow, total, water) for path, stress in pairs]
+
+
+def _balanced(
+    planes: Array, stresses: Array, flow: HeldFlow, total: float, water: tuple[float, float]
+) -> State:
+    """Return the state on a path of gaps at which effective stress and mean uplift make the total stress.
+
+    Between two steps the gap is linear in the logarithm of the stress, as elastic faces close. `water` is the
+    downstream pressure and the pressure difference. The path is searched from its greatest stress down:
+    there may be a second balance of a joint that the water holds open.
+    """
+    from scipy.optimize import brentq
+
+    count = itertools.count(1)
+
+    def state(place: float) -> State:
+        step = min(int(place), len(stresses) - 2)
+        share, (low, high) = place - step, stresses[step : step + 2]
+        stress = low * (high / low) ** share if low > 0 else share * high
+        gap = planes[step] + share * (planes[step + 1] - planes[step])
+        p, residual = flow.pressure(gap)
+        uplift = float(np.nan_to_num(water[0] + water[1] * p).mean())
+        error = (stress + uplift) / total - 1.0
+        balances = abs(error) <= STRESS_BALANCE
+        return State(p, residual, _isolated(gap, p), next(count), balances, float(stress), error)
+
+    place = len(stresses) - 1
+    found = state(place)
+    while place > 0 and found.balance_error > 0:
+        place, above = place - 1, found
+        found = state(place)
+    if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
+        root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=PLACE_ERROR)
+        return state(root)
+    if found.converged:
+        return found
+    return found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
+
+
+def _warn(states: Sequence[State]) -> None:
+    failed = [number for number, state in enumerate(states) if not state.converged]
+    if not failed:
+        return
+    if math.isfinite(states[0].balance_error):
+        errors = ", ".join(f"{states[number].balance_error:+.2g}" for number in failed[:SHOWN])
+        what = f"no effective stress on the path balances the total stress (balance_error {errors})"
+    else:
+        what = f"opening and flow did not come to balance in {MAX_ITERATIONS} iterations"
+    message = f"{WHERE}: not converged, {len(failed)} of {len(states)} gaps: {what}"
+    warnings.warn(message, ConvergenceWarning, stacklevel=4)
+
+
+Knots = dict[str, tuple[Array, Array]]
+
+
+def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float) -> Knots:
+    """Return distance from the upstream side and pressure at the knots of the diagrams of guidelines."""
+    (upstream, downstream), (high, low) = flow.sides, ends
+    if upstream.axis != downstream.axis:
+        return {}
+    reach, last = abs(downstream.place - upstream.place), np.sort(flow.distances(both_ends=True))
+    knots = {"linear": (np.array([last[0], 0.0, reach, last[1]]), np.array([high, high, low, low]))}
+    rows = np.nonzero(flow.is_drain)[upstream.axis]
+    if rows.size:
+        place = float(flow.distances()[rows].mean())
+        if 0.0 < place < reach:
+            pressure = np.array([high, high, low + share * (high - low), low, low])
+            knots["bilinear"] = np.array([last[0], 0.0, place, reach, last[1]]), pressure
     return knots
 
 
-def _forces(
-    pressure: Array, grid: Grid, side: _Edge, knots: dict[str, tuple[Array, Array]], leading: tuple[str, ...]
-) -> xr.Dataset:
-    """Return force, line of action and profile of the joint and of the diagrams."""
-    spacing, length = grid.spacing[side.axis], grid.extent[side.axis]
-    profile = np.nan_to_num(pressure).mean(axis=-2 if side.axis == 1 else -1)
-    profile = profile[..., ::-1] if side.backwards else profile
-    distance = (np.arange(profile.shape[-1]) + 0.5) * spacing
-    mean, moment = profile.mean(axis=-1), (profile * distance).mean(axis=-1)
-    if profile.shape[-1] > 1:  # the pressure falls inside a cell
-        moment = moment + np.gradient(profile, spacing, axis=-1).mean(axis=-1) * spacing**2 / 12.0
-    means, moments, profiles = [mean], [moment], [profile]
+def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, ...]) -> xr.Dataset:
+    """Return force, point of action (from the low edges) and profile of the joint and of the diagrams."""
+    grid, upstream = flow.grid, flow.sides[0]
+    axis, length = upstream.axis, grid.extent[upstream.axis]
+    filled = np.nan_to_num(pressure)
+    profile, mean = filled.mean(axis=-2 if axis == 1 else -1), filled.mean(axis=(-2, -1))
+    centres = [_centre(filled, 0, grid), _centre(filled, 1, grid)]
+    arms = [flow.sense * (centres[axis] - upstream.place)]
+    means, profiles, points = [mean], [profile], [centres]
     for place, p in knots.values():
-        a, b = p[:-1], p[1:]
-        step = np.diff(place)
+        a, b, step = p[:-1], p[1:], np.diff(place)
         force = (a + b) / 2.0 * step
+        arm = (force * place[:-1] + step**2 * (a + 2.0 * b) / 6.0).sum() / force.sum()
         means.append(np.full_like(mean, force.sum() / length))
-        moments.append(
-            np.full_like(mean, (force * place[:-1] + step**2 * (a + 2.0 * b) / 6.0).sum() / length)
-        )
-        profiles.append(np.broadcast_to(np.interp(distance, place, p), profile.shape))
-    mean, moment, shown = np.stack(means, -1), np.stack(moments, -1), np.stack(profiles, -2)
+        arms.append(np.full_like(mean, arm))
+        profiles.append(np.broadcast_to(np.interp(flow.distances(), place, p), profile.shape))
+        middle = [0.5 * extent for extent in grid.extent]
+        middle[axis] = upstream.place + flow.sense * arm
+        points.append([np.full_like(mean, place) for place in middle])
     dims = (*leading, "diagram")
-    arm = np.divide(moment, mean, out=np.full_like(mean, np.nan), where=mean > 0)
     return xr.Dataset(
         {
-            "uplift_force": (dims, mean * grid.nominal_area),
-            "mean_uplift": (dims, mean),
-            "uplift_arm": (dims, arm),
-            "uplift_profile": ((*dims, side.dim), shown[..., ::-1] if side.backwards else shown),
+            "uplift_force": (dims, np.stack(means, -1) * grid.nominal_area),
+            "mean_uplift": (dims, np.stack(means, -1)),
+            "uplift_arm": (dims, np.stack(arms, -1)),
+            "uplift_y": (dims, np.stack([point[0] for point in points], -1)),
+            "uplift_x": (dims, np.stack([point[1] for point in points], -1)),
+            "uplift_profile": ((*dims, "yx"[axis]), np.stack(profiles, -2)),
         },
         coords={"diagram": ["joint", *knots]},
     )
+
+
+def _centre(pressure: Array, axis: int, grid: Grid) -> Array:
+    """Return the distance (m) of the resultant of the pressure from the low edge across an axis."""
+    profile = pressure.mean(axis=-1 if axis == 0 else -2)
+    spacing = grid.spacing[axis]
+    mean = profile.mean(axis=-1)
+    moment = (profile * (np.arange(profile.shape[-1]) + 0.5) * spacing).mean(axis=-1)
+    if profile.shape[-1] > 1:  # the pressure falls inside a cell
+        moment = moment + np.gradient(profile, spacing, axis=-1).mean(axis=-1) * spacing**2 / 12.0
+    return np.asarray(np.divide(moment, mean, out=np.full_like(mean, np.nan), where=mean > 0))

@@ -41,6 +41,7 @@ from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
 from fractalcontact.plotting._style import drawn_for_files, figure_of, needs_log_axis
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
+from fractalcontact.plotting._uplift import uplift
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -146,6 +147,7 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
         ("joints/decorrelation_length", "correlation", correlation),
         ("joints/directional_roughness", "directional_roughness", directional_roughness),
         ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
+        ("joints/uplift", "uplift", _uplift),
         ("contact", "closure_law", _closure_laws),
         ("contact", "contact_area", _contact_area),
         ("partial_slip", "slip_loops", slip_loops),
@@ -218,6 +220,11 @@ def _lacunarity(data: xr.Dataset) -> Any:
 
 def _slip_domains(data: xr.Dataset) -> Any:
     return slip_domains(data.isel(shear=-1) if "shear" in data.dims else data)  # at the greatest shear
+
+
+def _uplift(data: xr.Dataset) -> Any:
+    """Draw the uplift at the greatest shear, under the greatest load."""
+    return uplift(data.isel({dim: -1 for dim in ("shear", "step") if dim in data.dims}))
 
 
 def _local_slopes(data: xr.Dataset) -> Any:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import extent_of, result_of, words
@@ -55,7 +56,7 @@ def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(uplift.get_ylabel())
     uplift (kPa)
     """
-    data = result_of(result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_arm"), ())
+    data = result_of(result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), ())
     plane = plane_of(data[["fluid_pressure"]], "uplift", "fluid_pressure")
     profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
                                               and d not in ("diagram", "x", "y")])  # fmt: skip
@@ -67,21 +68,32 @@ def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     mappable = _maps.field(left, np.asarray(plane.values, float), extent, length, pressure, positive=False)
     _maps.colour_bar(left, mappable, axis_label(plane, pressure))
     label_axes(left, plane, length)
+    left.set_title(_state(data))
     _draw_diagrams(right, data, profile, extent, length, pressure)
     return shown
+
+
+def _state(data: Any) -> str:
+    """Return shear and normal stress of the joint that is shown, as far as the result has them."""
+    shown = {"shear": "shear", "effective_stress": "effective stress", "nominal_pressure": "normal stress"}
+    present = [name for name in shown if name in data.variables and data[name].size == 1]
+    present = [name for name in present if not (name == "nominal_pressure" and "effective_stress" in present)]
+    values = {name: float(np.ravel(data[name].values)[0]) for name in present}
+    return ", ".join(
+        f"{shown[name]} {quantity_text(value, 'm' if name == 'shear' else 'Pa')}"
+        for name, value in values.items()
+        if np.isfinite(value)
+    )
 
 
 def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, pressure: Any) -> None:
     """Draw the profile of each diagram and mark its line of action on the axis."""
     dim = "x" if "x" in profile.dims else "y"
     start, end = extent[:2] if dim == "x" else extent[2:]
-    linear = profile.sel(diagram="linear").values
-    falls = bool(linear[0] >= linear[-1])  # from the start of the axis
     for name in words(profile["diagram"]):
-        arm = float(data["uplift_arm"].sel(diagram=name))
         style = {"color": _style.ink(), **LINES[name]}
         ax.plot(length(profile[dim].values), pressure(profile.sel(diagram=name).values), label=name, **style)
-        place = float(length(start + arm if falls else end - arm))
+        place = float(length(float(data[f"uplift_{dim}"].sel(diagram=name))))
         ax.plot([place], [0.0], marker="^", color=style["color"], clip_on=False, ls="", ms=6, zorder=3)
     ax.set_xlim(float(length(start)), float(length(end)))
     ax.set_ylim(bottom=0.0)

@@ -21,7 +21,7 @@ import numpy as np
 from fractalcontact.base.errors import FractalContactWarning
 from fractalcontact.scenes._inputs import surface_grid
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stages import STAGES
+from fractalcontact.scenes._stages import READ_THE_GAP, STAGES
 
 CURVES_FILE = Path(__file__).with_name("autotune_curves.json")
 SAFETY_FACTOR = 3.0  # on the error of the curve: surfaces differ
@@ -224,7 +224,7 @@ def _solvers(scene: Scene, shape: tuple[int, int]) -> Iterator[_Solver]:
         benchmark = f"rough, {body} body{condition}"
         yield _Solver("contact", benchmark, 1.0 + WARM_START * (steps - 1), float(np.prod(shape)))
     wanted = set(scene.want.joints)
-    if (scene.want.domains or "transmissivity" in wanted) and not scene.is_pressed:
+    if (scene.want.domains and not scene.is_pressed) or wanted & set(READ_THE_GAP):
         wanted.add("closure")
     solves = sum(_joint_solves(scene, name) for name in ("closure", "elastic_dilatancy") if name in wanted)
     if solves:

@@ -15,6 +15,7 @@ from fractalcontact.base.units import number, quantity_text
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MEMBER = "member"
+ISOLATED = 0.05  # of the area: less is lost in the pressure beside it
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
 PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
@@ -32,8 +33,8 @@ def caveats(tree: xr.DataTree) -> list[str]:
     -------
     list of str
         One sentence each: islands of too few cells, at which loads; slopes beyond small strains; the true
-        pressure where no hardness limits it; strengths beyond that of the material. Empty where the results
-        have no such limit.
+        pressure where no hardness limits it; strengths beyond that of the material; uplift that did not come
+        to balance. Empty where the results have no such limit.
     """
     lines: list[str] = []
     for path, surface in PRESSED.items():
@@ -41,7 +42,7 @@ def caveats(tree: xr.DataTree) -> list[str]:
         if pressed is not None and "contact_fraction" in pressed:
             lines += [*_resolution(path, pressed), *_slopes(path, pressed, surface)]
             lines += _true_pressure(path, pressed, _material(tree))
-    return [*lines, *_strength(tree)]
+    return [*lines, *_strength(tree), *_uplift(tree)]
 
 
 def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
@@ -148,6 +149,37 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
         yield (
             f"joints/friction: the peak shear strength is up to {strength}, and the material yields at "
             f"{limit}: asperities break before the faces climb over them."
+        )
+
+
+def _uplift(tree: xr.DataTree) -> Iterator[str]:
+    water = group_of(tree, "joints/uplift")
+    if water is None:
+        return
+    isolated = float(water["isolated_fraction"].max())
+    if isolated > ISOLATED:
+        yield (
+            f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
+            "over time it may come there too, and the uplift grow."
+        )
+    failed = ~water["converged"] if "converged" in water else np.zeros(1, bool)
+    if not bool(failed.any()):
+        return
+    count = f"{int(failed.sum())} of {failed.size}"
+    if "balance_error" not in water:
+        yield f"joints/uplift: opening and flow did not come to balance in {count} cases."
+        return
+    errors = water["balance_error"].where(failed)
+    if float(errors.min()) < 0:
+        yield (
+            f"joints/uplift: in {int((errors < 0).sum())} of {failed.size} cases the load path of the "
+            "closure ends before the effective stress; give it greater loads."
+        )
+    if float(errors.max()) > 0:
+        yield (
+            f"joints/uplift: in {int((errors > 0).sum())} of {failed.size} cases the water carries more "
+            "than the total stress less the lowest load of the closure: it lifts the joint, or the path "
+            "starts too late."
         )
 
 

@@ -18,6 +18,7 @@ from fractalcontact.scenes._stages import (
     ONE_DIRECTION,
     ONE_LOAD,
     PARTIAL_SLIP,
+    READ_THE_GAP,
     STAGES,
     StageType,
     arguments_of,
@@ -42,6 +43,8 @@ class Stage:
         Maps that it has to return.
     stored : bool
         False where the result file does not contain it.
+    whole_path : bool
+        Whether it reads the maps of all steps at once.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Stage:
     reason: str
     keep: tuple[str, ...] = ()
     stored: bool = True
+    whole_path: bool = False
 
     @property
     def row(self) -> StageType:
@@ -63,7 +67,7 @@ class Stage:
     @property
     def reads_part(self) -> bool:
         """Whether it reads that map plane by plane, so that the map does not have to be kept."""
-        return self.reads_map and not self.row.whole_path
+        return self.reads_map and not self.whole_path
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,7 @@ def stages_of(scene: Scene) -> tuple[Stage, ...]:
             reasons[name],
             keep=_kept_maps(scene, row),
             stored=name != "surfaces" or reasons[name] != "input",
+            whole_path=row.whole_path or "total_stress" in scene.stage_options(row, ("total_stress",)),
         )
         for name, row in STAGES.items()
         if name in reasons
@@ -176,8 +181,9 @@ def _joint_reasons(scene: Scene) -> dict[str, str]:
     reasons = {name: f"{name} is wanted" for name in want.joints}
     if want.domains and not scene.is_pressed:
         reasons.setdefault("closure", "the contact set is analysed")
-    if "transmissivity" in reasons:
-        reasons.setdefault("closure", "transmissivity needs the gap")
+    for name in READ_THE_GAP:
+        if name in reasons:
+            reasons.setdefault("closure", f"{name} needs the gap")
     if "friction" in reasons and "elastic_dilatancy" not in reasons:
         reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
     if scene.want.figures and reasons and scene.stage_options(STAGES["joints/delta_surface"], ("shear",)):
@@ -209,7 +215,7 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     reads_state = is_contact == scene.is_pressed and bool(scene.want.domains)
     if (reads_state or scene.want.figures) and "state" not in maps:
         maps.append("state")
-    if "transmissivity" in scene.want.joints and not is_contact and "gap" not in maps:
+    if set(READ_THE_GAP) & set(scene.want.joints) and not is_contact and "gap" not in maps:
         maps.append("gap")
     return tuple(maps)
 

@@ -69,6 +69,7 @@ def summary(tree: xr.DataTree) -> str:
         _direct_shear(tree),
         _self_weight(tree),
         _leakage(tree),
+        _uplift(tree),
         _contact_set(tree),
         "\n".join(note(caveat) for caveat in caveats(tree)),
         paper_table(tree) if compares_with_paper(tree) else "",
@@ -299,6 +300,43 @@ def _leakage(tree: xr.DataTree) -> str:
         every = (amount(state["hydraulic_aperture"].sel(axis=axis)) for axis in axes)
         rows.append((shear, amount(state["normal_force"]), amount(state["aperture"]), *every))
     return table(rows)
+
+
+def _uplift(tree: xr.DataTree) -> str:
+    """Return force and arm of the uplift, how they compare with the diagrams, and the stress that remains."""
+    water = group_of(tree, "joints/uplift")
+    if water is None:
+        return ""
+    balanced = "effective_stress" in water
+    diagrams = [str(name) for name in water["diagram"].values]
+    load = "effective_stress" if balanced else "nominal_pressure"
+    head = ("effective stress" if balanced else "normal stress", *(f"uplift, {name}" for name in diagrams))
+    rows: list[tuple[str, ...]] = [("uplift at shear", *head, "arm, joint")]
+    remarks: list[str] = []
+    for shear, state in _at_shears(water if balanced else water.isel(step=-1)):
+        forces = state["uplift_force"].transpose("diagram", ...)
+        arm = amount(state["uplift_arm"].sel(diagram="joint"))
+        rows.append((shear, amount(state[load]), *map(amount, forces), arm))
+        remarks += _uplift_remarks(shear, state, diagrams)
+    return "\n".join([table(rows), *map(note, remarks)])
+
+
+def _uplift_remarks(shear: str, state: xr.Dataset, diagrams: list[str]) -> Iterator[str]:
+    """Yield whether the joint has more or less uplift than the guidelines assume."""
+    joint, arm = (state[name].sel(diagram="joint") for name in ("uplift_force", "uplift_arm"))
+    place = f"at shear {shear}: " if shear else ""
+    if not np.isfinite(joint.values).all():
+        yield f"{place}no effective stress on the path of the closure balances the total stress"
+        return
+    for name in diagrams[1:]:
+        more = float((joint / state["uplift_force"].sel(diagram=name)).mean()) - 1.0
+        farther = float((arm - state["uplift_arm"].sel(diagram=name)).mean())
+        way, safe = ("less", "on the safe side") if more < 0 else ("more", "NOT on the safe side")
+        where = "upstream" if farther < 0 else "downstream"
+        yield (
+            f"{place}the {name} diagram is {safe}: the joint has {abs(100 * more):.1f} % {way} uplift, which "
+            f"acts {length(abs(farther))} farther {where}"
+        )
 
 
 def _partial_slip(tree: xr.DataTree, path: str) -> str:

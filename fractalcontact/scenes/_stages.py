@@ -59,7 +59,8 @@ class StageType:
     takes_surface : bool
         It describes the lower face, not the crack.
     whole_path : bool
-        It follows the contact set along the load path, and reads the maps of all steps at once.
+        It follows the contact set along the load path, and reads the maps of all steps at once. A scene can
+        ask that of other stages too, see `Stage.whole_path`.
     """
 
     name: str
@@ -146,6 +147,7 @@ _ROWS = (
     _joint("self_weight"),
     _joint("decorrelation_length"),
     _joint("transmissivity", ("joints/closure",), reads="gap"),
+    _joint("uplift", ("joints/closure",), reads="gap"),
     _domain("box_dimension"),
     _domain("box_counts"),
     _domain("minkowski_dimension"),
@@ -174,6 +176,7 @@ DATASHEET = (
     "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "transmissivity",
 )  # fmt: skip
 DOMAIN_STAGES = _words("domains")
+READ_THE_GAP = tuple(row.word for row in _ROWS if row.reads == "gap")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
     "surfaces": ("height", "describe"),

@@ -81,7 +81,7 @@ def _groups(result: xr.DataTree | xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 def _sets_of_dims(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     """Return the dims of the variables, each set once, without those of maps."""
     found = dict.fromkeys(tuple(str(dim) for dim in variable.dims) for variable in dataset.data_vars.values())
-    return sorted((dims for dims in found if not MAP_DIMS & set(dims)), key=len)
+    return sorted((dims for dims in found if not set(dims) >= MAP_DIMS), key=len)
 
 
 def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:

@@ -34,7 +34,7 @@ from fractalcontact.scenes._inputs import (
 from fractalcontact.scenes._parts import map_reader
 from fractalcontact.scenes._plan import Stage, stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
-from fractalcontact.scenes._scene import Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
 from fractalcontact.scenes._stages import (
     FIGURES,
@@ -220,8 +220,10 @@ def _validate_calls(
                 _validate_call(stage.row.function, surface, keep=stage.keep, **options)
             elif stage.reads_map:
                 reader, maps = map_reader(stage, scene), None
-                if surface is not None and (scene.is_pressed or crack is not None):
-                    maps = _empty_maps(scene, surface, float if reader.variable == "gap" else bool)
+                if reader.variable == "gap" and crack is not None:
+                    maps = _empty_gap(scene, crack)
+                elif surface is not None and (scene.is_pressed or crack is not None):
+                    maps = _empty_maps(scene, surface)
                 _validate_call(reader.function, maps, **reader.options)
             elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
                 if stage.row.takes_surface:
@@ -252,7 +254,17 @@ def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
         public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 
 
-def _empty_maps(scene: Scene, surface: xr.DataArray, dtype: type) -> xr.DataArray:
+def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
+    """Return openings of zero on the block, along the load path of the closure, whatever its load."""
+    rows, columns = crack.layout.slices
+    block = crack.lower.isel(y=rows, x=columns)
+    gap = block.copy(data=np.broadcast_to(0.0, block.shape))
+    options = joint_options(scene, "closure")
+    path = next((np.atleast_1d(options[key]) for key in LOADS if key in options), np.zeros(1))
+    return gap.expand_dims(step=path.size).assign_coords(nominal_pressure=("step", path.astype(float)))
+
+
+def _empty_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
     """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
     is_surface = scene.is_pressed or scene.joint.block is None
     spacing = spacing_of(surface)
@@ -260,4 +272,4 @@ def _empty_maps(scene: Scene, surface: xr.DataArray, dtype: type) -> xr.DataArra
     cells = surface.shape if is_surface else tuple(np.rint(edges / spacing).astype(int).tolist())
     periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
     maps = _zeros(cells, spacing, periodic)
-    return maps.copy(data=np.broadcast_to(dtype(0), cells)).expand_dims(step=2)
+    return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)

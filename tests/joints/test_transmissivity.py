@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import fractalcontact as fc
-from fractalcontact.joints import _flow_network
+from fractalcontact.joints import _network_pressure
 
 # relative amplitude, hydraulic over mean aperture across and along the crests
 SINUSOIDS = [(0.3, 0.910952, 1.043114), (0.6, 0.652413, 1.154800)]
@@ -285,7 +285,7 @@ def test_leading_dims_and_labels(make_face):
 def test_multigrid_and_elimination_agree(make_face, rough, monkeypatch):
     gap = rough((96, 96), 0) + 0.5
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_flow_network, "LARGEST_DIRECT", 10)
+    monkeypatch.setattr(_network_pressure, "LARGEST_DIRECT", 10)
     pytest.importorskip("pyamg")
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=2e-8)
@@ -302,7 +302,7 @@ def test_multigrid_at_high_contrast(make_face, monkeypatch, contrast):
     pytest.importorskip("pyamg")
     gap = np.cbrt(np.where(np.random.default_rng(5).random((120, 120)) < 0.45, 1.0, contrast))
     direct = flow(make_face, gap)
-    monkeypatch.setattr(_flow_network, "LARGEST_DIRECT", 10)
+    monkeypatch.setattr(_network_pressure, "LARGEST_DIRECT", 10)
     multigrid = flow(make_face, gap)
     np.testing.assert_allclose(multigrid.transmissivity, direct.transmissivity, rtol=1e-7)
 
@@ -364,7 +364,7 @@ def test_transmissivity_over_load_and_shear(make_face, rough):
 @pytest.mark.parametrize("wraps", [(False, False), (True, False), (False, True), (True, True)])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (2, 40), (33, 7), (40, 40)])
 def test_order_of_elimination_takes_every_cell_once(shape, wraps):
-    order = _flow_network.nested_dissection(shape, wraps)
+    order = _network_pressure.nested_dissection(shape, wraps)
     assert sorted(order.tolist()) == list(range(shape[0] * shape[1]))
 
 
@@ -372,7 +372,7 @@ def test_order_of_elimination_takes_every_cell_once(shape, wraps):
 def test_order_of_elimination_fills_in_little(wraps):
     """The bound of George (1973), 31/4 n^2 log2(n) for n x n cells; row by row it would be n^3."""
     n = 48
-    order = _flow_network.nested_dissection((n, n), wraps)
+    order = _network_pressure.nested_dissection((n, n), wraps)
     line = sparse.diags_array([1.0, 1.0], offsets=[-1, 1], shape=(n, n)).tolil()
     line[0, -1] = line[-1, 0] = float(wraps[0])
     links = sparse.kron(line, sparse.eye_array(n)) + sparse.kron(sparse.eye_array(n), line)

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+import xarray as xr
+from scipy.optimize import brentq
 
 import fractalcontact as fc
+from fractalcontact.base.errors import ConvergenceWarning
 
 HEAD = 490.5e3  # Pa, 50 m of water
 
@@ -33,6 +36,131 @@ def test_bilinear_diagram_with_a_third_at_the_drains(make_face):
     np.testing.assert_allclose(per_metre.sel(diagram="joint"), per_metre.sel(diagram="bilinear"), rtol=1e-4)
     arms = result.uplift_arm
     np.testing.assert_allclose(arms.sel(diagram="joint"), arms.sel(diagram="bilinear"), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("share", "force", "arm"),
+    [
+        (1 / 3, 4.251e6, 5022.2222 / 433.3333),  # USBR: a third of the difference, 16.67 m of water
+        (0.5 * 36 / 40, 5.3955e6, 6733.3333 / 550.0),  # USACE: half of 50 m (40 - 4)/40, 22.5 m of water
+    ],
+)
+def test_diagrams_of_guidelines_by_hand(make_face, share, force, arm):
+    """50 m of water, a base of 40 m, drains at 4 m: force per metre, and its arm, by two trapezia."""
+    place = 4.05  # the middle of the cell of the drain
+    result = uplift(make_face, np.full((3, 400), 1e-4), (1.0, 0.1), drains=(place, 1.5), drain_share=share)
+    bilinear = result.sel(diagram="bilinear")
+    np.testing.assert_allclose(bilinear.uplift_force / 3, force, rtol=5e-3)
+    np.testing.assert_allclose(bilinear.uplift_arm, arm, rtol=5e-3)
+    low = share * 50
+    exact = 9.81e3 * ((50 + low) / 2 * place + low / 2 * (40 - place))
+    np.testing.assert_allclose(bilinear.uplift_force / 3, exact, rtol=1e-12)
+
+
+def test_lines_inside_the_plane(make_face):
+    """A crack open up to 10.5 m, and tailwater from 30.5 m on: full head, a line, nothing."""
+    result = uplift(make_face, np.full((2, 40), 1e-4), upstream=("x", 10.5), downstream=["x", 30.2])
+    per_metre = result.uplift_force / 2
+    np.testing.assert_allclose(per_metre.sel(diagram="linear"), HEAD * (10.5 + 10.0), rtol=1e-12)
+    np.testing.assert_allclose(per_metre.sel(diagram="joint"), HEAD * (10.5 + 10.0), rtol=1e-6)
+    centre = (10.5 * 5.25 + 10.0 * (10.5 + 20 / 3)) / 20.5
+    np.testing.assert_allclose(result.uplift_x, centre, rtol=1e-3)
+    np.testing.assert_allclose(result.uplift_arm, centre - 10.5, atol=0.01)
+    np.testing.assert_allclose(result.uplift_y, 1.0, rtol=1e-12)
+    back = uplift(make_face, np.full((2, 40), 1e-4), upstream=("x", 30.2), downstream=("x", 10.5))
+    np.testing.assert_allclose(back.fluid_pressure, HEAD - result.fluid_pressure, atol=1e-4)
+
+
+def test_two_edges_that_meet(make_face, rough):
+    """From west to south: the plane mirrored at its diagonal swaps both sides."""
+    gap = np.maximum(rough((12, 12), seed=4) + 1.5, 0.0) * 1e-4
+    gap = gap + gap.T
+    result = uplift(make_face, gap, upstream="W", downstream="S")
+    p = result.fluid_pressure / HEAD
+    wet = np.isfinite(p.values)
+    assert wet.sum() > 100
+    np.testing.assert_allclose((p.values + p.values.T)[wet], 1.0, rtol=1e-9)
+    assert result.diagram.values.tolist() == ["joint"]
+    assert "x" in result.uplift_profile.dims
+
+
+def test_periodic_sides_are_joined(make_face, rough):
+    gap = np.maximum(rough((12, 16), seed=4) + 1.2, 0.0) * 1e-4
+    plain = uplift(make_face, gap, upstream="S", periodic=True).fluid_pressure
+    rolled = uplift(make_face, np.roll(gap, 5, axis=1), upstream="S", periodic=True).fluid_pressure
+    np.testing.assert_allclose(rolled, np.roll(plain, 5, axis=1), rtol=1e-9)
+
+
+def on_path(surface, gaps, stresses):
+    return xr.concat([surface(gap, 1.0) for gap in gaps], "step").assign_coords(
+        nominal_pressure=("step", stresses)
+    )
+
+
+def test_balance_with_the_closure_of_two_halves(make_face):
+    """Each half closes with the logarithm of the stress; the fixed point is that of one equation."""
+    total, stresses = 800e3, np.geomspace(1e5, 1e6, 4)
+
+    def apertures(stress):
+        decades = np.log10(stress / 1e5)
+        return 1e-4 * (3 - 1.5 * decades), 1e-4 * (2 - 0.4 * decades)  # upstream closes faster
+
+    def excess(stress):
+        upper, lower = apertures(stress)
+        middle = upper**3 / (upper**3 + lower**3)  # two plates in series
+        return stress + HEAD * (1 + 2 * middle) / 4 - total
+
+    exact = brentq(excess, 1e5, 1e6)
+    gaps = [np.repeat(apertures(stress), 10) * np.ones((2, 1)) for stress in stresses]
+    result = fc.joints.uplift(on_path(make_face, gaps, stresses), upstream_pressure=HEAD, total_stress=total)
+    assert result.converged
+    np.testing.assert_allclose(result.effective_stress, exact, rtol=1e-8)
+    joint = result.mean_uplift.sel(diagram="joint")
+    np.testing.assert_allclose(result.effective_stress + joint, total, rtol=1e-8)
+    assert abs(float(joint) / HEAD - 0.5) > 0.02  # not that of even plates
+    assert "step" not in result.dims
+    assert "nominal_pressure" not in result.coords
+
+
+def test_balance_on_the_path_of_a_rough_joint(make_face, rough):
+    """The gap pressed at the effective stress itself gives the uplift that was found between two steps."""
+    face = make_face(2e-5 * rough((32, 32), seed=2), 1e-4)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
+    stresses = np.geomspace(2e5, 3.2e6, 9)
+    path = fc.joints.closure(crack, shear=2e-4, nominal_pressure=stresses, keep="gap").gap
+    result = fc.joints.uplift(path, upstream_pressure=1e6, total_stress=1.5e6).squeeze()
+    stress = float(result.effective_stress)
+    pressed = fc.joints.closure(crack, shear=2e-4, nominal_pressure=stress, keep="gap").gap
+    dry = fc.joints.uplift(pressed, upstream_pressure=1e6).squeeze()
+    both = stress + float(dry.mean_uplift.sel(diagram="joint"))
+    np.testing.assert_allclose(both, 1.5e6, rtol=2e-3)
+    assert stress < 1.3e6
+
+
+@pytest.mark.parametrize(("total", "sign"), [(5e6, -1), (2e5, 1)])
+def test_a_total_stress_off_the_path_is_reported(make_face, total, sign):
+    stresses = np.array([1e5, 2e5, 4e5])
+    gaps = [np.full((2, 10), gap) for gap in (3e-4, 2e-4, 1e-4)]
+    with pytest.warns(ConvergenceWarning, match="no effective stress on the path"):
+        result = fc.joints.uplift(
+            on_path(make_face, gaps, stresses), upstream_pressure=HEAD, total_stress=total
+        )
+    assert not result.converged
+    assert np.isnan(result.effective_stress)
+    assert np.sign(result.balance_error) == sign
+    assert np.isnan(result.uplift_force.sel(diagram="joint"))
+    np.testing.assert_allclose(result.mean_uplift.sel(diagram="linear"), HEAD / 2, rtol=1e-12)
+
+
+def test_an_opening_that_does_not_converge_is_reported(make_face):
+    rng = np.random.default_rng(43)  # openings over five decades: the water closes and opens bottlenecks
+    gap = 10.0 ** rng.uniform(-8, -3, (20, 24))
+    gap[rng.random(gap.shape) < 0.2] = 0
+    options = {"normal_stiffness": 7.7e11, "drains": [(5.0, 5.0), (5.0, 15.0)]}
+    gaps = xr.concat([make_face(gap, 1.0), make_face(np.full(gap.shape, 1e-4), 1.0)], "step")
+    with pytest.warns(ConvergenceWarning, match="1 of 2 gaps: opening and flow"):
+        result = fc.joints.uplift(gaps, upstream_pressure=490e3, **options)
+    assert result.converged.values.tolist() == [False, True]
 
 
 def test_open_crack_carries_the_full_head(make_face):
@@ -132,6 +260,11 @@ def test_drain_of_a_diameter_holds_all_its_cells(make_face):
         ({"drains": [1.0, 2.0, 3.0]}, "drains: expected points"),
         ({"downstream_pressure": 2 * HEAD}, "less than upstream_pressure"),
         ({"upstream": "NE"}, "upstream"),
+        ({"upstream": ("x", 99.0)}, "upstream: expected a line inside"),
+        ({"upstream": ("z", 1.0)}, "upstream: expected 'W'"),
+        ({"downstream": "W"}, "downstream: expected another edge"),
+        ({"total_stress": 1e6}, "whose nominal_pressure rises"),
+        ({"total_stress": 1e6, "normal_stiffness": 1e9}, "expected one of them"),
     ],
 )
 def test_wrong_arguments_are_named(make_face, options, message):

@@ -134,6 +134,7 @@ REQUIREMENTS = {
     "joints/partial_slip": _SOLVER,
     "partial_slip": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
+    "joints/uplift": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover")),
     "domains/box_counts": Requirement(_SPECIAL, ("mean cover",)),
     "domains/box_counts/minimum": Requirement((), ("minimum cover",)),

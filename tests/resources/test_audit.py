@@ -24,6 +24,7 @@ block = 1.2e-3
 shear = [1e-4]
 structure_size = [1.0, 10.0]
 unit_weight = 24e3
+upstream_pressure = 1e4
 [domains.generalised_dimensions]
 q = [0.0, 2.0]
 [want]
@@ -42,6 +43,7 @@ WANTED = {
         "friction",
         "decorrelation_length",
         "transmissivity",
+        "uplift",
         "delta_dimension",
         "elimination",
         "area_dimension",
@@ -58,6 +60,7 @@ WORDS = {
 ALSO = {
     "joints/friction": {"joints/rigid_dilatancy"},
     "joints/transmissivity": {"joints/closure"},
+    "joints/uplift": {"joints/closure"},
 } | {word: {"joints/closure"} for word in WORDS if word.startswith("domains/")}
 NAMED = {
     "surfaces/height": "surfaces",
