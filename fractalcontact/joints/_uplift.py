@@ -421,10 +421,10 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
     arms = [flow.sense * (centres[axis] - upstream.place)]
     means, profiles, points = [mean], [profile], [centres]
     for place, p in knots.values():
-        a, b, step = p[:-1], p[1:], np.diff(place)
+        a, b, step = p[:-1] / p[0], p[1:] / p[0], np.diff(place)
         force = (a + b) / 2.0 * step
         arm = (force * place[:-1] + step**2 * (a + 2.0 * b) / 6.0).sum() / force.sum()
-        means.append(np.full_like(mean, force.sum() / length))
+        means.append(np.full_like(mean, p[0] * force.sum() / length))
         arms.append(np.full_like(mean, arm))
         profiles.append(np.broadcast_to(np.interp(flow.distances(), place, p), profile.shape))
         middle = [0.5 * extent for extent in grid.extent]

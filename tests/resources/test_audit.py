@@ -24,6 +24,7 @@ block = 1.2e-3
 shear = [1e-4]
 structure_size = [1.0, 10.0]
 unit_weight = 24e3
+[joint.uplift]
 upstream_pressure = 1e4
 [domains.generalised_dimensions]
 q = [0.0, 2.0]

@@ -1,0 +1,208 @@
+"""A joint whose faces wear: pressed at a hardness, and moved in balance with its normal force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import fractalcontact as fc  # loads `contact` on first use
+from fractalcontact.joints._closure import Pressing, ShearedContact
+from fractalcontact.joints._compass import Direction
+from fractalcontact.joints._crack import Crack
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.joints.direct_shear"
+LOAD_ERROR = 1e-3  # relative error of the load on the contacts
+MAX_SOLUTIONS = 40  # for one such load
+SMALLEST_FORCE = 1e-6  # of the load of the step before: a spring may unload the block entirely
+CAPACITY = 1.0 - 1e-9  # largest load over hardness times area
+BRACKET, LOWEST = 0.5, 40.0  # steps of the logarithm of the load, and its range below the capacity
+UNLOADED = 0.5  # the elastic stiffness is that of unloading to this share of the load
+
+
+@dataclass(frozen=True)
+class State:
+    """The joint under a load: height of the block and closure (m), energies (J), and what is worn off (m)."""
+
+    height: float
+    closure: float
+    elastic_energy: float
+    plastic_work: float
+    wear: Array
+    contact_fraction: float
+
+
+@dataclass(frozen=True)
+class ShearStep:
+    """One step of shear and the state at its end.
+
+    `load` P on the contacts (N) is constant over the step. `rise` d is that of the block over its slip, and
+    `wear` w the work of wear with the change of the elastic energy, over load and slip.
+    """
+
+    load: float
+    rise: float
+    wear: float
+    state: State
+
+    def forces(self, friction: float) -> tuple[float, float]:
+        """Return normal and tangential force (N): N = P (1 - mu d), T = P (d + w + mu)."""
+        return self.load * (1.0 - friction * self.rise), self.load * (self.rise + self.wear + friction)
+
+
+class WornJoint:
+    """A crack with the wear of both its faces, which grows as it is pressed."""
+
+    def __init__(self, crack: Crack, towards: Direction, options: fc.contact.ContactOptions) -> None:
+        lower, upper = crack.faces()
+        self.crack, self.towards = crack, towards
+        self.capacity = CAPACITY * float(options.hardness or math.inf) * crack.nominal_area
+        self.pressing = Pressing(
+            fc.contact.LoadPath("normal_force", (0.0,)), options, "flat_block", (), WHERE
+        )
+        self.elastic = replace(self.pressing, options=replace(options, hardness=None))
+        self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
+        self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
+        self.unconverged = 0
+
+    def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
+        """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
+        lower, upper = self.faces()
+        worn = replace(self.crack, lower=lower, upper=upper)
+        return ShearedContact(worn, position, self.towards, self.elastic if elastic else self.pressing)
+
+    def press(self, contact: ShearedContact, load: float) -> State:
+        """Press a contact of this joint under a load, N."""
+        columns = contact.press(fc.contact.LoadPath("normal_force", (load,)), ("residual_height",))
+        heights = np.asarray(contact.surface.values)
+        self.residual = max(self.residual, float(columns["residual"][0]))
+        self.steepest = max(self.steepest, float(columns["rms_slope"][0]))
+        self.unconverged += int(not columns["converged"][0])
+        closure, energy, share = (
+            float(columns[name][0]) for name in ("interface_closure", "elastic_energy", "contact_fraction")
+        )
+        work = float(columns["plastic_work"][0]) if "plastic_work" in columns else 0.0
+        wear = heights - columns["residual_height"][0]
+        return State(float(heights.max()) - closure, closure, energy, work, wear, share)
+
+    def wear(self, position: float, state: State) -> None:
+        """Wear off what a press at a position wears off, half of it from each face."""
+        layout = self.crack.layout
+        shift = layout.shift(position, self.towards.unit)
+        rows, columns = (
+            (layout.start[axis] + int(shift[axis]) + np.arange(layout.cells[axis])) % layout.face_cells[axis]
+            for axis in (0, 1)
+        )
+        self.lower_wear[np.ix_(rows, columns)] += 0.5 * state.wear
+        self.upper_wear += 0.5 * state.wear
+        self.plastic_work += state.plastic_work
+
+    def faces(self) -> tuple[xr.DataArray, xr.DataArray]:
+        """Return the whole lower and upper face as they are worn now."""
+        whole = self.crack.lower if self.crack.upper is None else self.crack.upper
+        heights = np.array(whole.values, dtype=np.float64)
+        heights[self.crack.layout.slices] += self.upper_wear
+        return self.crack.lower.copy(data=self.crack.faces()[0] - self.lower_wear), whole.copy(data=heights)
+
+    def report(self, state: State, first: float) -> dict[str, float]:
+        """Return what is reported of a state, with the height of the block at the start."""
+        volume = float(self.lower_wear.sum() + self.upper_wear.sum()) * math.prod(self.crack.layout.spacing)
+        return {
+            "dilatancy": state.height - first,
+            "wear_depth": volume / self.crack.nominal_area,
+            "worn_fraction": float(np.mean(self.upper_wear > 0)),
+            "contact_fraction": state.contact_fraction,
+            "plastic_work": self.plastic_work,
+        }
+
+
+def shear_stiffness(joint: WornJoint, position: float, load: float) -> float:
+    """Return the elastic shear stiffness (Pa/m) in full stick, from the normal stiffness of unloading.
+
+    Contacts that stick have the ratio 2 (1 - nu)/(2 - nu) of tangential to normal stiffness (Mindlin 1949).
+    """
+    contact = joint.contact(position)
+    closed = [joint.press(contact, part * load).closure for part in (1.0, UNLOADED)]
+    nu, unloading = joint.crack.contact_poisson, closed[0] - closed[1]
+    if unloading <= 0:
+        return math.inf
+    stiffness = (1.0 - UNLOADED) * load / unloading / joint.crack.nominal_area
+    return 2.0 * (1.0 - nu) / (2.0 - nu) * stiffness
+
+
+def balanced_step(
+    joint: WornJoint,
+    here: float,
+    there: float,
+    start: float,
+    friction: float,
+    normal_force: Callable[[float], float],
+) -> ShearStep | None:
+    """Move the block by one step and wear the faces; None if no load on the contacts balances.
+
+    The load P on the contacts is that at which N = P (1 - mu d) is the normal force. The rise d falls as P
+    grows, so that there is one such load. Where contacts yield all at once d jumps; the step is then the mean
+    of those on both sides that has the normal force.
+    """
+
+    def excess(log_load: float) -> tuple[float, ShearStep]:
+        step = _moved(joint, contacts, abs(there - here), math.exp(log_load))
+        wanted = max(normal_force(step.state.height), 0.0)
+        return step.forces(friction)[0] / max(wanted, start * SMALLEST_FORCE) - 1.0, step
+
+    contacts = joint.contact(here, elastic=True), joint.contact(there)
+    limit = math.log(joint.capacity)
+    low = high = min(math.log(start), limit)
+    below = above = excess(low)
+    while below[0] > 0 and low > limit - LOWEST:
+        high, above = low, below
+        low -= BRACKET
+        below = excess(low)
+    while above[0] < 0 and high < limit:
+        low, below = high, above
+        high = min(high + BRACKET, limit)
+        above = excess(high)
+    if below[0] > 0 or above[0] < 0:
+        return None
+    for turn in range(MAX_SOLUTIONS):
+        if high - low <= LOAD_ERROR or min(above[0], -below[0]) <= LOAD_ERROR:
+            break
+        share = 0.5 if turn % 2 else above[0] / (above[0] - below[0])  # bisection and secant in turn
+        middle = high + share * (low - high)
+        value = excess(middle)
+        if value[0] < 0:
+            low, below = middle, value
+        else:
+            high, above = middle, value
+    span = above[0] - below[0]
+    step = _mean(above[1], below[1], above[0] / span if span > 0 else 0.0)
+    joint.wear(there, step.state)
+    return step
+
+
+def _mean(first: ShearStep, second: ShearStep, share: float) -> ShearStep:
+    """Return the mean of two steps, the second with this share."""
+
+    def mix(one: Any, two: Any) -> Any:
+        if isinstance(one, State):
+            return State(*(mix(getattr(one, each.name), getattr(two, each.name)) for each in fields(State)))
+        return one + share * (two - one)
+
+    return ShearStep(
+        *(mix(getattr(first, each.name), getattr(second, each.name)) for each in fields(ShearStep))
+    )
+
+
+def _moved(
+    joint: WornJoint, contacts: tuple[ShearedContact, ShearedContact], slip: float, load: float
+) -> ShearStep:
+    """Return the step between two positions under a load, which is taken up elastically before it."""
+    before, after = (joint.press(contact, load) for contact in contacts)
+    energy = after.elastic_energy + after.plastic_work - before.elastic_energy
+    return ShearStep(load, (after.height - before.height) / slip, energy / (load * slip), after)
