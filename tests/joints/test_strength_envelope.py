@@ -30,6 +30,15 @@ def test_patton_is_bilinear(surface):
     np.testing.assert_allclose(found, [35.7526, 38.794, 43.0940], rtol=1e-4)
 
 
+@pytest.mark.parametrize("ratio", [5.0, 10.0, 20.0])
+def test_strength_of_the_material_is_the_parabola_of_fairhurst(surface, ratio):
+    """Its vertex is the tensile strength, and it touches the circle of uniaxial compression (0 to JCS)."""
+    found, _ = strength(surface, "ladanyi_archambault", [100], tensile_strength=100 * MPA / ratio)
+    height = (found / 100) ** 2 / (1 + 1 / ratio)  # of tau^2 above the vertex, in units of JCS
+    # tau^2 = height (sigma + 1/ratio) meets sigma (1 - sigma) in one point
+    np.testing.assert_allclose((height - 1) ** 2 - 4 * height / ratio, 0, atol=1e-12)
+
+
 def test_ladanyi_archambault_by_hand(surface):
     # at 10 MPa: a = 1 - 0.9^1.5 = 0.146185, v = 0.9^4 tan 20 = 0.238802, s_r = 100 (sqrt 11 - 1)/10 sqrt 2
     # = 32.7620: (10 * 0.853815 * 0.816152 + 0.146185 * 32.7620)/(1 - 0.853815 * 0.238802 * 0.577350)
