@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.results import provenance_of
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
@@ -25,10 +26,20 @@ if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray
 
 A4 = (8.27, 11.69)  # inches
-ROWS = (0.7, 3.0, 2.7, 2.5, 2.3)  # relative heights: title, strength, shear, stiffness and flow, limits
+ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
 COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
 FLOW_LINES = ("-", (0, (4, 2)))
 STIFFNESS, FLOW = Scale(1e9, "MPa/mm"), Scale(1.0, "m³")
+# what a consultant has to answer for, with its symbol and its unit
+INPUTS = {
+    "young": ("E", "Pa"),
+    "poisson": ("ν", ""),
+    "basic_friction_angle": ("φb", ""),
+    "residual_friction_angle": ("φr", ""),
+    "cohesion": ("c", "Pa"),
+    "wall_strength": ("JCS", "Pa"),
+    "hardness": ("hardness", "Pa"),
+}
 ROUGHNESS = ("roughness_coefficient", "directional_roughness")
 GROUPS = ("strength_envelope", "direct_shear", "shear_curve", "closure", "transmissivity")
 
@@ -44,7 +55,7 @@ def datasheet(
     tree : DataTree
         From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
         joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
-        closure and transmissivity. Panels without data stay empty.
+        closure, transmissivity and uplift. Panels without data stay empty.
     notes : sequence of str
         Sentences to print with the limits of validity that the results state themselves.
     figure : Figure, optional
@@ -74,7 +85,7 @@ def datasheet(
     >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
     [8.27, 11.69]
     """
-    found = {name: group(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS)}
+    found = {name: group(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
     with Problems("fractalcontact.plotting.datasheet") as problems:
         expected = f"at least one of joints/{', joints/'.join(found)}"
         problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
@@ -95,8 +106,9 @@ def _draw_page(
     panels: dict[str, Axes] = {}
     parts: Any = page.subfigures(len(ROWS), 1, height_ratios=ROWS)
     title = str(tree.attrs.get("title") or tree.name or "joint")
-    parts[0].text(0.03, 0.6, title, size=13, weight="bold", va="center")
-    parts[0].text(0.03, 0.2, _source(tree), size=8, color=_style.grey(), va="center")
+    parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
+    facts = "\n".join([_source(tree), *_input_lines(found)])
+    parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
     left.text(0.08, 0.93, "\n".join(_roughness_lines(found)), size=8, va="top", linespacing=1.5)
     if found["strength_envelope"] is not None:
@@ -132,6 +144,32 @@ def _source(tree: xr.DataTree) -> str:
     return f"face of {edges}, {spacing} apart; {version}"
 
 
+def _input_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
+    """Yield what was scanned, and the constants of the material and the direction that were assumed."""
+    stated: dict[str, Any] = {}
+    for name in ("closure", "direct_shear", "shear_curve", "strength_envelope"):
+        data = found[name]
+        stated |= {} if data is None else provenance_of(data).get("parameters", {})
+    crack = stated.get("crack")
+    if isinstance(crack, dict):
+        stated = crack | stated
+        block, cells = crack["block"][-1], crack["block_cells"][-1]
+        edges = " x ".join(quantity_text(n * block / cells, "m") for n in crack["lower"]["dims"].values())
+        faces = "mated copy above" if crack["upper"] == "mated" else "both faces scanned"
+        sides = " x ".join(quantity_text(side, "m") for side in crack["block"])
+        yield f"face of {edges}, heights {quantity_text(block / cells, 'm')} apart, {faces}; block of {sides}"
+    texts = []
+    for key, (symbol, units) in INPUTS.items():
+        values = np.ravel(stated[key] if stated.get(key) is not None else [])
+        if values.size:
+            shown = ", ".join(quantity_text(float(v), units) if units else f"{float(v):g}" for v in values)
+            texts.append(f"{symbol} {shown}{'°' if key.endswith('angle') else ''}")
+    if "direction" in stated:
+        texts.append(f"shear towards {stated['direction']}")
+    if texts:
+        yield "assumed: " + "; ".join(texts)
+
+
 def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
     """Yield the lines of the roughness and of the strength in numbers."""
     coefficient, facets, tests = (found[name] for name in (*ROUGHNESS, "direct_shear"))
@@ -142,6 +180,9 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
             low, high = float(row["roughness_coefficient_low"]), float(row["roughness_coefficient_high"])
             spread = f"  (profiles {low:.1f} to {high:.1f})" if np.isfinite(low + high) else ""
             yield f"  JRC {direction}: {float(row['roughness_coefficient']):.1f}{spread}"
+        lags, intervals = (np.unique(coefficient[name]) for name in ("lag", "regression_interval"))
+        read, fitted = ([quantity_text(float(v), "m") for v in values] for values in (lags, intervals))
+        yield f"      read every {', '.join(read)}; regression {', '.join(fitted)}"
     if facets is not None:
         metric = facets["roughness_metric"]
         places = (int(np.argmin(metric.values)), int(np.argmax(metric.values)))
@@ -154,12 +195,31 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
         yield f"  asperity angle: {float(envelope['asperity_angle']):.1f}°"
     if tests is not None:
         yield ""
-        yield "Direct shear: peak, residual"
+        yield "Direct shear: peak (its angle), residual"
         for i in range(tests.sizes["nominal_pressure"]):
             row = tests.isel(nominal_pressure=i)
             texts = [quantity_text(float(row[name]), "Pa") for name in
                      ("nominal_pressure", "peak_shear_strength", "residual_shear_strength")]  # fmt: skip
-            yield f"  {texts[0]}: {texts[1]}, {texts[2]} ({float(row['peak_friction_angle']):.0f}°)"
+            angle = float(row["peak_friction_angle"])
+            yield f"  under {texts[0]}: {texts[1]} ({angle:.0f}°), {texts[2]}"
+    water = found["uplift"]
+    if water is not None:
+        yield ""
+        yield from _uplift_lines(water)
+
+
+def _uplift_lines(water: xr.Dataset) -> Iterator[str]:
+    """Yield the uplift at the greatest load beside the diagrams of guidelines, one line per shear."""
+    yield "Uplift, over the linear diagram"
+    last = water.isel(step=-1) if "step" in water.dims else water
+    shears = np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]
+    for shear in shears:
+        row = last.sel(shear=shear) if "shear" in last.dims else last
+        place = "" if shear is None else f"at shear {quantity_text(float(shear), 'm')}: "
+        force = row["uplift_force"]
+        joint = float(force.sel(diagram="joint"))
+        share = f" ({joint / float(force.sel(diagram='linear')):.0%})" if "linear" in force.diagram else ""
+        yield f"  {place}{quantity_text(joint, 'N')}{share}" if np.isfinite(joint) else f"  {place}no balance"
 
 
 def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | None) -> AxesArray:
@@ -220,10 +280,11 @@ def _limits(found: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterat
     if envelope is not None:
         texts |= dict.fromkeys(_criteria(envelope))
     for name, data in found.items():
-        for variable in () if data is None else data.data_vars.values():
+        for variable in () if data is None else data.drop_vars("bulk_closure", errors="ignore").values():
             comment = str(variable.attrs.get("comment", ""))
             if comment and not comment.startswith(("NaN", "outside the range of the criterion")):
-                texts[f"{name.replace('_', ' ')}: {comment}"] = None
+                quantity = str(variable.attrs.get("long_name", name.replace("_", " ")))
+                texts[f"{quantity}: {comment}"] = None
     if found["direct_shear"] is not None:
         texts["direct shear: one hardness, no gouge, no cohesion; no asperity smaller than the spacing"] = (
             None

@@ -24,6 +24,7 @@ def tree():
         "direct_shear": fc.joints.direct_shear(crack, 1e-3, nominal_pressure=pressures[:2], hardness=6e7),
         "closure": closed.drop_vars("gap"),
         "transmissivity": fc.joints.transmissivity(closed["gap"]),
+        "uplift": fc.joints.uplift(closed["gap"], upstream_pressure=1e5),
     }
     tree = xr.DataTree.from_dict({f"/joints/{name}": data for name, data in groups.items()})
     tree.attrs["title"] = "Joint under the spillway"
@@ -58,8 +59,14 @@ def test_words_are_those_of_the_results(tree):
         f"JRC E: {coefficient:.1f}",
         "islands of few cells",
         "hardness",
+        "face of 24 mm x 24 mm, heights 0.5 mm apart, mated copy above; block of 16 mm x 16 mm",
+        "assumed: E 30 GPa; ν 0.2; φb 30°; JCS 60 MPa; hardness 60 MPa; shear towards E",
+        "read every 0.5 mm; regression 0.508 mm",
     ):
         assert expected in shown, expected
+    water = tree["joints/uplift"].isel(step=-1, shear=1).uplift_force
+    share = float(water.sel(diagram="joint") / water.sel(diagram="linear"))
+    assert f"at shear 2 mm: {float(water[0]):.3g} N ({share:.0%})" in shown
     assert "xia: fresh mated fractures" in shown
     assert "drawn in range from 1 MPa to 4 MPa" in shown  # not at 50 of 60 MPa
 
