@@ -83,6 +83,8 @@ CALLS = {
     "contact.flat_stiffness": lambda _: fc.contact.flat_stiffness((20, 20), 1e-4, contact_modulus=1e9),
     "dimensions.methods": lambda _: fc.dimensions.methods(),
     "joints.Crack": lambda _: labels.crack().faces()[0],
+    "joints.bandis_aperture": lambda _: fc.joints.bandis_aperture(10.0, 50e6, 100e6),
+    "joints.hydraulic_aperture": lambda _: fc.joints.hydraulic_aperture(1e-4, roughness=10.0),
     "joints.bandis_constants": lambda _: fc.joints.bandis_constants(10.0, 100e6, 0.2e-3),
     "joints.bandis_closure": lambda _: fc.joints.bandis_closure(
         1e6, initial_stiffness=1e10, greatest_closure=1e-3

@@ -83,6 +83,18 @@ def flow():
 
 
 @functools.cache
+def laws():
+    return fc.joints.closure_laws(closed())
+
+
+@functools.cache
+def distributed():
+    return fc.contact.press(
+        rough(), contact_modulus=1e9, nominal_pressure=[1e4, 1e5], also=["pressure_distribution"]
+    )
+
+
+@functools.cache
 def watered():
     return fc.joints.uplift(pressed()["gap"].isel(step=0), upstream_pressure=1e5)
 
@@ -161,6 +173,10 @@ CALLS = {
     "contact.partial_slip": lambda: PRESS
     | {"surface": periodic(), "poisson": 0.2, "friction_coefficient": 0.5, "tangential_force": 0.01},
     "joints.Crack": lambda: {"lower": rough(), "upper": rough() + 1e-5, "young": 1e10, "poisson": 0.2},
+    "joints.bandis_aperture": lambda: {
+        "roughness": 10, "wall_strength": 5e7, "compressive_strength": 1e8,
+    },
+    "joints.hydraulic_aperture": lambda: {"aperture": 1e-4, "roughness": 10},
     "joints.bandis_closure": lambda: {
         "nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4,
     },
@@ -210,6 +226,10 @@ CALLS = {
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
     "plotting.contact_domains": lambda: {"result": pressed()},
     "plotting.contact_area": lambda: {"result": closed()},
+    "plotting.closure_fits": lambda: {"closure": closed(), "laws": laws()},
+    "plotting.mean_gap": lambda: {"result": closed()},
+    "plotting.stiffness": lambda: {"result": laws()},
+    "plotting.pressure_distribution": lambda: {"result": distributed()},
     "plotting.closure_laws": lambda: {"closure": closed()},
     "plotting.rigid_dilatancy": lambda: {"dilatancy": slid()},
     "plotting.elastic_dilatancy": lambda: {"dilatancy": slid(), "direction": "E"},

@@ -16,10 +16,12 @@ SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints")
 UNLABELLED = {
     "joints.Crack",
     "joints.PARK_PAULAY",
+    "joints.bandis_aperture",
     "joints.bandis_closure",
     "joints.bandis_constants",
     "joints.barton_bandis_scaled",
     "joints.barton_choubey_strength",
+    "joints.hydraulic_aperture",
     "joints.self_weight_strength",
     "joints.size_effect",
     "contact.ContactOptions",
@@ -109,7 +111,7 @@ CALLS = {
         crack(), shear=[1e-4], normal_force=[1.0, 10.0], keep=("state",)
     ),
     "joints.closure_laws": lambda: fc.joints.closure_laws(
-        fc.joints.closure(crack(), shear=[1e-4], normal_force=[1.0, 3.0, 10.0, 30.0])
+        fc.joints.closure(crack(), shear=[1e-4], normal_force=[1.0, 3.0, 10.0, 30.0]), seating_pressure=1e5
     ),
     "joints.cyclic_shear": lambda: fc.joints.cyclic_shear(
         slid().sel(direction=["E", "W"]), [0.0, 3e-4, -3e-4, 0.0]

@@ -86,6 +86,8 @@ CALLS = {
     "joints.uplift": {
         "gap": SURFACE - SURFACE.min(), "upstream_pressure": 1e5, "normal_stiffness": 1e10,
     },
+    "joints.bandis_aperture": {"roughness": 10, "wall_strength": 5e7, "compressive_strength": 1e8},
+    "joints.hydraulic_aperture": {"aperture": 1e-4, "roughness": 10},
     "joints.bandis_closure": {"nominal_pressure": 1e6, "initial_stiffness": 1e9, "greatest_closure": 1e-4},
     "joints.bandis_constants": {"roughness": 10, "wall_strength": 1e8, "aperture": 1e-4},
     "joints.barton_bandis_scaled": {"roughness": 10, "wall_strength": 1e8, "length": 1.0},

@@ -71,6 +71,10 @@ _SCALE_POSITION = {
     "flag_values": np.array([-1, 0, 1], dtype=np.int8),
     "flag_meanings": "below inside above",
 }
+_PREFERRED_LAW = {
+    "flag_values": np.array([0, 1, 2, 3], dtype=np.int8),
+    "flag_meanings": "undecided exponential hyperbolic neither",
+}
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_FACET = {"comment": "NaN where no facet faces the shear"}
@@ -210,6 +214,14 @@ QUANTITIES: dict[str, Quantity] = {
     "tangential_force": Quantity("N", "tangential force on the upper body, positive towards the azimuth"),
     "tangential_displacement": Quantity("m", "elastic displacement of the upper body along the azimuth"),
     "tangential_stiffness": Quantity("N m-1", "increment of tangential force over that of displacement"),
+    "contact_stiffness": Quantity("Pa m-1", "derivative of the nominal pressure by the closure"),
+    "relative_conductance": Quantity(
+        "m-1", "contact conductance per nominal area over the mean conductivity 2/(rho1 + rho2)"
+    ),
+    "maximum_pressure": Quantity("Pa", "greatest pressure in the contact"),
+    "pressure_class": Quantity("1", "middle of a class of pressures, over the greatest pressure"),
+    "area_share": Quantity("1", "share of the nominal area with a pressure of the class"),
+    "load_share": Quantity("1", "share of the force borne at a pressure of the class"),
     "interface_stiffness": Quantity("Pa m-1", "normal stiffness of the interface per nominal area"),
     "stiffness_ratio": Quantity("1", "shear stiffness of the interface over its normal stiffness"),
     "stuck_ratio": Quantity("1", "theory for that ratio where nothing slips: 2 (1 - nu)/(2 - nu)"),
@@ -226,6 +238,7 @@ QUANTITIES: dict[str, Quantity] = {
     "m0": Quantity("m2", "mean square height"),
     "m2": Quantity("1", "mean square slope of the profiles of an isotropic surface"),
     "m4": Quantity("m-2", "mean square second derivative of the profiles of an isotropic surface"),
+    "pressure_spread": Quantity("Pa", "standard deviation of the pressure in complete contact, E* g/2"),
     # joints
     "bulk_closure": Quantity("m", "closure of the flat block under the same force"),
     "interface_closure": Quantity("m", "closure without that of the flat block"),
@@ -262,6 +275,18 @@ QUANTITIES: dict[str, Quantity] = {
     "initial_stiffness": Quantity("Pa m-1", "normal stiffness at zero pressure of the hyperbolic law"),
     "greatest_closure": Quantity("m", "greatest closure of the hyperbolic law"),
     "hyperbolic_misfit": Quantity("m", "root mean square difference from the hyperbolic law"),
+    "closure_length_low": Quantity("m", "lower end of the 95 % interval of the closure length"),
+    "closure_length_high": Quantity("m", "upper end of the 95 % interval of the closure length"),
+    "reference_pressure_low": Quantity("Pa", "lower end of the 95 % interval of the reference pressure"),
+    "reference_pressure_high": Quantity("Pa", "upper end of the 95 % interval of the reference pressure"),
+    "initial_stiffness_low": Quantity("Pa m-1", "lower end of the 95 % interval of the initial stiffness"),
+    "initial_stiffness_high": Quantity("Pa m-1", "upper end of the 95 % interval of the initial stiffness"),
+    "greatest_closure_low": Quantity("m", "lower end of the 95 % interval of the greatest closure"),
+    "greatest_closure_high": Quantity("m", "upper end of the 95 % interval of the greatest closure"),
+    "preferred_law": Quantity("1", "law that the closures of the first loading prefer", _PREFERRED_LAW),
+    "law_score": Quantity("1", "statistic of Vuong, exponential against hyperbolic law"),
+    "seating_pressure": Quantity("Pa", "nominal pressure from which the closure is counted"),
+    "seated_closure": Quantity("m", "interface closure counted from the seating pressure"),
     "roughness_coefficient": Quantity("1", "joint roughness coefficient JRC"),
     "roughness_coefficient_low": Quantity("1", "JRC below which 2.5 % of the single profiles lie"),
     "roughness_coefficient_high": Quantity("1", "JRC above which 2.5 % of the single profiles lie"),

@@ -15,14 +15,24 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-UNDETERMINED = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
+UNDETERMINED = (
+    "normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement",
+    "maximum_pressure", "area_share", "load_share",
+)  # fmt: skip
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
 BEYOND_SMALL_STRAINS = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
+ALSO = ("stiffness", "pressure_distribution")
+PRESSURE_CLASSES = 50  # of a distribution of pressures, from 0 to the greatest of the step
+PUNCH_TOLERANCE = 1e-4  # the error of the stiffness is about its square
+NO_STIFFNESS = (
+    "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
+)
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -32,6 +42,7 @@ def _check(
     surface: Any,
     contact_modulus: Any,
     keep: Any,
+    also: Any,
     closure: Any,
     normal_force: Any,
     nominal_pressure: Any,
@@ -42,6 +53,7 @@ def _check(
     problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
+    problems.choices("also", also, ALSO)
     options = problems.construct(ContactOptions, **keywords)
     load = problems.construct(
         LoadPath.from_keywords,
@@ -75,14 +87,14 @@ def press(
     tolerance: float = 1e-8,
     method: str = "fast",
     keep: Sequence[str] = ("state",),
+    also: str | Sequence[str] = (),
     progress: bool = False,
 ) -> xr.Dataset:
     """Press a rigid flat down on a rough elastic surface, without friction or adhesion.
 
-    At every node gap >= 0 and pressure >= 0, and one of them is zero, with
-    gap = (top - height) + displacement - closure and top the greatest height. Heights count up, closure and
-    displacement down; pressure is positive in compression. Theory, error control and measured accuracy: page
-    `theory_contact`.
+    At every node gap >= 0 and pressure >= 0, and one of them is zero, with gap = (top - height) +
+    displacement - closure and top the greatest height. Heights count up, closure and displacement down;
+    pressure is positive in compression. Theory and measured accuracy: page `theory_contact`.
 
     Parameters
     ----------
@@ -108,6 +120,8 @@ def press(
         Constrained conjugate gradients, or the dense active set of the 1998 paper for small surfaces.
     keep : any of "state", "pressure", "gap", "displacement", "residual_height"
         Maps (step, y, x) to return: flags open, contact, yielded; Pa; m; m; heights after unloading (m).
+    also : any of "stiffness", "pressure_distribution"
+        Further results: stiffness and conductance, from one more solution a step; shares of the pressures.
     progress : bool
         Show a progress bar over the steps.
 
@@ -117,8 +131,9 @@ def press(
         Coordinates closure, normal_force, nominal_pressure; contact_area, contact_fraction,
         corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
         transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
-        rms_slope of the surface, disc_radius ("disc"). NaN where a periodic body is closed beyond its
-        mean plane.
+        rms_slope, disc_radius ("disc"). NaN where a periodic body is closed beyond its mean plane.
+        "stiffness": contact_stiffness (Pa m-1), dp/dclosure, and relative_conductance (m-1), that over E*.
+        "pressure_distribution": maximum_pressure (Pa); over pressure_class area_share and load_share.
 
     Raises
     ------
@@ -130,15 +145,14 @@ def press(
     ConvergenceWarning
         A step stopped before its tolerance was met, or its force is not determined.
     SmallStrainWarning
-        The rms slope of the surface is above 0.3: strains are about half of it where asperities are
-        flattened, and terms of the order of its square, a tenth, are left out.
+        The rms slope of the surface is above 0.3: strains, about half of it, are not small.
 
     References
     ----------
     Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3 ("elimination"); Polonsky and Keer (1999), Wear
-    231:206 ("fast"); Stanley and Kato (1997), J. Tribol. 119:481 (2/(E* |q|) of periodic bodies); Love
-    (1929), Phil. Trans. A 228:377 ("square"); Yastrebov, Anciaux and Molinari (2017), Tribol. Int. 114:161
-    (perimeter correction of the contact fraction).
+    231:206 ("fast"); Stanley and Kato (1997), J. Tribol. 119:481 (periodic); Love (1929), Phil. Trans. A
+    228:377 ("square"); Yastrebov, Anciaux and Molinari (2017), Tribol. Int. 114:161 (corrected area); Barber
+    (2003), Proc. R. Soc. A 459:53 (conductance, see page `theory_contact`).
 
     Examples
     --------
@@ -149,8 +163,7 @@ def press(
     >>> x = 1e-4 * np.arange(-20, 21)
     >>> ball = fc.surfaces.from_array(-(x**2 + x[:, None] ** 2) / 2, 1e-4)
     >>> pressed = fc.contact.press(ball, contact_modulus=1e9, closure=2e-6)
-    >>> hertz = 4 / 3 * 1e9 * 2e-6**1.5
-    >>> round(float(pressed["normal_force"][0]) / hertz, 3)
+    >>> round(float(pressed["normal_force"][0]) / (4 / 3 * 1e9 * 2e-6**1.5), 3)
     1.0
     """
     options = ContactOptions(boundary, influence, disc_radius, hardness, tolerance, method)
@@ -160,11 +173,11 @@ def press(
     grid = read_grid(surface)
     heights = np.asarray(surface.values, dtype=np.float64)
     path = scaled_path(heights, grid, float(contact_modulus), options, load)
-    names = word_tuple(keep)
+    names, further = word_tuple(keep), Further(word_tuple(also), grid, float(contact_modulus))
     scalars: list[dict[str, Any]] = []
     maps: dict[str, list[Array]] = {name: [] for name in names}
     for step in track(solve_path(path), progress, "press", total=len(path.values)):
-        scalars.append(_scalars(step, grid, path.body.periodic))
+        scalars.append(_scalars(step, grid, path.body.periodic) | further.of(step))
         for name in names:
             maps[name].append(np.asarray(MAPS[name](step, heights)))
     slope = rms_slope(heights, grid)
@@ -238,6 +251,53 @@ def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
     }
 
 
+class Further:
+    """The results in `also`, step by step."""
+
+    def __init__(self, names: Sequence[str], grid: Grid, contact_modulus: float) -> None:
+        self.names, self.grid, self.modulus = names, grid, contact_modulus
+        self.latest: Step | None = None
+
+    def of(self, step: Step) -> dict[str, Any]:
+        """Return them for a step."""
+        found: dict[str, Any] = {}
+        if "stiffness" in self.names:
+            found["contact_stiffness"] = stiffness = self.stiffness(step)
+            found["relative_conductance"] = stiffness / self.modulus
+        if "pressure_distribution" in self.names:
+            found |= _pressure_distribution(step.pressure)
+        return found
+
+    def stiffness(self, step: Step) -> float:
+        """Return the derivative of the nominal pressure by the closure, Pa/m; NaN where it has no bound."""
+        before, self.latest = self.latest, step
+        if not step.force > 0:
+            return 0.0 if step.force == 0 else np.nan
+        guess = None
+        if before is not None:  # roughly the derivative of the pressure
+            change = np.abs(step.solution.pressure - before.solution.pressure)
+            guess = np.where(step.contact, change, 0.0)
+        punch = press_punch(step, guess, tolerance=PUNCH_TOLERANCE)
+        stiffness = np.inf if punch is None else stiffness_of(punch) / self.grid.nominal_area
+        return float(stiffness) if np.isfinite(stiffness) else np.nan
+
+
+def _pressure_distribution(pressure: Array) -> dict[str, Any]:
+    """Return the greatest pressure (Pa), and the shares of area and load in each class of pressures.
+
+    The area is that of the whole extent, the open part of which is in no class.
+    """
+    greatest = float(pressure.max())
+    if not greatest > 0:
+        none = np.full(PRESSURE_CLASSES, 0.0 if greatest == 0 else np.nan)
+        return {"maximum_pressure": greatest, "area_share": none, "load_share": none}
+    relative = pressure[pressure > 0] / greatest
+    number = np.minimum((relative * PRESSURE_CLASSES).astype(np.int64), PRESSURE_CLASSES - 1)
+    area = np.bincount(number, minlength=PRESSURE_CLASSES) / pressure.size
+    load = np.bincount(number, relative, minlength=PRESSURE_CLASSES)
+    return {"maximum_pressure": greatest, "area_share": area, "load_share": load / load.sum()}
+
+
 def _dataset(
     surface: xr.DataArray,
     grid: Grid,
@@ -247,9 +307,14 @@ def _dataset(
     slope: float,
 ) -> xr.Dataset:
     """Return the Dataset over all steps, made at once: to add a variable later takes 0.3 ms."""
-    columns = {name: ("step", np.array([step[name] for step in scalars])) for name in scalars[0]}
+    columns: dict[str, Any] = {}
+    for name in scalars[0]:
+        values = np.array([step[name] for step in scalars])
+        columns[name] = (("step", "pressure_class")[: values.ndim], values)
     coords: dict[str, Any] = {name: columns.pop(name) for name in CONTROLS}
     coords["step"] = np.arange(len(scalars))
+    if "area_share" in columns:
+        coords["pressure_class"] = (np.arange(PRESSURE_CLASSES) + 0.5) / PRESSURE_CLASSES
     variables: dict[str, Any] = dict(columns)
     variables["nominal_area"] = grid.nominal_area
     variables["contact_modulus"] = path.units.modulus
@@ -270,6 +335,9 @@ def _add_reasons(result: xr.Dataset) -> None:
         for name in UNDETERMINED:
             if name in result.variables:
                 result[name].attrs["reason"] = BEYOND_REASON
+    if "contact_stiffness" in result and bool(result["contact_stiffness"].isnull().any()):
+        for name in ("contact_stiffness", "relative_conductance"):
+            result[name].attrs["reason"] = NO_STIFFNESS
 
 
 def _warn(result: xr.Dataset) -> None:

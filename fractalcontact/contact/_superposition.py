@@ -29,14 +29,12 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.schema import SLIP, STICK
+from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 FORCE_ROUNDING = 1e-12  # of the normal force: forces that differ by less share one solution
-STIFFNESS_TOLERANCE = (
-    0.03  # of the punch that the sticking contact is; the error of the stiffness is its square
-)
 
 
 @dataclass(frozen=True)
@@ -180,7 +178,7 @@ class Superposition:
         cells = int(np.count_nonzero(stick))
         punch = None
         if self.has_stiffness and number in self.latest:
-            punch = press_sticking_punch(step, self.expected_slope(step))
+            punch = press_punch(step, self.expected_slope(step))
         self.last_pressure = step.solution.pressure
         solutions = [step.solution] if punch is None else [step.solution, punch.solution]
         self.rows.append(
@@ -256,28 +254,3 @@ class Superposition:
             else:
                 plane[self.contact] = self.fields[name[:-2]][row] * factor * self.unit[name.endswith("y")]
         return planes
-
-
-def press_sticking_punch(step: Step, guess: Array | None) -> Step | None:
-    """Press a punch with the contact of `step` as its base, from a pressure; None where there is no contact.
-
-    The derivative of the force by the closure is the stiffness of that punch, because a node at the edge of
-    a contact bears no pressure. Away from the base the gap is more than the punch can close: its closure is
-    at most that of `step`, whose stiffness grows with the load.
-    """
-    if step.force <= 0:
-        return None
-    depth = 4 * step.solution.closure + 1.0
-    path = replace(
-        step.path,
-        gap=np.where(step.contact, 0.0, depth),
-        control="normal_force",
-        values=(step.force,),
-        tolerance=max(step.path.tolerance, STIFFNESS_TOLERANCE),
-    )
-    return next(solve_path(path, lambda _: guess))
-
-
-def stiffness_of(punch: Step) -> float:
-    """Return force over closure, in N/m: infinite in full contact of a periodic body."""
-    return punch.force / punch.closure if punch.closure > 0 else math.inf

@@ -20,7 +20,7 @@ from fractalcontact.contact._options import LoadPath, check_scale
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas")
+THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
 SMALL_CONTACT = 0.05  # contact fraction beyond which asperities no longer deform independently
 GAMMA = 0.45  # gamma of Yang and Persson (2008): elastic energy over that of complete contact, at small loads
 FULL = 26.0  # argument of erf at which contact is complete: exp(-FULL^2) is the smallest number
@@ -32,9 +32,12 @@ LAW = (
     f"greenwood_williamson and bush_gibson_thomas hold up to a contact fraction of {SMALL_CONTACT:g}, while "
     "asperities deform independently"
 )
-NONE = "NaN where a theory gives none: bush_gibson_thomas gives the area only"
+SMOOTH = 1e-3  # rms distance of a surface from a paraboloid, over its range: beyond, Hertz does not hold
+ROUND = 1e-6  # squared eccentricity below which an ellipse is a circle to rounding
+PARABOLOID = "hertz holds on one smooth summit without periods, while the contact is inside the surface"
+NONE = "NaN where a theory gives none: bush_gibson_thomas gives the area only, and hertz no gap"
 REASONS = {
-    "contact_fraction": f"NaN where a theory does not hold: {LAW}",
+    "contact_fraction": f"NaN where a theory does not hold: {LAW}; {PARABOLOID}",
     "mean_gap": f"{NONE}; without pressure the gap has no bound; {LAW}",
     "interface_stiffness": f"{NONE}; in complete contact it has no bound; {LAW}",
 }
@@ -58,7 +61,7 @@ def _check(
     references=(
         "Persson (2001), J. Chem. Phys. 115:3840; Yang and Persson (2008), J. Phys.: Cond. Matter 20:215214; "
         "Greenwood and Williamson (1966), Proc. R. Soc. A 295:300; McCool (1986), Wear 107:37; "
-        "Bush, Gibson and Thomas (1975), Wear 35:87"
+        "Bush, Gibson and Thomas (1975), Wear 35:87; Johnson (1985), Contact Mechanics, section 4.2 (Hertz)"
     ),
     achieved_error="that of the theories, which assume an isotropic Gaussian surface",
     check=_check,
@@ -88,8 +91,9 @@ def theories(
     Dataset over `theory` and `step`
         contact_fraction; mean_gap (m), between the mean planes; interface_stiffness (Pa m-1), minus the
         derivative of the pressure by the mean gap; coordinates nominal_pressure and normal_force (N).
-        Without dims: the spectral moments `m0` (m2), `m2` and `m4` (m-2) of the profiles, and
-        contact_modulus. NaN with the attribute `reason` where a theory gives no value or does not hold.
+        Without dims: the spectral moments `m0` (m2), `m2` and `m4` (m-2) of the profiles, pressure_spread
+        E* g/2 (Pa), the standard deviation of the pressure in complete contact, and contact_modulus. NaN with
+        the attribute `reason` where a theory gives no value or does not hold.
 
     Raises
     ------
@@ -105,6 +109,8 @@ def theories(
       variance from the moments (McCool). The mean gap neglects the deformation around the summits.
     - bush_gibson_thomas: the asymptote sqrt(2 pi) p/(E* g) at vanishing area, which the full theory leaves
       early.
+    - hertz: a single smooth summit, a paraboloid to 0.1 % of its range, and nothing else: the elliptical
+      contact and, as stiffness, the derivative of the pressure by the approach.
 
     The moments are sums over all modes of the spectrum: m0 the mean square height, m2 half the mean square
     gradient, m4 3/8 of the mean square Laplacian. A surface that is not periodic along both axes is first
@@ -118,16 +124,18 @@ def theories(
     >>> curves = fc.contact.theories(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
     >>> curves["contact_fraction"].sel(theory="persson").values.round(3).tolist()
     [0.016, 0.159]
-    >>> curves["contact_fraction"].isel(step=0).values.round(3).tolist()
-    [0.016, 0.013, 0.025]
+    >>> curves["contact_fraction"].isel(step=0).values.round(3).tolist()  # no single summit: no Hertz
+    [0.016, 0.013, 0.025, nan]
     """
     grid, pressure = read_grid(surface), float_array(nominal_pressure)
-    spectrum = _spectrum(np.asarray(surface.values, dtype=np.float64), grid)
+    heights = np.asarray(surface.values, dtype=np.float64)
+    spectrum = _spectrum(heights, grid)
     columns = np.full((3, len(THEORIES), pressure.size), math.nan)
     modulus = float(contact_modulus)
     if spectrum.slope > 0:
         columns[:, 0] = _persson(spectrum, pressure / modulus)
         columns[:, 1] = _greenwood_williamson(spectrum, pressure / modulus)
+        columns[[0, 2], 3] = _hertz(heights, grid, pressure / modulus)
         columns[0, 2] = _small(math.sqrt(2 * math.pi) * pressure / modulus / spectrum.slope)
     columns[2] *= modulus
     columns[~np.isfinite(columns)] = math.nan
@@ -140,6 +148,7 @@ def theories(
             "normal_force": ("step", pressure * grid.nominal_area),
         },
     ).assign(m0=spectrum.m0, m2=spectrum.m2, m4=spectrum.m4, contact_modulus=modulus)
+    result["pressure_spread"] = 0.5 * modulus * spectrum.slope
     for name, reason in REASONS.items():
         if bool(result[name].isnull().any()):
             result[name].attrs["reason"] = reason if spectrum.slope > 0 else FLAT
@@ -267,6 +276,60 @@ def _summit_integral(order: float, t: Array) -> Array:
     """Return F_n(t), the integral of (z - t)^n over the standard normal density beyond t."""
     cylinder = special.pbdv(-order - 1, t)[0]
     return np.asarray(special.gamma(order + 1) / math.sqrt(2 * math.pi) * np.exp(-(t**2) / 4) * cylinder)
+
+
+def _hertz(heights: Array, grid: Grid, pressure: Array) -> tuple[Array, Array]:
+    """Return contact fraction and stiffness (m-1) at pressures over E*, after Johnson (1985), section 4.2.
+
+    The surface is -(A x^2 + B y^2) along the axes of a paraboloid, A <= B. The semi-axes a >= b of the
+    contact follow from B/A = [E(m) a^2/b^2 - K(m)]/[K(m) - E(m)] with m = 1 - b^2/a^2 (4.26a) and
+    a^3 = 3 F [K(m) - E(m)]/(2 pi A m E*). The stiffness pi a E*/K(m) is that of an elliptical punch.
+    """
+    none = np.full(pressure.size, math.nan)
+    summit = None if any(grid.periodic) else _paraboloid(heights, grid)
+    if summit is None:
+        return none, none
+    least, most, reach = summit
+
+    def ratio_excess(m: float) -> float:
+        return float((special.ellipe(m) / (1 - m) - special.ellipk(m)) / difference(m) - most / least)
+
+    def difference(m: float) -> float:
+        return float(special.ellipk(m) - special.ellipe(m))
+
+    m = ROUND
+    if ratio_excess(ROUND) < 0:
+        m = float(optimize.brentq(ratio_excess, ROUND, 1 - 1e-12, xtol=1e-14))
+    area = grid.nominal_area
+    semi_axis = np.cbrt(1.5 * pressure * area * difference(m) / (math.pi * least * m))
+    inside = semi_axis <= reach
+    fraction = math.pi * semi_axis**2 * math.sqrt(1 - m) / area
+    stiffness = math.pi * semi_axis / special.ellipk(m) / area
+    return np.where(inside, fraction, math.nan), np.where(inside, stiffness, math.nan)
+
+
+def _paraboloid(heights: Array, grid: Grid) -> tuple[float, float, float] | None:
+    """Return A, B (m-1) and the distance (m) of the summit from the edge; None where it is no paraboloid."""
+    (ny, nx), (dy, dx) = grid.shape, grid.spacing
+    half = 0.5 * max((ny - 1) * dy, (nx - 1) * dx)
+    y, x = np.meshgrid(
+        (np.arange(ny) - (ny - 1) / 2) * dy / half, (np.arange(nx) - (nx - 1) / 2) * dx / half, indexing="ij"
+    )
+    values, _, scale = shifted(heights)
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
+    coefficients = np.linalg.lstsq(terms, values.ravel(), rcond=None)[0]
+    misfit = values.ravel() - terms @ coefficients
+    if math.sqrt(float(np.mean(misfit**2))) > SMOOTH * float(np.ptp(values)):
+        return None
+    _, slope_x, slope_y, xx, xy, yy = coefficients
+    curvature = -np.array([[xx, 0.5 * xy], [0.5 * xy, yy]])
+    least, most = np.linalg.eigvalsh(curvature)
+    if least <= 0:
+        return None
+    summit = 0.5 * np.linalg.solve(curvature, [slope_x, slope_y])
+    reach = float(min(x.max() - abs(summit[0]), y.max() - abs(summit[1]))) * half
+    factor = scale / half**2
+    return (float(least) * factor, float(most) * factor, reach) if reach > 0 else None
 
 
 def _small(fraction: Array) -> Array:

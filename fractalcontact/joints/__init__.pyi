@@ -1,5 +1,9 @@
 from ._area_dimension import area_dimension as area_dimension
 from ._closure import closure as closure
+from ._closure_criteria import bandis_aperture as bandis_aperture
+from ._closure_criteria import bandis_closure as bandis_closure
+from ._closure_criteria import bandis_constants as bandis_constants
+from ._closure_criteria import hydraulic_aperture as hydraulic_aperture
 from ._closure_laws import closure_laws as closure_laws
 from ._crack import Crack as Crack
 from ._cyclic_shear import cyclic_shear as cyclic_shear
@@ -16,8 +20,6 @@ from ._roughness_coefficient import roughness_coefficient as roughness_coefficie
 from ._self_weight import self_weight as self_weight
 from ._shear_curve import shear_curve as shear_curve
 from ._strength_criteria import PARK_PAULAY as PARK_PAULAY
-from ._strength_criteria import bandis_closure as bandis_closure
-from ._strength_criteria import bandis_constants as bandis_constants
 from ._strength_criteria import barton_bandis_scaled as barton_bandis_scaled
 from ._strength_criteria import barton_choubey_strength as barton_choubey_strength
 from ._strength_criteria import self_weight_strength as self_weight_strength
@@ -30,6 +32,7 @@ __all__ = [
     "Crack",
     "PARK_PAULAY",
     "area_dimension",
+    "bandis_aperture",
     "bandis_closure",
     "bandis_constants",
     "barton_bandis_scaled",
@@ -44,6 +47,7 @@ __all__ = [
     "direct_shear",
     "directional_roughness",
     "friction",
+    "hydraulic_aperture",
     "partial_slip",
     "register",
     "roughness_coefficient",

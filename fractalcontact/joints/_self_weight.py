@@ -20,8 +20,11 @@ from fractalcontact.joints._friction import LOCKED_ANGLE, mark_locked
 Array = np.ndarray[Any, np.dtype[Any]]
 
 FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
+FROM_RIGID = ("rigid_dilatancy", "basic_friction_angle", "nominal_area")
+SOLVER = {"influence": None, "hardness": None, "tolerance": 1e-8}  # options of elastic faces, as by default
 LARGEST = 1e100  # products of such numbers do not overflow
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
+RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
 
 
@@ -45,6 +48,13 @@ def _check(
         problems.require(ascending, "structure_size", "ascending sizes, each once", structure_size)
         if weight and isinstance(crack, Crack):
             force = (float(unit_weight) * sizes * crack.nominal_area).tolist()
+    if _is_rigid(crack):
+        for name, default in SOLVER.items():
+            expected = "nothing for rigid faces, of a crack with neither young nor poisson"
+            problems.require(solver[name] == default, name, expected, solver[name])
+        with problems.collect():
+            dilatancy.validate(crack, shear=shear, direction=direction)
+        return
     with problems.collect():
         dilatancy.validate(crack, shear=shear, direction=direction, normal_force=force, **solver)
 
@@ -70,6 +80,7 @@ def self_weight(
     Parameters
     ----------
     crack : Crack
+        With neither `young` nor `poisson` its faces are rigid: no load closes them.
     structure_size : float or sequence of float
         Sizes L, ascending: the height of material above the joint, m.
     unit_weight : float
@@ -87,7 +98,8 @@ def self_weight(
         Over (direction, shear, structure_size): dilatancy (m), friction_angle (degree), shear_strength (Pa),
         NaN with the `reason` where the faces lock; residual and converged. strength_exponent over (direction,
         shear): slope of a straight line through ln(shear_strength) over ln(structure_size). nominal_pressure
-        (Pa) over structure_size; rms_slope, basic_friction_angle, nominal_area, run_time (s).
+        (Pa) over structure_size; rms_slope, basic_friction_angle, nominal_area, run_time (s). Rigid faces
+        have neither residual, converged nor rms_slope: nothing is pressed.
 
     Raises
     ------
@@ -121,17 +133,9 @@ def self_weight(
     """
     sizes, shears = float_array(structure_size), float_array(shear)
     pressures = float(unit_weight) * sizes
-    slid = dilatancy(
-        crack,
-        shear=shears,
-        direction=direction,
-        normal_force=(pressures * crack.nominal_area).tolist(),
-        influence=influence,
-        hardness=hardness,
-        tolerance=tolerance,
-    )
-    result = slid[list(FROM_DILATANCY)].drop_vars(("step", "normal_force", "nominal_pressure"))
-    result = result.drop_attrs().rename(step="structure_size").assign_coords(structure_size=sizes)
+    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
+    slid, result = _slid(crack, shears, direction, pressures, solver)
+    result = result.assign_coords(structure_size=sizes)
     result = result.assign_coords(nominal_pressure=("structure_size", pressures))
     opening = result["dilatancy"]
     angle = crack.basic_friction_angle + np.degrees(np.arctan(opening.values / shears[:, None]))
@@ -140,11 +144,33 @@ def self_weight(
     exponents = [_exponent(sizes, row) for row in strength.reshape(-1, sizes.size)]
     result["strength_exponent"] = opening.dims[:-1], np.reshape(exponents, opening.shape[:-1])
     result["friction_angle"].attrs["comment"] = MEAN_ANGLE
+    if _is_rigid(crack):
+        result["shear_strength"].attrs["comment"] = RIGID_FACES
     mark_locked(result, ("shear_strength",))
     if np.isnan(exponents).any():
         result["strength_exponent"].attrs["reason"] = NO_EXPONENT
-    residual = float(result["residual"].max())
-    return result.assign_attrs(achieved_residual=residual, references=slid.attrs["references"])
+    if "residual" in result:
+        result.attrs["achieved_residual"] = float(result["residual"].max())
+    return result.assign_attrs(references=slid.attrs["references"])
+
+
+def _is_rigid(crack: Any) -> bool:
+    return isinstance(crack, Crack) and crack.young is None and crack.poisson is None
+
+
+def _slid(
+    crack: Crack, shears: Array, direction: Any, pressures: Array, solver: dict[str, Any]
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Return the result of `dilatancy` and what is kept of it, over (direction, shear, structure_size)."""
+    if _is_rigid(crack):
+        slid = dilatancy(crack, shear=shears, direction=direction)
+        kept = slid[list(FROM_RIGID)].rename(rigid_dilatancy="dilatancy").drop_attrs()
+        repeated = kept["dilatancy"].expand_dims(structure_size=pressures.size, axis=-1).copy()
+        return slid, kept.assign(dilatancy=repeated)
+    force = (pressures * crack.nominal_area).tolist()
+    slid = dilatancy(crack, shear=shears, direction=direction, normal_force=force, **solver)
+    kept = slid[list(FROM_DILATANCY)].drop_vars(("step", "normal_force", "nominal_pressure"))
+    return slid, kept.drop_attrs().rename(step="structure_size")
 
 
 def _exponent(sizes: Array, strengths: Array) -> float:

@@ -1,7 +1,7 @@
-"""Empirical criteria of strength, closure and size effect for concrete and rock joints.
+"""Empirical criteria of strength and size effect for concrete and rock joints.
 
 They were fitted to laboratory tests and serve to compare a computed joint with; nothing else in the package
-uses them. Pressures in Pa, lengths in m, angles in degrees; the published fits are in MPa and mm.
+uses them. Pressures in Pa, lengths in m, angles in degrees.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PARK_PAULAY = {"monolithic": 1.4, "against hardened concrete": 1.0}
 """Friction coefficients of concrete on concrete (Park and Paulay 1975, Reinforced Concrete Structures)."""
 
-MPA, MM = 1e6, 1e-3
 LARGEST = 1e100  # products and powers of such numbers do not overflow
 
 
@@ -27,13 +26,6 @@ class JointConstants(NamedTuple):
     roughness: float
     wall_strength: float
     peak_shear: float
-
-
-class ClosureConstants(NamedTuple):
-    """Initial normal stiffness (Pa m-1) and greatest closure (m) of a joint."""
-
-    initial_stiffness: float
-    greatest_closure: float
 
 
 class SizeEffect(NamedTuple):
@@ -155,106 +147,6 @@ def scaled_constants(roughness: float, wall_strength: float, length: float) -> J
     scaled = roughness * ratio ** (-0.02 * roughness)
     strength = wall_strength * ratio ** (-0.03 * roughness)
     return JointConstants(scaled, strength, length / 500.0 * (scaled / length) ** 0.33)
-
-
-def bandis_constants(roughness: float, wall_strength: float, aperture: float) -> ClosureConstants:
-    """Return initial stiffness and greatest closure of a joint after Bandis, for its first cycle of load.
-
-    Kni = -7.15 + 1.75 JRC + 0.02 JCS/a and Vm = -0.2960 - 0.0056 JRC + 2.2410 (JCS/a)^-0.2450, in MPa and mm.
-
-    Parameters
-    ----------
-    roughness, wall_strength : float
-        JRC and JCS (Pa).
-    aperture : float
-        Initial mechanical aperture a, m.
-
-    Returns
-    -------
-    ClosureConstants
-        Kni (Pa/m) and Vm (m).
-
-    Raises
-    ------
-    InvalidInput
-        A number is outside its bounds, or the fit gives no positive stiffness or closure for them.
-
-    Notes
-    -----
-    Fitted to joints with JRC of 5 to 15, JCS of 22 to 182 MPa and apertures of 0.1 to 0.6 mm.
-
-    References
-    ----------
-    Bandis, Lumsden and Barton (1983), Int. J. Rock Mech. Min. Sci. 20:249.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> constants = fc.joints.bandis_constants(roughness=10, wall_strength=100e6, aperture=0.2e-3)
-    >>> round(constants.initial_stiffness / 1e9, 2), round(constants.greatest_closure * 1e3, 3)
-    (20.35, 0.137)
-    """
-    with Problems("fractalcontact.joints.bandis_constants") as problems:
-        problems.number("roughness", roughness, at_least=0, at_most=20)
-        problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
-        problems.number("aperture", aperture, above=0, at_most=LARGEST)
-        if not problems.messages:
-            jrc = float(roughness)
-            stress = (float(wall_strength) / MPA) / (float(aperture) / MM)
-            stiffness = -7.15 + 1.75 * jrc + 0.02 * stress
-            closure = -0.2960 - 0.0056 * jrc + (2.2410 * stress**-0.2450 if stress > 0 else -1.0)
-            problems.require(
-                stiffness > 0 and closure > 0,
-                "roughness, wall_strength, aperture",
-                "values inside the range of the fit",
-                f"{stiffness:.3g} MPa/mm and {closure:.3g} mm",
-            )
-    return ClosureConstants(stiffness * MPA / MM, closure * MM)
-
-
-def bandis_closure(
-    nominal_pressure: float | Array, *, initial_stiffness: float, greatest_closure: float
-) -> Array:
-    """Return the hyperbolic closure of a rock joint after Bandis, sigma Vm / (Kni Vm + sigma), in m.
-
-    Elastic half-spaces close with the logarithm of the pressure instead. The hyperbola can be fitted to a
-    computed elastic closure, but that does not confirm it.
-
-    Parameters
-    ----------
-    nominal_pressure : float or ndarray
-        Normal stress sigma, Pa, at least 0.
-    initial_stiffness, greatest_closure : float
-        Kni (Pa m-1) and Vm (m), see `bandis_constants`.
-
-    Returns
-    -------
-    ndarray
-        Closure in m, of the shape of `nominal_pressure`.
-
-    Raises
-    ------
-    InvalidInput
-        A number is outside its bounds.
-
-    References
-    ----------
-    Bandis, Lumsden and Barton (1983), Int. J. Rock Mech. Min. Sci. 20:249.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> closure = fc.joints.bandis_closure(2e6, initial_stiffness=20e9, greatest_closure=1e-4)
-    >>> round(float(closure) * 1e6, 1)  # half of the greatest closure at sigma = Kni Vm
-    50.0
-    """
-    with Problems("fractalcontact.joints.bandis_closure") as problems:
-        problems.numbers("nominal_pressure", nominal_pressure, at_least=0, at_most=LARGEST, any_shape=True)
-        problems.number("initial_stiffness", initial_stiffness, above=0, at_most=LARGEST)
-        problems.number("greatest_closure", greatest_closure, above=0, at_most=LARGEST)
-    kni, vm = float(initial_stiffness), float(greatest_closure)
-    pressure = np.asarray(nominal_pressure, dtype=np.float64)
-    return np.asarray(pressure * vm / (kni * vm + pressure))
 
 
 def self_weight_strength(length: float | Array, *, unit_weight: float, friction_angle: float) -> Array:

@@ -3,8 +3,12 @@ from ._accuracy import estimator_errors as estimator_errors
 from ._area_dimension import area_dimension as area_dimension
 from ._box_dimension import box_dimension as box_dimension
 from ._box_dimension import local_slopes as local_slopes
+from ._closure import closure_fits as closure_fits
 from ._closure import closure_laws as closure_laws
 from ._closure import contact_area as contact_area
+from ._contact_curves import mean_gap as mean_gap
+from ._contact_curves import pressure_distribution as pressure_distribution
+from ._contact_curves import stiffness as stiffness
 from ._contact_maps import contact_domains as contact_domains
 from ._datasheet import datasheet as datasheet
 from ._decorrelation import correlation as correlation
@@ -35,6 +39,7 @@ from ._uplift import uplift as uplift
 __all__ = [
     "area_dimension",
     "box_dimension",
+    "closure_fits",
     "closure_laws",
     "contact_area",
     "contact_domains",
@@ -55,12 +60,15 @@ __all__ = [
     "islands",
     "lacunarity",
     "local_slopes",
+    "mean_gap",
     "paper_figure",
+    "pressure_distribution",
     "rigid_dilatancy",
     "scaling",
     "self_weight",
     "shear_curve",
     "sliding_scheme",
+    "stiffness",
     "slip_domains",
     "slip_loops",
     "strength_envelope",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
 LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
+LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
+LAW_LINES: tuple[Any, ...] = ((0, (4, 2)), (0, (1, 1.5)))  # exponential, hyperbolic
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 
 
@@ -100,7 +102,7 @@ def closure_laws(
     ax.set_ylabel(axis_label(data["normal_force"], newton))
     _set_scales(ax, length(total), newton(force), log=log)
     if key:
-        _shear_legend(ax, data, colours)
+        shear_legend(ax, data, colours)
     if inner_name != "closure":
         _style.side_legend(
             ax,
@@ -112,6 +114,90 @@ def closure_laws(
             low=True,
         )
     return ax
+
+
+@_style.checked
+def closure_fits(closure: Any, laws: Any, *, ax: Axes | None = None) -> Axes:
+    """Draw the closure against the nominal pressure with both closure laws, one colour per shear.
+
+    Points are the steps of the first loading and beyond; the law that they prefer is a thick line, and laws
+    that are not preferred are thin ones, dashed for the exponential, dotted for the hyperbola.
+
+    Parameters
+    ----------
+    closure : Dataset or node of a DataTree
+        From `fractalcontact.joints.closure`: interface_closure (m) and nominal_pressure (Pa) over (shear,
+        step), or over one of them.
+    laws : Dataset or node of a DataTree
+        From `fractalcontact.joints.closure_laws` of the same closure, also with a seating pressure.
+    ax : Axes, optional
+        Default: those of a new figure.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    InvalidInput
+        A variable is missing, or a result has a further dimension.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
+    >>> pressure = [1e6, 2e6, 4e6, 8e6, 1.6e7, 3.2e7]
+    >>> closure = fc.joints.closure(crack, shear=[2e-4, 4e-4], nominal_pressure=pressure)
+    >>> laws = fc.joints.closure_laws(closure, seating_pressure=1e6)
+    >>> ax = fc.plotting.closure_fits(closure, laws)
+    >>> ax.get_xlabel(), len(ax.lines)  # for each shear the steps and two laws
+    ('nominal pressure (MPa)', 6)
+    """
+    ax = _style.axes_or_new(ax)
+    names = ("interface_closure", "nominal_pressure")
+    data = result_of(closure, "closure_fits", names, ("shear", "step"), "closure")
+    fitted = result_of(laws, "closure_fits", (*LAW_CONSTANTS, "preferred_law"), ("shear",), "laws")
+    pressure, points = (table(data, name, ("shear", "step")) for name in names[::-1])
+    with Problems("fc.plotting.closure_fits") as problems:
+        same = fitted.sizes["shear"] == len(points)
+        problems.require(same, "laws", f"{len(points)} shears, as of the closure", fitted.sizes["shear"])
+    seat = float(fitted["seating_pressure"]) if "seating_pressure" in fitted else 0.0
+    if "seated_closure" in fitted:
+        points = table(fitted, "seated_closure", ("shear", "step"))
+    constants = {name: table(fitted, name, ("shear",)) for name in LAW_CONSTANTS}
+    preferred = table(fitted, "preferred_law", ("shear",)).astype(int)
+    along, up = scale_of(data["nominal_pressure"]), scale_of(data["interface_closure"])
+    colours = _style.sequence_colours(len(points))
+    for i, colour in enumerate(colours):
+        ax.plot(along(pressure[i]), up(points[i]), "o", color=colour, ms=3.5)
+        shown = pressure[i][np.isfinite(points[i]) & (pressure[i] > seat)]
+        if shown.size < 2:
+            continue
+        p = np.geomspace(shown.min(), shown.max(), 200)
+        law = {name: values[i] for name, values in constants.items()}
+        with np.errstate(all="ignore"):  # constants of faces that close by rounding alone
+            curves = (_exponential(p, law), _hyperbola(p - seat, law))
+        for number, (style, curve) in enumerate(zip(LAW_LINES, curves, strict=True), 1):
+            line = {"lw": 1.8} if number == preferred[i] else {"lw": 0.9, "ls": style}
+            ax.plot(along(p), up(curve), color=colour, **line)
+    _style.log_scale(ax, x=pressure)
+    _style.plain_ticks(ax)
+    ax.set_xlabel(axis_label(data["nominal_pressure"], along))
+    ax.set_ylabel(axis_label(data["interface_closure"], up))
+    shear_legend(ax, data, colours)
+    entries = [_style.legend_line(f"{name},\nnot preferred", lw=0.9, ls=style)
+               for name, style in zip(("exponential", "hyperbolic"), LAW_LINES, strict=True)]  # fmt: skip
+    _style.side_legend(ax, [_style.legend_line("preferred", lw=1.8), *entries], title="law", low=True)
+    return ax
+
+
+def _exponential(pressure: Any, law: Mapping[str, float]) -> Any:
+    return law["closure_length"] * np.log(pressure / law["reference_pressure"])
+
+
+def _hyperbola(pressure: Any, law: Mapping[str, float]) -> Any:
+    return pressure / (law["initial_stiffness"] + pressure / law["greatest_closure"])
 
 
 @_style.checked
@@ -183,11 +269,13 @@ def contact_area(
             ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)
     ax.set_xlabel(axis_label(data[against], scale))
     ax.set_ylabel(percent.label("real / nominal contact area"))
-    entries = [] if theory is None else _draw_theories(ax, theory, against, scale, percent)
+    entries: list[Any] = []
+    if theory is not None:
+        entries += draw_theories(ax, theory, "contact_area", "contact_fraction", against, scale, percent)
     _set_scales(ax, scale(loads), percent(raw), log=log)
     if log and against != "closure":
         entries += _proportional_line(ax, scale(loads), percent(raw))
-    _shear_legend(ax, data, colours)
+    shear_legend(ax, data, colours)
     if corrected:
         lines = [
             _style.legend_line("corrected for\nthe perimeter"),
@@ -199,24 +287,25 @@ def contact_area(
     return ax
 
 
-def _draw_theories(ax: Axes, theory: Any, against: str, scale: Scale, percent: Scale) -> list[Any]:
-    """Draw the contact fraction of each theory; return the entries of the legend."""
-    data = result_of(theory, "contact_area", ("contact_fraction", "theory", against), ("theory", "step"))
-    loads, areas = table(data, against, ("step",)), table(data, "contact_fraction", ("theory", "step"))
+def draw_theories(
+    ax: Axes, theory: Any, where: str, name: str, against: str, scale: Scale, up: Scale
+) -> list[Any]:
+    """Draw a variable of each theory that gives one; return the entries of the legend."""
+    data = result_of(theory, where, (name, "theory", against), ("theory", "step"), "theory")
+    loads, values = table(data, against, ("step",)), table(data, name, ("theory", "step"))
     entries = []
-    for i, name in enumerate(words(data["theory"])):
-        style: dict[str, Any] = {
-            "ls": "-.",
-            "lw": 1.0,
-            "color": _style.cycle()[(i + 1) % len(_style.cycle())],
-        }
-        ax.plot(scale(loads), percent(areas[i]), **style)
-        authors = ", ".join(part.capitalize() for part in name.split("_"))
+    colours = _style.cycle()
+    for i, word in enumerate(words(data["theory"])):
+        if not np.isfinite(values[i]).any():
+            continue
+        style: dict[str, Any] = {"ls": "-.", "lw": 1.0, "color": colours[(i + 1) % len(colours)]}
+        ax.plot(scale(loads), up(values[i]), **style)
+        authors = ", ".join(part.capitalize() for part in word.split("_"))
         entries.append(_style.legend_line(authors.replace(", ", ",\n"), **style))
     return entries
 
 
-def _shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
+def shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
     """Label the curves by their shear; a single curve without a shear gets no legend."""
     title, labels = shear_words(data)
     if labels:

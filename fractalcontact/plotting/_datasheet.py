@@ -41,7 +41,10 @@ INPUTS = {
     "hardness": ("hardness", "Pa"),
 }
 ROUGHNESS = ("roughness_coefficient", "directional_roughness")
-GROUPS = ("strength_envelope", "direct_shear", "shear_curve", "closure", "transmissivity")
+GROUPS = (
+    "strength_envelope", "direct_shear", "shear_curve", "closure", "closure_laws", "transmissivity",
+)  # fmt: skip
+MOST_SHEARS = 4  # with a line about their closure
 
 
 @_style.checked
@@ -55,7 +58,7 @@ def datasheet(
     tree : DataTree
         From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
         joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
-        closure, transmissivity and uplift. Panels without data stay empty.
+        closure, closure_laws, transmissivity and uplift. Panels without data stay empty.
     notes : sequence of str
         Sentences to print with the limits of validity that the results state themselves.
     figure : Figure, optional
@@ -110,7 +113,8 @@ def _draw_page(
     facts = "\n".join([_source(tree), *_input_lines(found)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
-    left.text(0.08, 0.93, "\n".join(_roughness_lines(found)), size=8, va="top", linespacing=1.5)
+    numbers = [*_roughness_lines(found), *_closure_lines(found["closure_laws"])]
+    left.text(0.08, 0.96, "\n".join(numbers), size=7.5, va="top", linespacing=1.4)
     if found["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])
@@ -122,7 +126,7 @@ def _draw_page(
         panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
     panels |= zip(
         ("normal stiffness", "mean gap", "transmissivity"),
-        _flow_panels(parts[3], found["closure"], found["transmissivity"]),
+        _flow_panels(parts[3], found["closure"], found["closure_laws"], found["transmissivity"]),
         strict=True,
     )
     lines = list(_limits(found, notes))
@@ -222,13 +226,62 @@ def _uplift_lines(water: xr.Dataset) -> Iterator[str]:
         yield f"  {place}{quantity_text(joint, 'N')}{share}" if np.isfinite(joint) else f"  {place}no balance"
 
 
-def _flow_panels(figure: Any, closure: xr.Dataset | None, flow: xr.Dataset | None) -> AxesArray:
+def _closure_lines(laws: xr.Dataset | None) -> Iterator[str]:
+    """Yield a line for each of a few shears: the law that its closures prefer, with its constants."""
+    if laws is None:
+        return
+    seat = "from first touch"
+    if "seating_pressure" in laws:
+        seat = f"above {quantity_text(float(laws['seating_pressure']), 'Pa')}"
+    yield ""
+    yield f"Closure {seat}"
+    every = laws if "shear" in laws.dims else laws.expand_dims("shear")
+    meanings = str(laws["preferred_law"].attrs["flag_meanings"]).split()
+    title, labels = shear_words(every)
+    unit = title.partition("(")[2].rstrip(")")
+    for i in _style.spread_indices(every.sizes["shear"], MOST_SHEARS):
+        law = every.isel(shear=i).squeeze()
+        name = meanings[int(law["preferred_law"])]
+        shear = f"v = {labels[i]} {unit}: " if labels else ""
+        if not np.isfinite(float(law["closure_length"])):
+            yield f"  {shear}no law"
+        elif name == "hyperbolic":
+            yield f"  {shear}hyperbolic"
+            for constant, symbol, scale in (
+                ("greatest_closure", "Vm", scale_for("m", law["greatest_closure_low"])),
+                ("initial_stiffness", "Kni", STIFFNESS),
+            ):
+                yield f"      {symbol} {_interval(law, constant, scale)}"
+        elif name == "exponential":
+            margin = float(law["closure_length_high"] - law["closure_length_low"]) / 2
+            length = scale_for("m", law["closure_length"])
+            values = [f"{value:.3g}" for value in length([float(law["closure_length"]), margin])]
+            yield f"  {shear}exponential, l {values[0]} ± {values[1]} {length.unit}"
+        else:
+            misfits = [quantity_text(float(law[f"{word}_misfit"]), "m") for word in meanings[1:3]]
+            yield f"  {shear}{name}, misfits {misfits[0]}, {misfits[1]}"
+
+
+def _interval(law: xr.Dataset, name: str, scale: Scale) -> str:
+    """Return a constant of a law with its interval."""
+    ends = [float(law[word]) for word in (name, f"{name}_low", f"{name}_high")]
+    value, low, high = (f"{float(scale(end)):.3g}" if np.isfinite(end) else "no bound" for end in ends)
+    return f"{value} ({low} to {high}) {scale.unit}"
+
+
+def _flow_panels(
+    figure: Any, closure: xr.Dataset | None, laws: xr.Dataset | None, flow: xr.Dataset | None
+) -> AxesArray:
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
     axes: AxesArray = _style.panel_row(figure, 3, A4)
     if closure is not None:
         pressure = table(_with_dims(closure), "nominal_pressure", ("shear", "step"))
-        closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
-        _draw(axes[0], pressure, stiffness(pressure, closed)[..., None], "normal stiffness", STIFFNESS)
+        if laws is not None:
+            stiffness = table(_with_dims(laws), "stiffness", ("shear", "step"))
+        else:
+            closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
+            stiffness = secant_stiffness(pressure, closed)
+        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", STIFFNESS)
         gap = table(_with_dims(closure), "mean_gap", ("shear", "step"))
         _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap))
     if flow is not None and "nominal_pressure" in flow.variables:
@@ -252,7 +305,7 @@ def _with_dims(data: xr.Dataset, *more: str) -> xr.Dataset:
     return data.expand_dims([dim for dim in ("shear", "step", *more) if dim not in data.dims])
 
 
-def stiffness(pressure: Any, closure: Any) -> Any:
+def secant_stiffness(pressure: Any, closure: Any) -> Any:
     """Return the slope of pressure over closure; NaN where the closure does not grow."""
     result = np.full(pressure.shape, np.nan)
     for row, p, w in zip(result, pressure, closure, strict=True):

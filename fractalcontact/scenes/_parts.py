@@ -213,7 +213,7 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
     if name == "faces":
         return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
     options = joint_options(scene, name)
-    if name == "friction":
+    if name in ("friction", "closure_laws"):
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
     if stage.row.takes_surface:
         return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))

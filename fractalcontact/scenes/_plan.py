@@ -184,6 +184,8 @@ def _joint_reasons(scene: Scene) -> dict[str, str]:
     for name in READ_THE_GAP:
         if name in reasons:
             reasons.setdefault("closure", f"{name} needs the gap")
+    if "closure_laws" in reasons:
+        reasons.setdefault("closure", "closure_laws needs it")
     if "friction" in reasons and "elastic_dilatancy" not in reasons:
         reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
     if scene.want.figures and reasons and scene.stage_options(STAGES["joints/delta_surface"], ("shear",)):

@@ -280,7 +280,9 @@ def _self_weight(tree: xr.DataTree) -> str:
     if strengths is None:
         return ""
     sizes = [f"at {length(size)}" for size in strengths["structure_size"].values]
-    rows: list[tuple[str, ...]] = [("strength under self-weight", "over shear", *sizes, "exponent of size")]
+    faces = "" if "converged" in strengths else " (rigid faces)"  # nothing was pressed without a modulus
+    title = f"strength under self-weight{faces}"
+    rows: list[tuple[str, ...]] = [(title, "over shear", *sizes, "exponent of size")]
     for direction in np.atleast_1d(strengths["direction"].values):
         for shear, state in _at_shears(strengths.sel(direction=direction)):
             every = [amount(state["shear_strength"].isel(structure_size=i)) for i in range(len(sizes))]

@@ -65,6 +65,7 @@ ONE_NUMBER: dict[str, dict[str, Any]] = {
     "viscosity": {"above": 0.0},
     "hardness": {"above": 0.0},
     "unit_weight": {"above": 0.0},
+    "seating_pressure": {"above": 0.0},
 }
 NUMBERS: dict[str, dict[str, Any]] = {
     "block": {"above": 0.0},
@@ -344,8 +345,13 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     _check_partial_slip(scene, problems)
     contact, material = scene.table("contact"), scene.table("material")
+    rigid = set(RIGID)
+    if "elastic_dilatancy" not in scene.want.joints:
+        rigid.add("friction")  # that of the rigid dilatancy
+    if not {"young", "poisson"} & set(material):
+        rigid.add("self_weight")
     deforms = any(
-        name in JOINT_STAGES and name not in RIGID and not STAGES[f"joints/{name}"].takes_surface
+        name in JOINT_STAGES and name not in rigid and not STAGES[f"joints/{name}"].takes_surface
         for name in scene.want.joints
     )
     if deforms or (scene.wanted("domains") and not scene.is_pressed):

@@ -86,6 +86,8 @@ class StageType:
         """Return the arguments of the function that a scene may give."""
         if self.name == "joints/rigid_dilatancy":
             return ("shear", "direction")
+        if self.name == "joints/closure_laws":  # its closure is the result of another stage, not a load
+            return ("seating_pressure",)
         allowed = arguments_of(self.function)[0]
         if self.name == "joints/elimination":  # of a part of the block, and elastic
             return ("block", *(key for key in allowed if key not in ("method", "hardness")))
@@ -134,6 +136,7 @@ _ROWS = (
     _joint("delta_dimension"),
     _joint("rigid_dilatancy", function="dilatancy"),
     _joint("closure", keeps=CONTACT_MAPS),
+    _joint("closure_laws", ("joints/closure",)),
     _joint("elimination", function="closure"),
     _joint("area_dimension"),
     _joint(PARTIAL_SLIP, keeps=SLIP_MAPS),
@@ -173,7 +176,8 @@ CURVES = _words("dimensions")
 JOINT_STAGES = _words("joints", leave_out=("faces",))
 # what the datasheet of a joint shows at least
 DATASHEET = (
-    "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "transmissivity",
+    "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "closure_laws",
+    "transmissivity",
 )  # fmt: skip
 DOMAIN_STAGES = _words("domains")
 READ_THE_GAP = tuple(row.word for row in _ROWS if row.reads == "gap")

@@ -48,6 +48,7 @@ from fractalcontact.scenes._stages import (
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
 
+FROM_RESULTS = ("friction", "closure_laws")  # stages of a joint that take a result alone
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
 LARGE = 1 << 18  # points of a generated surface that is not made twice
 
@@ -225,7 +226,7 @@ def _validate_calls(
                 elif surface is not None and (scene.is_pressed or crack is not None):
                     maps = _empty_maps(scene, surface)
                 _validate_call(reader.function, maps, **reader.options)
-            elif stage.name.startswith("joints/") and name in JOINT_STAGES and name != "friction":
+            elif stage.name.startswith("joints/") and name in JOINT_STAGES and name not in FROM_RESULTS:
                 if stage.row.takes_surface:
                     _validate_call(stage.row.function, surface, **joint_options(scene, name))
                     continue

@@ -172,6 +172,7 @@ def test_no_pressure_complete_contact_and_flat_surface():
     result = theories(rough(), [0.0, 1e12])
     assert result["contact_fraction"].sel(theory="persson").values.tolist() == [0.0, 1.0]
     assert result["interface_stiffness"].isel(step=0).values[:2].tolist() == [0.0, 0.0]
+    assert np.isnan(result["interface_stiffness"].isel(step=0).values[2:]).all()
     assert np.isnan(result["mean_gap"].isel(step=0)).all()
     assert float(result["mean_gap"].sel(theory="persson")[1]) == pytest.approx(0.0, abs=1e-20)
     assert np.isnan(result["interface_stiffness"].isel(step=1)).all()
@@ -187,3 +188,111 @@ def test_all_problems_are_listed():
         fc.contact.theories(waves((4, 1e-6)), contact_modulus=0, nominal_pressure=-1.0)
     assert "contact_modulus" in str(caught.value)
     assert "nominal_pressure" in str(caught.value)
+
+
+def summit(curvature_x, curvature_y, *, turned=0.0, side=1e-3, cells=81, offset=0.0):
+    """Return a free surface with one paraboloid, of two curvatures (m-1)."""
+    x = np.linspace(-side / 2, side / 2, cells)
+    along = (x - offset) * math.cos(turned) + x[:, None] * math.sin(turned)
+    across = x[:, None] * math.cos(turned) - (x - offset) * math.sin(turned)
+    return fc.surfaces.from_array(-(curvature_x * along**2 + curvature_y * across**2) / 2, x[1] - x[0])
+
+
+def hertz(surface, pressure):
+    return theories(surface, pressure).sel(theory="hertz")
+
+
+def test_hertz_on_a_ball():
+    surface = summit(10.0, 10.0)  # radius 0.1 m
+    found, side = hertz(surface, [0.0, 1e2, 1e4]), 81 / 80 * 1e-3
+    force = np.array([0.0, 1e2, 1e4]) * side**2
+    a = np.cbrt(3 * force * 0.1 / (4 * MODULUS))
+    np.testing.assert_allclose(found.contact_fraction * side**2, math.pi * a**2, rtol=1e-5)
+    np.testing.assert_allclose(found.interface_stiffness * side**2, 2 * a * MODULUS, rtol=1e-5)
+    assert np.isnan(found.mean_gap).all()
+
+
+# semi-axes over the cube root of 3 F/(4 E* (A + B)), at cos(theta) = (B - A)/(B + A): the table of Whittemore
+# and Petrenko (1921) in Timoshenko and Goodier, Theory of Elasticity, section 140
+PUBLISHED = {30: (2.731, 0.493), 45: (1.926, 0.604), 60: (1.486, 0.717), 75: (1.202, 0.846), 90: (1.0, 1.0)}
+
+
+@pytest.mark.parametrize("theta", PUBLISHED)
+def test_hertz_on_an_ellipsoid_by_the_published_table(theta):
+    cosine = math.cos(math.radians(theta))
+    least, most = 20.0 * (1 - cosine), 20.0 * (1 + cosine)  # 2 A and 2 B
+    surface, side, pressure = summit(least, most, turned=0.4), 81 / 80 * 1e-3, 1e3
+    unit = np.cbrt(3 * pressure * side**2 / (4 * MODULUS * 20.0))
+    a, b = (number * unit for number in PUBLISHED[theta])
+    found = hertz(surface, pressure)
+    assert float(found.contact_fraction[0]) * side**2 == pytest.approx(math.pi * a * b, rel=2e-3)
+
+
+def test_hertz_agrees_with_the_solver_on_an_ellipsoid():
+    surface, pressure = summit(10.0, 30.0), 5e4
+    pressed = fc.contact.press(
+        surface, contact_modulus=MODULUS, nominal_pressure=pressure, also="stiffness"
+    ).isel(step=0)
+    found = hertz(surface, pressure).isel(step=0)
+    assert float(pressed.corrected_contact_fraction) == pytest.approx(float(found.contact_fraction), rel=0.02)
+    assert float(pressed.contact_stiffness) == pytest.approx(float(found.interface_stiffness), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        summit(10.0, -10.0),  # a saddle
+        summit(-10.0, -10.0),  # a hollow
+        summit(10.0, 10.0, offset=2e-3),  # the summit is outside
+        waves((1, 1e-6)),
+        rough(),
+    ],
+)
+def test_hertz_holds_on_single_summits_only(surface):
+    found = theories(surface, 1e3)
+    assert np.isnan(found["contact_fraction"].sel(theory="hertz")).all()
+    assert "one smooth summit" in found["contact_fraction"].attrs["reason"]
+
+
+def test_hertz_ends_where_the_contact_reaches_the_edge():
+    found = hertz(summit(10.0, 10.0), [1e4, 1e9])["contact_fraction"].values
+    assert np.isfinite(found).tolist() == [True, False]
+
+
+def test_pressure_spread_of_one_wave():
+    """Under a flattened wave of amplitude a the pressure is (E* q a/2) cos(q x): spread E* q a/sqrt(8)."""
+    q = 2 * math.pi * 4 / SIDE
+    expected = MODULUS * q * 1e-6 / math.sqrt(8)
+    assert float(theories(waves((4, 1e-6)), 1e6).pressure_spread) == pytest.approx(expected)
+
+
+def test_summits_of_a_gaussian_surface():
+    """Density, mean height, variance and curvature of the summits (Nayak 1971), by random sampling.
+
+    At a point of an isotropic Gaussian surface the second derivatives have the variances m4, m4 and m4/3, the
+    covariance m4/3 and the covariance -m2 with the height; the gradient is independent, of variance m2.
+    The density of summits is the mean of |det H| where H is negative definite, over 2 pi m2.
+    """
+    m0, m2, m4 = 1.0, 1.0, 3.0  # Nayak's parameter is 3
+    covariance = [[m0, -m2, -m2, 0], [-m2, m4, m4 / 3, 0], [-m2, m4 / 3, m4, 0], [0, 0, 0, m4 / 3]]
+    z, xx, yy, xy = np.random.default_rng(0).multivariate_normal(np.zeros(4), covariance, 4_000_000).T
+    determinant = xx * yy - xy**2
+    weight = np.where((determinant > 0) & (xx + yy < 0), determinant, 0.0)
+    density = weight.mean() / (2 * math.pi * m2)
+    mean = (weight @ z) / weight.sum()
+    variance = (weight @ (z - mean) ** 2) / weight.sum()
+    curvature = -(weight @ (xx + yy)) / 2 / weight.sum()
+    nayak = m0 * m4 / m2**2
+    assert density == pytest.approx(m4 / m2 / (6 * math.pi * math.sqrt(3)), rel=3e-3)
+    assert mean == pytest.approx(4 * math.sqrt(m0 / (math.pi * nayak)), rel=3e-3)
+    assert variance == pytest.approx((1 - 0.8968 / nayak) * m0, rel=5e-3)
+    assert 1 / curvature == pytest.approx(3 / 8 * math.sqrt(math.pi / m4), rel=3e-3)
+
+
+def test_work_of_persson_in_complete_contact():
+    """The work of the pressure on the gap is the energy of a flattened wave, E* q a^2/8, for any gamma."""
+    q, a = 2 * math.pi * 4 / SIDE, 1e-6
+    pressure = MODULUS * q * a * np.linspace(0.0, 5.0, 20001)[1:]
+    stiffness = theories(waves((4, a)), pressure)["interface_stiffness"].sel(theory="persson").values
+    work = np.nansum(pressure / stiffness) * (pressure[1] - pressure[0])
+    assert work == pytest.approx(MODULUS * q * a**2 / 8, rel=1e-3)

@@ -130,6 +130,138 @@ def test_self_affine_faces_close_with_the_known_length(seed):
     assert result.exponential_misfit[0] < 0.1 * float(delta.std())
 
 
+def word(laws):
+    return laws.preferred_law.attrs["flag_meanings"].split()[int(laws.preferred_law)]
+
+
+def hyperbola(p, stiffness, greatest):
+    return p * greatest / (stiffness * greatest + p)
+
+
+def test_closures_count_from_the_seating_pressure():
+    p = np.array([1e4, 3e4, 5e4, 2e5, 9e5, 4e5])
+    result = fc.joints.closure_laws(law(p, 3e-6 * np.log(p / 2e3)), seating_pressure=4e4)  # between two steps
+    np.testing.assert_allclose(result.seated_closure, 3e-6 * np.log(p / 4e4), rtol=1e-9, atol=1e-18)
+    assert result.closure_length == pytest.approx(3e-6, rel=1e-9)
+    assert result.reference_pressure == pytest.approx(4e4, rel=1e-9)
+    assert float(result.seating_pressure) == 4e4
+    unseated = fc.joints.closure_laws(law(p, 3e-6 * np.log(p / 2e3)))
+    np.testing.assert_array_equal(result.stiffness, unseated.stiffness)
+
+
+def test_seated_hyperbola_has_the_stiffness_at_the_seating_pressure():
+    """w(p) - w(ps) is a hyperbola of p - ps: Kni is dp/dw at ps, and Vm what is left of the closure."""
+    p, kni, vm = np.geomspace(1e5, 3e7, 12), 2e10, 1e-4
+    seat = float(p[3])
+    result = fc.joints.closure_laws(law(p, hyperbola(p, kni, vm)), seating_pressure=seat)
+    assert float(result.initial_stiffness) == pytest.approx(kni * (1 + seat / (kni * vm)) ** 2, rel=1e-5)
+    assert float(result.greatest_closure) == pytest.approx(vm - hyperbola(seat, kni, vm), rel=1e-5)
+
+
+def test_law_of_goodman():
+    """(p - ps)/ps = w/(Vm - w), Goodman (1976), has Kni Vm = ps."""
+    seat, vm = 1e5, 8e-5
+    p = seat * np.array([1.0, 1.5, 2.0, 3.0, 4.0, 10.0, 30.0, 60.0])
+    result = fc.joints.closure_laws(law(p, vm * (1 - seat / p)), seating_pressure=seat)
+    assert float(result.greatest_closure) == pytest.approx(vm, rel=1e-6)
+    assert float(result.initial_stiffness * result.greatest_closure) == pytest.approx(seat, rel=1e-6)
+    assert word(result) == "hyperbolic"
+
+
+@pytest.mark.parametrize("seat", [1e3, 1e8])
+def test_seating_pressure_that_is_not_reached(seat):
+    p = np.geomspace(1e4, 1e6, 6)
+    result = fc.joints.closure_laws(law(p, 3e-6 * np.log(p / 2e3)), seating_pressure=seat)
+    assert np.isnan(result.closure_length)
+    assert np.isnan(result.seated_closure).all()
+    assert "seating pressure" in result.seated_closure.attrs["reason"]
+    assert word(result) == "undecided"
+    assert np.isfinite(result.stiffness).all()
+
+
+@pytest.mark.parametrize(
+    ("expected", "closure"),
+    [
+        ("exponential", lambda p: 1e-6 * np.log(p / 2e4)),
+        ("hyperbolic", lambda p: hyperbola(p, 1e10, 1e-4)),
+        ("neither", lambda p: p**0.5 * np.where(np.arange(p.size) % 2, 1.3, 0.8)),
+    ],
+)
+def test_preferred_law(expected, closure):
+    p = np.geomspace(1e5, 1e7, 10)
+    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(p.size)
+    assert word(fc.joints.closure_laws(law(p, closure(p) * noise))) == expected
+
+
+def test_few_steps_and_narrow_paths_leave_the_law_undecided():
+    p = np.geomspace(1e5, 1e7, 5)
+    assert word(fc.joints.closure_laws(law(p, 1e-6 * np.log(p / 2e4)))) == "undecided"
+    narrow = np.geomspace(1e6, 1.3e6, 10)
+    noisy = hyperbola(narrow, 1e10, 1e-4) + 1e-7 * np.random.default_rng(2).standard_normal(10)
+    assert word(fc.joints.closure_laws(law(narrow, noisy))) == "undecided"
+
+
+def test_law_is_seldom_preferred_where_both_are_as_good():
+    """Closures half way between the two fits, with scatter: about one joint in twenty may prefer a law."""
+    p = np.geomspace(1e6, 4e6, 12)
+    exponential = 1e-5 * np.log(p / 2e5)
+    fitted = fc.joints.closure_laws(law(p, exponential))
+    other = hyperbola(p, float(fitted.initial_stiffness), float(fitted.greatest_closure))
+    noise = 3e-7 * np.random.default_rng(3).standard_normal((400, p.size))
+    joints = xr.Dataset(
+        {"interface_closure": (("joint", "step"), 0.5 * (exponential + other) + noise)},
+        coords={"nominal_pressure": ("step", p)},
+    )
+    decided = (fc.joints.closure_laws(joints).preferred_law > 0).mean()
+    assert 0.0 < float(decided) < 0.08
+
+
+def test_intervals_have_their_coverage():
+    """95 % of 1000 scattered paths; the standard error of the share is 0.7 %."""
+    p = np.geomspace(1e5, 1e7, 10)
+    truth = {
+        "closure_length": 3e-6, "reference_pressure": 2e4,
+        "initial_stiffness": 1e10, "greatest_closure": 1e-4,
+    }  # fmt: skip
+    curves = {
+        "exponential": truth["closure_length"] * np.log(p / truth["reference_pressure"]),
+        "hyperbolic": hyperbola(p, truth["initial_stiffness"], truth["greatest_closure"]),
+    }
+    rng = np.random.default_rng(4)
+    for name, curve in curves.items():
+        closures = curve + 0.02 * np.ptp(curve) * rng.standard_normal((1000, p.size))
+        result = fc.joints.closure_laws(
+            xr.Dataset(
+                {"interface_closure": (("joint", "step"), closures)},
+                coords={"nominal_pressure": ("step", p)},
+            )
+        )
+        for constant in list(truth)[:2] if name == "exponential" else list(truth)[2:]:
+            low, high = result[f"{constant}_low"], result[f"{constant}_high"]
+            covered = ((low < truth[constant]) & (truth[constant] < high)).mean()
+            assert 0.93 < float(covered) < 0.97, constant
+
+
+def test_interval_without_bound_where_nothing_curves():
+    p = np.linspace(1e5, 1e6, 8)
+    noise = 1e-8 * np.random.default_rng(5).standard_normal(p.size)
+    result = fc.joints.closure_laws(law(p, p / 5e10 + noise))
+    assert np.isinf(result.greatest_closure_high)
+    assert 0 < float(result.greatest_closure_low) < 1e-2
+    assert float(result.initial_stiffness_low) < 5e10 < float(result.initial_stiffness_high)
+
+
+def test_elastic_faces_prefer_the_exponential_law_of_persson():
+    """Self-affine periodic faces under moderate pressure; yielding rock is not among them."""
+    options = {"hurst": 0.8, "long_cutoff": 64e-6, "short_cutoff": 4e-6, "rms_height": 1e-7}
+    lower, upper = (fc.surfaces.spectral((128, 128), 1e-6, rng=7 + i, **options) for i in (0, 1))
+    crack = fc.joints.Crack(lower, upper, young=1e9, poisson=0.0)
+    slope = float(fc.surfaces.describe(fc.joints.delta_surface(crack, 0.0)).rms_slope)
+    pressure = crack.contact_modulus * slope * np.geomspace(0.005, 0.1, 8)
+    closed = fc.joints.closure(crack, shear=0.0, nominal_pressure=pressure)
+    assert word(fc.joints.closure_laws(closed).isel(shear=0)) == "exponential"
+
+
 def test_invalid_arguments_are_refused():
     with pytest.raises(
         ValueError, match=r"Dataset of fractalcontact.joints.closure, got an object of type int"
@@ -137,3 +269,5 @@ def test_invalid_arguments_are_refused():
         fc.joints.closure_laws(3)
     with pytest.raises(ValueError, match="no interface_closure"):
         fc.joints.closure_laws(xr.Dataset())
+    with pytest.raises(ValueError, match="seating_pressure: expected a finite number > 0"):
+        fc.joints.closure_laws(law([1.0, 2.0], [1.0, 2.0]), seating_pressure=0.0)

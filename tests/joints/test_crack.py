@@ -136,3 +136,22 @@ def test_crack_is_frozen_and_can_be_pickled(make_face, rough):
     assert twin.layout == crack.layout
     assert twin.block == crack.block
     assert "block: 8 x 8 cells" in repr(crack)
+
+
+def test_incompressible_bodies_deform(make_face, rough):
+    """E/(1 - nu^2) alone counts in normal contact: nu = .5 and 3/4 E is nu = 0 and E."""
+    face = make_face(1e-6 * rough((24, 24), 3), 1e-4)
+    young = 1e10
+
+    def crack(modulus, poisson):
+        return fc.joints.Crack(face, young=modulus, poisson=poisson, block=1.2e-3)
+
+    half, none = crack(0.75 * young, 0.5), crack(young, 0.0)
+    options = {"shear": 2e-4, "direction": "E", "normal_force": [1.0, 10.0]}
+    for function in (fc.joints.closure, fc.joints.dilatancy):
+        results = [function(one, **options)["interface_closure"] for one in (half, none)]
+        np.testing.assert_allclose(*results, rtol=1e-6)
+    slipped = fc.joints.partial_slip(
+        half, shear=2e-4, normal_force=10.0, tangential_force=[1.0, 2.0], friction_coefficient=0.6
+    )
+    assert bool(slipped["converged"].all())

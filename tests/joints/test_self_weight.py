@@ -68,3 +68,33 @@ def test_wrong_arguments_are_named(crack, options, named):
     with pytest.raises(ValueError, match=named) as caught:
         fc.joints.self_weight.validate(crack, **call)
     assert len(caught.value.problems) == 1
+
+
+def test_rigid_faces_need_no_modulus(make_face):
+    """On a plane of slope 0.1 loads close nothing: the strengths of elastic faces, in closed form."""
+    slope = 0.1 * np.arange(40.0) * np.ones((6, 1))
+    crack = fc.joints.Crack(make_face(slope), block=(6, 20), basic_friction_angle=30)
+    result = fc.joints.self_weight(
+        crack, structure_size=[10, 200], unit_weight=GAMMA, shear=[2, 8], direction=["E", "W"]
+    )
+    for name, sign in (("E", 1), ("W", -1)):
+        tangent = np.tan(np.radians(30) + sign * np.arctan(0.1))
+        expected = np.tile(GAMMA * np.array([10, 200]) * tangent, (2, 1))
+        np.testing.assert_allclose(result.shear_strength.sel(direction=name), expected, rtol=1e-12)
+    np.testing.assert_allclose(result.strength_exponent, 1.0, atol=1e-12)
+    assert "rigid" in result.shear_strength.attrs["comment"]
+    assert not {"converged", "residual", "rms_slope"} & set(result.variables)
+
+
+def test_rigid_faces_refuse_options_of_the_solver(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((6, 40))), block=(6, 20))
+    with pytest.raises(ValueError, match="hardness: expected nothing for rigid faces"):
+        fc.joints.self_weight(
+            crack, structure_size=10, unit_weight=GAMMA, shear=2, direction="E", hardness=1e8
+        )
+
+
+def test_one_constant_of_elasticity_alone_is_a_mistake(make_face):
+    crack = fc.joints.Crack(make_face(np.zeros((6, 40))), block=(6, 20), young=1e10)
+    with pytest.raises(ValueError, match=r"crack.poisson: expected a value"):
+        fc.joints.self_weight(crack, structure_size=10, unit_weight=GAMMA, shear=2, direction="E")

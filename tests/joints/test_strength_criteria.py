@@ -33,18 +33,6 @@ def test_scaled_constants_decrease_with_length():
     assert longer.wall_strength == pytest.approx(50e6 * 10**-0.3)
 
 
-def test_bandis_closure():
-    constants = fc.joints.bandis_constants(10, 100e6, 0.2e-3)
-    assert constants.initial_stiffness == pytest.approx(20.35e9)
-    assert constants.greatest_closure == pytest.approx(0.136871e-3, rel=1e-5)
-    closures = fc.joints.bandis_closure(
-        np.array([0.0, 1e6, 10e6, 30e6]),
-        initial_stiffness=constants.initial_stiffness,
-        greatest_closure=constants.greatest_closure,
-    )
-    np.testing.assert_allclose(closures, np.array([0, 0.036158, 0.107053, 0.125243]) * 1e-3, rtol=1e-5)
-
-
 def test_size_effect_of_doubling():
     factors = fc.joints.size_effect(2.0, contact_dimension=1.66, roughness_dimension=1.94)
     np.testing.assert_allclose(factors, [0.790, 0.824, 1.580], atol=5e-4)

@@ -3,6 +3,7 @@
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
+import xarray as xr
 from plotting_figures import drawn, holds, render
 
 import fractalcontact as fc
@@ -20,6 +21,37 @@ def test_closure_laws_curves(closed):
     for v in closed.shear:
         for name in ("closure", "interface_closure"):
             assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
+
+
+def test_closure_fits_are_the_laws():
+    p = np.geomspace(1e5, 1e7, 9)
+    curves = [
+        3e-5 * np.log(p / 2e3),
+        fc.joints.bandis_closure(p, initial_stiffness=2e10, greatest_closure=1e-4),
+    ]
+    closure = xr.Dataset(
+        {"interface_closure": (("shear", "step"), np.array(curves))},
+        coords={
+            "shear": ("shear", [0.0, 1e-3], {"units": "m"}),
+            "step": np.arange(9),
+            "nominal_pressure": ("step", p, {"units": "Pa"}),
+        },
+    )
+    for seat in (None, float(p[1])):
+        laws = fc.joints.closure_laws(closure, seating_pressure=seat)
+        ax = plotting.closure_fits(closure, laws)
+        lines = [(line.get_xdata(), line.get_ydata(), line.get_linewidth()) for line in ax.lines]
+        for i, preferred in enumerate((1, 2)):  # exponential, then hyperbolic: after the points of the shear
+            x, y, width = lines[3 * i + preferred]
+            assert width > lines[3 * i + 3 - preferred][2]
+            origin = 0.0 if seat is None else curves[i][1]
+            np.testing.assert_allclose(lines[3 * i][1], (curves[i] - origin) * 1e6, atol=1e-9)
+            shown = slice(0 if seat is None else 2, None)
+            found = np.interp(np.log(p[shown] / 1e6), np.log(x), y)
+            np.testing.assert_allclose(found, (curves[i][shown] - origin) * 1e6, rtol=2e-3)
+    render(ax.figure)
+    with pytest.raises(InvalidInput, match="laws: expected 2 shears"):
+        plotting.closure_fits(closure, laws.isel(shear=[0]))
 
 
 def test_marked_points(closed):
@@ -86,7 +118,7 @@ def test_theories_beside_the_contact_area():
     pressed, theory = fc.contact.press(surface, **given), fc.contact.theories(surface, **given)
     for against in ("nominal_pressure", "normal_force"):
         ax = plotting.contact_area(pressed, against=against, theory=theory)
-        for name in theory.theory:
+        for name in theory.theory[:-1]:  # hertz does not hold on a rough surface, and is not drawn
             expected = theory.contact_fraction.sel(theory=name)
             assert holds(drawn(ax), expected[against], expected)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]

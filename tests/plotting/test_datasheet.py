@@ -71,6 +71,53 @@ def test_words_are_those_of_the_results(tree):
     assert "drawn in range from 1 MPa to 4 MPa" in shown  # not at 50 of 60 MPa
 
 
+def closures(pressure, *curves):
+    return xr.Dataset(
+        {"interface_closure": (("shear", "step"), np.array(curves))},
+        coords={
+            "shear": ("shear", 1e-3 * np.arange(len(curves)), {"units": "m"}),
+            "step": np.arange(pressure.size),
+            "nominal_pressure": ("step", pressure, {"units": "Pa"}),
+        },
+    )
+
+
+def test_closure_laws_are_drawn_and_named(tree):
+    pressure = tree["joints/closure"]["nominal_pressure"].values
+    many = np.geomspace(1e5, 1e7, 9)
+    laws = fc.joints.closure_laws(
+        closures(
+            many,
+            3e-6 * np.log(many / 2e3),
+            fc.joints.bandis_closure(many, initial_stiffness=2e10, greatest_closure=1e-4),
+            np.zeros(9),
+        ),
+        seating_pressure=1.5e5,
+    )
+    page = figure_of(plotting.datasheet(xr.DataTree.from_dict({"/joints/closure_laws": laws})))
+    shown = texts(page)
+    for expected in (
+        "Closure above 150 kPa",
+        "v = 0 mm: exponential, l 3 ±",
+        "v = 1 mm: hyperbolic",
+        "Vm 93 (93 to 93) µm",  # less 1e-4 (1.5e5/2.15e6) up to the seating pressure
+        "Kni 23.1 (23.1 to 23.1) MPa/mm",  # 20 (1 + 0.075)^2
+        "v = 2 mm: no law",
+    ):
+        assert expected in shown, expected
+    render(page)
+    own = fc.joints.closure_laws(tree["joints/closure"].to_dataset())
+    both = tree.copy()
+    both["joints/closure_laws"] = xr.DataTree(own)
+    page = figure_of(plotting.datasheet(both))
+    axes = {ax.get_title(loc="left"): ax for ax in page.axes}
+    line = axes["normal stiffness (MPa/mm)"].lines[1]
+    np.testing.assert_allclose(line.get_ydata(), own["stiffness"].isel(shear=1) / 1e9)
+    np.testing.assert_allclose(line.get_xdata(), pressure[1] / 1e6)
+    assert "Closure from first touch" in texts(page)
+    assert "undecided, misfits" in texts(page)  # three steps
+
+
 def test_a_study_of_the_roughness_alone_has_a_page(tree):
     page = figure_of(
         plotting.datasheet(

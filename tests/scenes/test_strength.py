@@ -104,6 +104,7 @@ def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
         "datasheet = true\nfigures = true",
     )
     text = text.replace("[joint.direct_shear]", "shear = 2e-4\n[joint.direct_shear]")
+    text = text.replace("[want]", "[joint.closure_laws]\nseating_pressure = 3e6\n[want]")
     path = scene(text)
     names = {stage.name for stage in fc.scenes.plan(fc.scenes.load(path))}
     assert {"joints/roughness_coefficient", "joints/closure", "joints/transmissivity"} <= names
@@ -117,6 +118,11 @@ def test_datasheet_adds_its_stages_and_writes_page_and_tables(scene, tmp_path):
         tmp_path / "out" / "tables" / "joints_closure_by_shear_step.csv", delimiter=",", names=True
     )
     assert curves.size == tree["joints/closure"].sizes["step"]
+    laws = tree["joints/closure_laws"].to_dataset()
+    expected = fc.joints.closure_laws(tree["joints/closure"].to_dataset(), seating_pressure=3e6)
+    np.testing.assert_array_equal(laws["stiffness"], expected["stiffness"])
+    assert float(laws["seating_pressure"]) == 3e6
+    assert (tmp_path / "out" / "tables" / "joints_closure_laws_by_shear.csv").is_file()
 
 
 def test_datasheet_that_fails_leaves_no_incomplete_file(scene, tmp_path, monkeypatch):
@@ -133,3 +139,62 @@ def test_datasheet_that_fails_leaves_no_incomplete_file(scene, tmp_path, monkeyp
         fc.scenes.run(scene(text), out=tmp_path / "out", progress=False)
     names = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
     assert names == {"result.nc", "report.html"}
+
+
+RIGID = """
+[surface]
+generate = "fbm"
+shape = [40, 40]
+spacing = 2e-4
+hurst = 0.8
+rms_increment = 3e-5
+rng = 3
+[joint]
+block = 4.8e-3
+shear = [0.0, 2e-4, 4e-4]
+[joint.self_weight]
+shear = [4e-4]
+structure_size = [10.0, 100.0]
+unit_weight = 24e3
+[want]
+joints = ["friction", "self_weight"]
+"""
+
+
+def test_laws_of_closure_need_a_closure_and_a_positive_pressure(scene):
+    text = SCENE.replace('"direct_shear", "shear_curve", "strength_envelope"', '"closure_laws"')
+    text = text.replace("[joint.direct_shear]", "shear = 2e-4\n[joint.direct_shear]")
+    names = [stage.name for stage in fc.scenes.plan(fc.scenes.load(scene(text)))]
+    assert [name for name in names if "closure" in name] == ["joints/closure", "joints/closure_laws"]
+    for value, message in (("-1.0", "seating_pressure: expected"), ("1e5\nclosure = 1e-6", "unknown key")):
+        wrong = text.replace("[want]", f"[joint.closure_laws]\nseating_pressure = {value}\n[want]")
+        with pytest.raises(ValueError, match=message):
+            fc.scenes.validate(scene(wrong))
+
+
+def test_no_modulus_is_asked_for_where_nothing_elastic_is_wanted(scene, tmp_path):
+    tree = fc.scenes.run(scene(RIGID), out=tmp_path / "out", progress=False)
+    assert "rigid_dilatancy" in tree["joints"].children
+    strength = tree["joints/self_weight/shear_strength"]
+    np.testing.assert_allclose(strength.isel(structure_size=1), 10 * strength.isel(structure_size=0))
+    assert "(rigid faces)" in fc.scenes.summary(tree)
+
+
+@pytest.mark.parametrize(
+    ("want", "material"),
+    [
+        ('"friction", "elastic_dilatancy"', ""),
+        ('"closure"', ""),
+        ('"self_weight"', "[material]\nyoung = 3e10\n"),
+    ],
+)
+def test_a_modulus_is_asked_for_where_bodies_deform(scene, want, material):
+    text = RIGID.replace('"friction", "self_weight"', want).replace("[joint]", f"{material}[joint]", 1)
+    with pytest.raises(ValueError, match=r"material.poisson: expected a value"):
+        fc.scenes.validate(scene(text))
+
+
+def test_incompressible_bodies_are_accepted_everywhere(scene, tmp_path):
+    text = SCENE.replace("poisson = 0.2", "poisson = 0.5")
+    tree = fc.scenes.run(scene(text), out=tmp_path / "out", progress=False)
+    assert np.isfinite(tree["joints/direct_shear/peak_shear_strength"]).all()
