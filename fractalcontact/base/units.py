@@ -97,6 +97,26 @@ def _scale_for(units: str, values: Any) -> Scale:
     return Scale(10.0 ** (exponent * power), PREFIXES[exponent] + raise_exponents(units))
 
 
+def named_scale(units: str, shown: str) -> Scale | None:
+    """Return the scale that shows values in `units` as `shown`, None where it is no multiple of them.
+
+    Examples
+    --------
+    >>> named_scale("m", "mm"), named_scale("m2", "mm2"), named_scale("1", "%"), named_scale("m", "N")
+    (Scale(factor=0.001, unit='mm'), Scale(factor=1e-06, unit='mm²'), Scale(factor=0.01, unit='%'), None)
+    """
+    if units in ("", "1"):
+        return {"": Scale(1.0, ""), "1": Scale(1.0, ""), "%": Scale(0.01, "%")}.get(shown)
+    unit, wanted = raise_exponents(units), raise_exponents(shown).replace("u", "µ", int(shown[:1] == "u"))
+    if wanted == unit or (units == "degree" and shown == "°"):
+        return Scale(1.0, "°" if units == "degree" else unit)
+    power = int(units[-1]) if units[-1].isdigit() else 1
+    for exponent, prefix in PREFIXES.items():
+        if PREFIXED.match(units) and prefix + unit == wanted:
+            return Scale(10.0 ** (exponent * power), wanted)
+    return None
+
+
 def raise_exponents(units: str) -> str:
     """Return UDUNITS text with raised exponents: `Pa m-1` becomes `Pa m⁻¹`."""
     return re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda match: match.group().translate(SUPERSCRIPT), units)

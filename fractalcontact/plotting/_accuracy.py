@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, require_variables, table, words
-from fractalcontact.plotting._units import axis_label
+from fractalcontact.plotting._units import label_axis, name_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArra
     for (left, right), (name, data) in zip(shown, benchmarks.items(), strict=True):
         seconds = scale_for("s", table(data, "run_time", PLANE))
         _error_curves(left, data, seconds(table(data, "run_time", PLANE)))
-        left.set_xlabel(axis_label(data["run_time"], seconds))
+        label_axis(left.xaxis, name_of(data["run_time"]), seconds)
         left.set_ylabel("true error")
         entries = _error_curves(right, data, table(data, "memory", PLANE) / MEGABYTE)
         right.set_xlabel("peak memory (MB)")

@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING, Any
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table
 from fractalcontact.plotting._paths import at_shear, load_words, shear_text
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 CORRECTED: dict[str, Any] = {"ls": (0, (4, 2)), "marker": "s", "ms": 3.5}
 
 
 @_style.checked
-def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None = None) -> Axes:
+def area_dimension(
+    result: Any, *, shear: float | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
     """Draw the real contact area of a joint against the spacing of its heights, one curve per load.
 
     Solid lines are the cells in contact, dashed lines the area corrected for their perimeter. The slope of a
@@ -28,6 +32,8 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
         From `fractalcontact.joints.area_dimension`.
     shear : float, optional
         Shear (m), the nearest one is drawn; None: the middle one.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -50,6 +56,7 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     spacing (µm) | real contact area (%)
     """
+    result = shown_in(result, units, "area_dimension")
     ax = _style.axes_or_new(ax)
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
     data = at_shear(result_of(result, "area_dimension", names, ("shear", "step", "resolution")), shear)
@@ -64,8 +71,8 @@ def area_dimension(result: Any, *, shear: float | None = None, ax: Axes | None =
     _style.plain_ticks(ax)
     ax.set_xticks(spacing, [f"{value:g}" for value in spacing])
     ax.set_xticks([], minor=True)
-    ax.set_xlabel(along.label("spacing"))
-    ax.set_ylabel(axis_label(data["contact_fraction"], across))
+    label_axis(ax.xaxis, "spacing", along)
+    label_axis(ax.yaxis, name_of(data["contact_fraction"]), across)
     ax.set_title(shear_text(data))
     title, labels = load_words(data)
     _style.sequence_legend(ax, title, labels, colours)

@@ -13,19 +13,22 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
-from fractalcontact.plotting._units import axis_label, name_of, scale_of
+from fractalcontact.plotting._units import axis_label, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 DIMENSIONS = ("box_dimension", "minkowski_dimension", "correlation_dimension", "boundary_dimension")
 WIDE_INTERVAL = 0.5  # width of an interval beyond which a point is drawn open
 
 
 @_style.checked
-def box_dimension(result: Any, *, normal_force: float | None = None, axes: Panels | None = None) -> AxesArray:
+def box_dimension(
+    result: Any, *, normal_force: float | None = None, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
     r"""Draw the box dimension of a contact domain against load, and against shear at one force.
 
     The other dimensions of a domain are drawn in the same way. Dashed lines show the random null: randomly
@@ -39,6 +42,8 @@ def box_dimension(result: Any, *, normal_force: float | None = None, axes: Panel
         `boundary_dimension` over (shear, step), or over one of them.
     normal_force : float, optional
         Normal force (N) of the panel against shear; the nearest step is taken. Default: the last step.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. There is one for each of the
         dims that is longer than one. Default: a new figure.
@@ -61,6 +66,7 @@ def box_dimension(result: Any, *, normal_force: float | None = None, axes: Panel
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     coverage (%) | box dimension $\Delta_\sigma$
     """
+    result = shown_in(result, units, "box_dimension")
     present = [name for name in DIMENSIONS if name in as_dataset(result, "box_dimension")]
     data = result_of(result, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
     name = present[0]
@@ -132,6 +138,7 @@ def local_slopes(
     *,
     shear: float | None = None,
     normal_force: float | None = None,
+    units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     """Draw the local dimension against box size, for increasing load and for increasing shear.
@@ -149,6 +156,8 @@ def local_slopes(
         middle one.
     normal_force : float, optional
         Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. There is one for each of the
         dims that is longer than one. Default: a new figure.
@@ -171,6 +180,7 @@ def local_slopes(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | local dimension
     """
+    result = shown_in(result, units, "local_slopes")
     data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
     scale = next((name for name in ("box_size", "radius") if name in data.variables), "box_size")
     require_dims(data, "local_slopes", {"local_slope": scale, scale: scale})

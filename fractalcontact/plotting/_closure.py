@@ -13,12 +13,13 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import nearest, result_of, table, words
 from fractalcontact.plotting._paths import shear_words
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.base.units import Scale
+    from fractalcontact.plotting._units import Units
 
 RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
 LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
@@ -35,6 +36,7 @@ def closure_laws(
     marked: Sequence[int] = (),
     key: bool = True,
     log: bool = False,
+    units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw normal force against closure, one curve per shear displacement.
@@ -55,6 +57,8 @@ def closure_laws(
         Add a legend of the shear displacements.
     log : bool
         Logarithmic axes, which show every decade of the load.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -77,6 +81,7 @@ def closure_laws(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     closure (µm) | normal force $F$ (N)
     """
+    closure = shown_in(closure, units, "closure_laws")
     ax = _style.axes_or_new(ax)
     data = result_of(closure, "closure_laws", ("closure", "normal_force"), ("shear", "step"), "closure")
     inner_name = "interface_closure" if "interface_closure" in data else "closure"
@@ -98,8 +103,8 @@ def closure_laws(
         steps = [int(step) for step in marked]
         _set_scales(ax, length(total), newton(force), log=log)
         mark_points(ax, length(inner[row, steps]), newton(force[row, steps]), colours[row])
-    ax.set_xlabel(length.label("closure"))
-    ax.set_ylabel(axis_label(data["normal_force"], newton))
+    label_axis(ax.xaxis, "closure", length)
+    label_axis(ax.yaxis, name_of(data["normal_force"]), newton)
     _set_scales(ax, length(total), newton(force), log=log)
     if key:
         shear_legend(ax, data, colours)
@@ -183,8 +188,8 @@ def closure_fits(closure: Any, laws: Any, *, ax: Axes | None = None) -> Axes:
             ax.plot(along(p), up(curve), color=colour, **line)
     _style.log_scale(ax, x=pressure)
     _style.plain_ticks(ax)
-    ax.set_xlabel(axis_label(data["nominal_pressure"], along))
-    ax.set_ylabel(axis_label(data["interface_closure"], up))
+    label_axis(ax.xaxis, name_of(data["nominal_pressure"]), along)
+    label_axis(ax.yaxis, name_of(data["interface_closure"]), up)
     shear_legend(ax, data, colours)
     entries = [_style.legend_line(f"{name},\nnot preferred", lw=0.9, ls=style)
                for name, style in zip(("exponential", "hyperbolic"), LAW_LINES, strict=True)]  # fmt: skip
@@ -207,6 +212,7 @@ def contact_area(
     against: str = "normal_force",
     theory: Any = None,
     log: bool = False,
+    units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
@@ -225,6 +231,8 @@ def contact_area(
         From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
     log : bool
         Logarithmic axes, which show every decade of the load; a dotted line is proportional to the load.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -250,6 +258,7 @@ def contact_area(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | real / nominal contact area (%)
     """
+    result = shown_in(result, units, "contact_area")
     ax = _style.axes_or_new(ax)
     data = result_of(result, "contact_area", ("contact_fraction", against), ("shear", "step"))
     with Problems("fc.plotting.contact_area") as problems:
@@ -267,8 +276,8 @@ def contact_area(
         if corrected:
             fraction = table(data, "corrected_contact_fraction", ("shear", "step"))[i]
             ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)
-    ax.set_xlabel(axis_label(data[against], scale))
-    ax.set_ylabel(percent.label("real / nominal contact area"))
+    label_axis(ax.xaxis, name_of(data[against]), scale)
+    label_axis(ax.yaxis, "real / nominal contact area", percent)
     entries: list[Any] = []
     if theory is not None:
         entries += draw_theories(ax, theory, "contact_area", "contact_fraction", against, scale, percent)

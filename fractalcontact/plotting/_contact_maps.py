@@ -12,11 +12,13 @@ from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import extent_of, result_of
 from fractalcontact.plotting._paths import load_text, select_path, shear_text
 from fractalcontact.plotting._surface import draw_outline, plane_scale
+from fractalcontact.plotting._units import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 COLUMNS = 3
 ZOOM = 1 / 6  # edge of the magnified window over the shorter side
@@ -31,6 +33,7 @@ def contact_domains(
     normal_force: float | None = None,
     panels: int = 6,
     zoom: float | None = None,
+    units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     """Draw maps of the contact state for increasing load at one shear, or increasing shear at one force.
@@ -50,6 +53,8 @@ def contact_domains(
     zoom : float, optional
         Edge (m) of the window, 0 for none. Default: a sixth of the shorter side if the cells of a map are
         narrower than a typographic point, else none; none on given `axes`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -71,6 +76,7 @@ def contact_domains(
     >>> len(maps)
     2
     """
+    result = shown_in(result, units, "contact_domains")
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
     count, columns = path.sizes[dim], number_of_columns(path.sizes[dim])

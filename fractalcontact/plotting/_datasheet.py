@@ -18,6 +18,7 @@ from fractalcontact.plotting._paper import group
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
+from fractalcontact.plotting._units import label_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -322,7 +323,7 @@ def _draw(ax: Any, pressure: Any, values: Any, name: str, across: Scale) -> None
             ax.plot(along(pressure[i]), across(values[i, :, j]), **style)
     _style.log_scale(ax, x=pressure, y=values)
     _style.plain_ticks(ax)
-    ax.set_xlabel(along.label("normal stress"))
+    label_axis(ax.xaxis, "normal stress", along)
     ax.set_title(across.label(name))
 
 

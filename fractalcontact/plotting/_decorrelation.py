@@ -9,16 +9,18 @@ import numpy as np
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._directions import direction_styles
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
 
 
 @_style.checked
-def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
+def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the correlation of the two faces of a joint against shear displacement.
 
     Vertical dotted lines show the decorrelation lengths, and bands their intervals.
@@ -27,6 +29,8 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
     ----------
     memory : Dataset or node of a DataTree
         From `fractalcontact.joints.decorrelation_length`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -49,6 +53,7 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | correlation of the faces
     """
+    memory = shown_in(memory, units, "correlation")
     ax = _style.axes_or_new(ax)
     names = ("correlation", "decorrelation_length", "shear")
     data = result_of(memory, "correlation", names, ("direction", "shear"), "memory")
@@ -66,7 +71,7 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
             ax.axvspan(float(along(low)), float(along(high)), color=style["color"], alpha=0.12, lw=0)
         entries.append(_style.legend_line(name, **style))
     ax.axhline(0.0, color=_style.grey(), lw=0.6)
-    ax.set_xlabel(axis_label(data["shear"], along))
+    label_axis(ax.xaxis, name_of(data["shear"]), along)
     ax.set_ylabel("correlation of the faces")
     _style.side_legend(ax, entries, title="block slides")
     _style.side_legend(ax, [_style.legend_line("decorrelation\nlength", lw=0.7, ls=":")], low=True)
@@ -74,13 +79,15 @@ def correlation(memory: Any, *, ax: Axes | None = None) -> Axes:
 
 
 @_style.checked
-def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Axes:
+def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method.
 
     Parameters
     ----------
     dimension : Dataset or node of a DataTree
         From `fractalcontact.joints.delta_dimension`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -103,6 +110,7 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | dimension of the delta-surface
     """
+    dimension = shown_in(dimension, units, "delta_dimension")
     ax = _style.axes_or_new(ax)
     data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",), "dimension")
     along = scale_of(data["shear"])
@@ -113,7 +121,7 @@ def delta_dimension(dimension: Any, *, ax: Axes | None = None) -> Axes:
         entries.append(_style.legend_line(name.split("_")[0], **style))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
         ax.set_xscale("log")
-    ax.set_xlabel(axis_label(data["shear"], along))
+    label_axis(ax.xaxis, name_of(data["shear"]), along)
     ax.set_ylabel("dimension of the delta-surface")
     _style.side_legend(ax, entries, title="method")
     return ax

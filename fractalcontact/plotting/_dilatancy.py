@@ -7,22 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._directions import direction_styles, limit_shear, select_direction
 from fractalcontact.plotting._inputs import nearest, result_of, table
 from fractalcontact.plotting._paths import load_words
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 MEAN_SLOPE_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
 
 
 @_style.checked
-def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Axes:
+def rigid_dilatancy(dilatancy: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     r"""Draw the dilatancy of rigid surfaces against shear displacement, one curve per direction.
 
     Thin dotted lines show the rise along the mean plane of the surface.
@@ -32,6 +33,8 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Axes:
     dilatancy : Dataset or node of a DataTree
         From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), and optionally
         mean_slope over direction.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -54,6 +57,7 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (µm) | rigid dilatancy $\delta_\mathrm{r}$ (µm)
     """
+    dilatancy = shown_in(dilatancy, units, "rigid_dilatancy")
     ax = _style.axes_or_new(ax)
     data = result_of(
         dilatancy, "rigid_dilatancy", ("rigid_dilatancy", "shear"), ("direction", "shear"), "dilatancy"
@@ -70,8 +74,8 @@ def rigid_dilatancy(dilatancy: Any, *, ax: Axes | None = None) -> Axes:
             slope = float(table(data, "mean_slope", ("direction",))[i])
             ends = np.array([0.0, np.nanmax(shear)])
             ax.plot(along(ends), across(slope * ends), color=style["color"], **MEAN_SLOPE_LINE)
-    ax.set_xlabel(axis_label(data["shear"], along))
-    ax.set_ylabel(axis_label(data["rigid_dilatancy"], across))
+    label_axis(ax.xaxis, name_of(data["shear"]), along)
+    label_axis(ax.yaxis, name_of(data["rigid_dilatancy"]), across)
     if any(name for name, _ in styles):
         _style.side_legend(ax, entries, title="block slides")
     if "mean_slope" in data:
@@ -86,6 +90,7 @@ def elastic_dilatancy(
     direction: str | None = None,
     reach: float | None = None,
     marked: Sequence[float] = (),
+    units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     r"""Draw dilatancy under constant normal force against shear displacement, one curve per force.
@@ -103,6 +108,8 @@ def elastic_dilatancy(
         Largest shear displacement (m) to show.
     marked : sequence of float
         Shear displacements (m) to mark A, B, C ... on the curve of the last force.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -125,6 +132,7 @@ def elastic_dilatancy(
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
+    dilatancy = shown_in(dilatancy, units, "elastic_dilatancy")
     ax = _style.axes_or_new(ax)
     selected = limit_shear(select_direction(dilatancy, direction, "elastic_dilatancy", "dilatancy"), reach)
     data = result_of(selected, "elastic_dilatancy", ("dilatancy", "shear"), ("shear", "step"), "dilatancy")
@@ -132,7 +140,7 @@ def elastic_dilatancy(
     opening = table(data, "dilatancy", ("shear", "step"))
     rigid = table(data, "rigid_dilatancy", ("shear",)) if "rigid_dilatancy" in data else None
     along = scale_of(data["shear"])
-    across = scale_for("m", opening if rigid is None else np.append(opening.ravel(), rigid))
+    across = scale_of(data["dilatancy"], opening if rigid is None else np.append(opening.ravel(), rigid))
     colours = _style.sequence_colours(opening.shape[1])
     marker = "o" if shear.size <= _style.MAX_MARKED_POINTS else ""
     entries = []
@@ -148,7 +156,7 @@ def elastic_dilatancy(
             mark_points(ax, along(shear[point]), across(opening[point, -1]), colours[-1], number)
     title, labels = load_words(data)
     entries += [_style.legend_line(text, color=colour) for text, colour in zip(labels, colours, strict=True)]
-    ax.set_xlabel(axis_label(data["shear"], along))
-    ax.set_ylabel(across.label(r"dilatancy $\delta$"))
+    label_axis(ax.xaxis, name_of(data["shear"]), along)
+    label_axis(ax.yaxis, r"dilatancy $\delta$", across)
     _style.side_legend(ax, entries, title=title)
     return ax

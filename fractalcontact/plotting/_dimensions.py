@@ -11,12 +11,13 @@ import xarray as xr
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, require_variables, result_of, table, words
-from fractalcontact.plotting._units import axis_label, name_of, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
@@ -38,7 +39,9 @@ CLIPPED = 10  # per cent of the local slopes at either end that may lie outside 
 
 
 @_style.checked
-def dimension_curves(curves: Any, estimates: Any = None, *, axes: Panels | None = None) -> AxesArray:
+def dimension_curves(
+    curves: Any, estimates: Any = None, *, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
     """Draw scaling curves with their local slopes, and the fitted window and slope.
 
     Parameters
@@ -49,6 +52,8 @@ def dimension_curves(curves: Any, estimates: Any = None, *, axes: Panels | None 
     estimates : Dataset, optional
         From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
         scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -69,6 +74,7 @@ def dimension_curves(curves: Any, estimates: Any = None, *, axes: Panels | None 
     >>> print(upper.get_ylabel(), "|", lower.get_xlabel())
     variogram (µm²) | lag (mm)
     """
+    curves = shown_in(curves, units, "dimension_curves")
     datasets, fits = _curves_in(curves, estimates)
     names = list(datasets)
     columns = 2 if len(names) == 4 else min(len(names), COLUMNS)
@@ -155,10 +161,10 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     if fit is not None:
         _draw_fit(upper, lower, fit, (scale, value), (x, y), (along, across))
     upper.set_title(name.replace("_", " "))
-    upper.set_ylabel(across.label(name_of(curve[value])))
+    label_axis(upper.yaxis, name_of(curve[value]), across)
     upper.tick_params(labelbottom=False)
     lower.set_xlim(upper.get_xlim())
-    lower.set_xlabel(axis_label(curve[scale], along))
+    label_axis(lower.xaxis, name_of(curve[scale]), along)
     lower.set_ylabel("local slope")
     for ax in (upper, lower):
         _style.plain_ticks(ax)

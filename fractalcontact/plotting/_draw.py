@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
+FORMATS = ("png", "svg", "pdf")
 PAPER_BAND = (2.15, 2.29)  # fractal dimensions that the paper gives for its surface
 # names of the same figures in a study that is not compared with the paper
 JOINT = {
@@ -61,9 +62,14 @@ JOINT = {
 
 
 def draw(
-    tree: xr.DataTree, folder: str | os.PathLike[str], *, progress: bool = False, paper: bool = True
+    tree: xr.DataTree,
+    folder: str | os.PathLike[str],
+    *,
+    progress: bool = False,
+    paper: bool = True,
+    formats: Sequence[str] = ("png",),
 ) -> list[Path]:
-    """Draw every figure that a study has data for and write each one as a PNG file.
+    """Draw every figure that a study has data for and write each one as a file.
 
     Parameters
     ----------
@@ -77,6 +83,8 @@ def draw(
         Show a progress bar.
     paper : bool
         Name the figures of a joint after those of the 1998 paper.
+    formats : sequence of str
+        Any of png, svg and pdf.
 
     Returns
     -------
@@ -99,13 +107,18 @@ def draw(
         problems.path("folder", folder, what="the path of a folder")
         problems.boolean("progress", progress)
         problems.boolean("paper", paper)
+        if problems.require(
+            isinstance(formats, (list, tuple)) and bool(formats), "formats", "a sequence of words", formats
+        ):
+            for word in formats:
+                problems.choice("formats", word, FORMATS)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, drawing in track(_all_drawings(tree, paper), progress, "figures", unit="figure"):
         with DRAWING_LOCK, drawn_for_files():
             figure = figure_of(drawing())
-            written.append(_write(figure, folder / f"{name}.png"))
+            written += [_write(figure, folder / f"{name}.{suffix}") for suffix in formats]
             figure.clear()
     return written
 
@@ -242,5 +255,9 @@ def _write(figure: Figure, target: Path) -> Path:
         layout.execute(figure)
         figure.set_layout_engine("none")
     with written_whole(target) as temporary:
-        canvas.print_png(temporary)  # type: ignore[no-untyped-call]
+        if target.suffix == ".png":
+            canvas.print_png(temporary, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
+        else:
+            date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
+            figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})
     return target

@@ -8,16 +8,18 @@ import numpy as np
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
 
 
 @_style.checked
-def scaling(result: Any, *, ax: Axes | None = None) -> Axes:
+def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the Hurst exponent of every octave of wavelength with its interval.
 
     The band is the longest run of octaves with one exponent, as wide as its wavelengths and as high as the
@@ -27,6 +29,8 @@ def scaling(result: Any, *, ax: Axes | None = None) -> Axes:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.dimensions.scaling`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -47,6 +51,7 @@ def scaling(result: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     wavelength (mm) | Hurst exponent
     """
+    result = shown_in(result, units, "scaling")
     ax = _style.axes_or_new(ax)
     names = ("hurst", "ci_low", "ci_high", "window_hurst", "wavelength")
     data = result_of(result, "scaling", names, ("wavelength",))
@@ -64,7 +69,7 @@ def scaling(result: Any, *, ax: Axes | None = None) -> Axes:
         ax.axhline(limit, color=_style.grey(), lw=0.7, ls=":")
     ax.set_xscale("log")
     ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
-    ax.set_xlabel(axis_label(data["wavelength"], along))
+    label_axis(ax.xaxis, name_of(data["wavelength"]), along)
     ax.set_ylabel("Hurst exponent")
     ax.legend()
     return ax

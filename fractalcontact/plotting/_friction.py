@@ -17,12 +17,13 @@ from fractalcontact.plotting._directions import (
 )
 from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
 from fractalcontact.plotting._paths import load_words
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
 
@@ -33,6 +34,7 @@ def friction(
     *,
     direction: str | None = None,
     reach: float | None = None,
+    units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     """Draw friction angle and shear strength against shear displacement, one curve per normal force.
@@ -47,6 +49,8 @@ def friction(
         direction gets a curve.
     reach : float, optional
         Largest shear displacement (m) to show.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -69,6 +73,7 @@ def friction(
     >>> print(ax.get_ylabel())
     friction angle (°)
     """
+    result = shown_in(result, units, "friction")
     selected = limit_shear(as_dataset(result, "friction"), reach)
     names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
     by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
@@ -117,8 +122,8 @@ def _draw_curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list
     if name == "shear_strength" and _style.needs_log_axis(values):
         ax.set_yscale("log")
         _style.plain_ticks(ax)
-    ax.set_xlabel(axis_label(data["shear"], along))
-    ax.set_ylabel(axis_label(data[name], across))
+    label_axis(ax.xaxis, name_of(data["shear"]), along)
+    label_axis(ax.yaxis, name_of(data[name]), across)
 
 
 def _curve_legend(data: xr.Dataset, over: str) -> tuple[list[Any], str]:

@@ -11,19 +11,20 @@ from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import as_dataset, extent_of, nearest, require_variables
 from fractalcontact.plotting._paths import load_words, shear_words
 from fractalcontact.plotting._surface import label_axes, plane_scale
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 MAX_CURVES = 8  # of the distributions of many masks
 PALETTE = 12  # colours of neighbouring islands
 
 
 @_style.checked
-def islands(result: Any, *, axes: Panels | None = None) -> AxesArray:
+def islands(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw a map of the islands of a contact domain and the distribution of their areas.
 
     The left panel shows neighbouring islands in different colours. The right panel shows the number of
@@ -35,6 +36,8 @@ def islands(result: Any, *, axes: Panels | None = None) -> AxesArray:
         From `fractalcontact.domains.islands` with `keep=("label",)`: label (y, x), and area (m2) over
         `island`. Of several masks the last one with an island is mapped, and each gets a curve (at most
         eight are drawn).
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -57,6 +60,7 @@ def islands(result: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(island_map.get_title(), "|", areas.get_xlabel())
     4 islands | island area (mm²)
     """
+    result = shown_in(result, units, "islands")
     data = _checked_islands(result, ("label", "area"))
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
     island_map(data, ax=left)
@@ -65,7 +69,9 @@ def islands(result: Any, *, axes: Panels | None = None) -> AxesArray:
 
 
 @_style.checked
-def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None) -> Axes:
+def island_map(
+    result: Any, *, title: str | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
     """Draw a map of the islands of a contact domain, neighbouring islands in different colours.
 
     Parameters
@@ -75,6 +81,8 @@ def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None)
         last one with an island is mapped.
     title : str, optional
         Default: the number of islands.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -99,6 +107,7 @@ def island_map(result: Any, *, title: str | None = None, ax: Axes | None = None)
     """
     import matplotlib
 
+    result = shown_in(result, units, "island_map")
     plane = _last_map(_checked_islands(result, ("label",))["label"])
     labels = np.asarray(plane.values).astype(np.int64)
     hues = matplotlib.colormaps[_style.SEQUENCE_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
@@ -132,7 +141,7 @@ def _last_map(plane: xr.DataArray) -> xr.DataArray:
 def _island_areas(ax: Axes, data: xr.Dataset) -> None:
     areas = np.asarray(data["area"].values, dtype=float).ravel()
     scale = scale_of(data["area"])
-    ax.set_xlabel(axis_label(data["area"], scale))
+    label_axis(ax.xaxis, name_of(data["area"]), scale)
     ax.set_ylabel("number of islands of at least this area")
     if not np.isfinite(areas).any():
         _style.write_in_empty_axes(ax, "no islands")

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import draw_size_curves
 from fractalcontact.plotting._inputs import require_dims, result_of
+from fractalcontact.plotting._units import shown_in
 
 if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 
 @_style.checked
@@ -18,6 +20,7 @@ def lacunarity(
     *,
     shear: float | None = None,
     normal_force: float | None = None,
+    units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
@@ -33,6 +36,8 @@ def lacunarity(
         middle one.
     normal_force : float, optional
         Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. There is one for each of the
         dims that is longer than one. Default: a new figure.
@@ -56,6 +61,7 @@ def lacunarity(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | lacunarity $\Lambda$
     """
+    result = shown_in(result, units, "lacunarity")
     data = result_of(result, "lacunarity", ("lacunarity",), ("shear", "step"))
     require_dims(data, "lacunarity", {"lacunarity": "box_size"})
     return draw_size_curves(data, shear, normal_force, axes, "lacunarity", "null_lacunarity")

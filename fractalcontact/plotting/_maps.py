@@ -9,6 +9,7 @@ import numpy as np
 
 from fractalcontact.base.units import Scale, quantity_text
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._units import label_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,14 +133,15 @@ def draw_image(ax: Axes, image: Array, extent: Extent, length: Scale) -> None:
     _style.draw_frame(ax)
 
 
-def colour_bar(ax: Axes, mappable: Any, label: str) -> Any:
+def colour_bar(ax: Axes, mappable: Any, name: str, scale: Scale) -> Any:
     """Add a narrow colour bar beside the axes."""
     bar: Any = ax.get_figure().colorbar(  # type: ignore[union-attr]
-        mappable, ax=ax, label=label, extend=mappable.beyond, aspect=28, shrink=0.85, pad=0.02
+        mappable, ax=ax, extend=mappable.beyond, aspect=28, shrink=0.85, pad=0.02
     )
     bar.outline.set_linewidth(0.5)
     _style.style_axes(bar.ax)
     bar.ax.grid(False)
+    label_axis(bar.ax.yaxis, name, scale)
     bar.ax.tick_params(length=2.5)
     return bar
 

@@ -13,12 +13,13 @@ from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_o
 from fractalcontact.plotting._inputs import extent_of, result_of, table
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._surface import plane_scale
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 STATES = ("open", "stick", "slip")
 
@@ -28,6 +29,7 @@ def slip_domains(
     result: Any,
     *,
     panels: int = 6,
+    units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
     """Draw maps of stick, slip and open along a path of tangential force.
@@ -39,6 +41,8 @@ def slip_domains(
         step.
     panels : int
         Largest number of maps, spread evenly over the steps.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -67,6 +71,7 @@ def slip_domains(
     >>> len(maps)
     3
     """
+    result = shown_in(result, units, "slip_domains")
     with Problems("fc.plotting.slip_domains") as problems:
         problems.integer("panels", panels, at_least=1)
     data = result_of(result, "slip_domains", ("slip_state",), ("step",))
@@ -88,7 +93,7 @@ def slip_domains(
 
 
 @_style.checked
-def slip_loops(result: Any, *, axes: Panels | None = None) -> AxesArray:
+def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw tangential force against displacement, and the part of the contact that sticks against the force.
 
     Parameters
@@ -96,6 +101,8 @@ def slip_loops(result: Any, *, axes: Panels | None = None) -> AxesArray:
     result : Dataset or node of a DataTree
         From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
         (shear, step).
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -123,6 +130,7 @@ def slip_loops(result: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(fc.plotting.slip_loops(result)[0].get_ylabel())
     tangential force $Q$ (N)
     """
+    result = shown_in(result, units, "slip_loops")
     needed = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
     data = result_of(result, "slip_loops", needed, ("shear", "step"))
     force = table(data, "tangential_force", ("shear", "step"))
@@ -138,9 +146,9 @@ def slip_loops(result: Any, *, axes: Panels | None = None) -> AxesArray:
         left.plot(along(displacement[row]), up(force[row]), **line)
         share = 100 * stuck[row] / np.where(contact[row] > 0, contact[row], np.nan)
         right.plot(up(force[row]), share, **line)
-    left.set_xlabel(axis_label(data["tangential_displacement"], along))
-    left.set_ylabel(axis_label(data["tangential_force"], up))
-    right.set_xlabel(axis_label(data["tangential_force"], up))
+    label_axis(left.xaxis, name_of(data["tangential_displacement"]), along)
+    label_axis(left.yaxis, name_of(data["tangential_force"]), up)
+    label_axis(right.xaxis, name_of(data["tangential_force"]), up)
     right.set_ylabel("part of the contact that sticks (%)")
     right.set_ylim(0, 105)
     title, labels = shear_words(data) if "shear" in data.dims else ("", [])

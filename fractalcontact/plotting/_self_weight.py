@@ -10,17 +10,19 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._directions import direction_styles
 from fractalcontact.plotting._inputs import result_of, table
 from fractalcontact.plotting._paths import shear_words
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 SHEAR_LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.2)))
 CONSTANT: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": "-."}
 
 
 @_style.checked
-def self_weight(result: Any, *, ax: Axes | None = None) -> Axes:
+def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the shear strength of a joint under self-weight against the size of the structure.
 
     One colour for each direction of sliding, one line style for each shear. A grey line is the strength for
@@ -30,6 +32,8 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Axes:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.self_weight`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -52,6 +56,7 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_xlabel(), ax.get_xscale(), ax.get_yscale())
     size of the structure (m) log log
     """
+    result = shown_in(result, units, "self_weight")
     ax = _style.axes_or_new(ax)
     names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
     data = result_of(result, "self_weight", names, ("direction", "shear", "structure_size"))
@@ -67,8 +72,8 @@ def self_weight(result: Any, *, ax: Axes | None = None) -> Axes:
     ax.plot(sizes, across(basic), **CONSTANT)
     _style.log_scale(ax, x=sizes, y=basic)
     _style.plain_ticks(ax)
-    ax.set_xlabel(along.label("size of the structure"))
-    ax.set_ylabel(axis_label(data["shear_strength"], across))
+    label_axis(ax.xaxis, "size of the structure", along)
+    label_axis(ax.yaxis, name_of(data["shear_strength"]), across)
     entries = [_style.legend_line(name, **style) for name, style in directions]
     _style.side_legend(ax, entries, title="block slides")
     title, labels = shear_words(data)

@@ -6,22 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of
-from fractalcontact.plotting._units import axis_label
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 SHOWN = ("shear_stress", "dilatancy")
 BESIDE: dict[str, Any] = {"lw": 1.0, "ls": "--"}  # curves to compare with
 
 
 @_style.checked
-def shear_curve(result: Any, *, beside: Any | None = None, axes: Panels | None = None) -> AxesArray:
+def shear_curve(
+    result: Any, *, beside: Any | None = None, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
     r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress.
 
     Parameters
@@ -30,6 +32,8 @@ def shear_curve(result: Any, *, beside: Any | None = None, axes: Panels | None =
         From `fractalcontact.joints.direct_shear` or `fractalcontact.joints.shear_curve`.
     beside : Dataset or node of a DataTree, optional
         Such a result to draw dashed, in the colours of the same normal stresses.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -52,23 +56,22 @@ def shear_curve(result: Any, *, beside: Any | None = None, axes: Panels | None =
     >>> print(fc.plotting.shear_curve(result)[0].get_ylabel())
     shear stress $\tau$ (MPa)
     """
+    result = shown_in(result, units, "shear_curve")
     data = [_read(result)] + ([] if beside is None else [_read(beside)])
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
     pressures = np.unique(np.concatenate([each["nominal_pressure"].values for each in data]))
     colours = dict(zip(pressures.tolist(), _style.sequence_colours(pressures.size), strict=True))
     displacements = np.concatenate([each["shear_displacement"].values.ravel() for each in data])
-    along = scale_for("m", displacements)
+    along = scale_of(data[0]["shear_displacement"], displacements)
     for ax, name in zip(shown, SHOWN, strict=True):
-        across = scale_for(
-            data[0][name].attrs["units"], np.concatenate([each[name].values.ravel() for each in data])
-        )
+        across = scale_of(data[0][name], np.concatenate([each[name].values.ravel() for each in data]))
         for each, style in zip(data, ({}, BESIDE), strict=False):
             for i, pressure in enumerate(each["nominal_pressure"].values.tolist()):
                 x = np.broadcast_to(each["shear_displacement"].values, each[name].shape)[i]
                 ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], **style)
-        ax.set_ylabel(axis_label(data[0][name], across))
-        ax.set_xlabel(axis_label(data[0]["shear_displacement"], along))
-    stress = scale_for("Pa", pressures)
+        label_axis(ax.yaxis, name_of(data[0][name]), across)
+        label_axis(ax.xaxis, name_of(data[0]["shear_displacement"]), along)
+    stress = scale_of(data[0]["nominal_pressure"], pressures)
     labels = [f"{value:.3g}" for value in stress(pressures)]
     entries = [
         _style.legend_line(text, color=colours[key]) for text, key in zip(labels, colours, strict=True)

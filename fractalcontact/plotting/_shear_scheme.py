@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.units import quantity_text, scale_for
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._directions import direction_name
 from fractalcontact.plotting._inputs import extent_of, result_of, words
 from fractalcontact.plotting._surface import draw_outline, label_axes, plane_of, plane_scale
+from fractalcontact.plotting._units import label_axis, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 AZIMUTHS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
@@ -49,7 +51,9 @@ class ShearStep:
 
 
 @_style.checked
-def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels | None = None) -> AxesArray:
+def sliding_scheme(
+    surface: Any, delta: Any, *, upper: Any = None, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
     """Draw the sliding block from above and a section through the crack along the sliding direction.
 
     The section shows the given surfaces, its heights exaggerated as its title says. The block is lifted by
@@ -65,6 +69,8 @@ def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels 
         shears is drawn.
     upper : DataArray, Dataset or node of a DataTree, optional
         Heights (m) of the block in the same coordinates. Default: mated, equal to `surface`.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -87,6 +93,7 @@ def sliding_scheme(surface: Any, delta: Any, *, upper: Any = None, axes: Panels 
     >>> print(section.get_title())
     section along the sliding direction, East, heights × 10
     """
+    surface = shown_in(surface, units, "sliding_scheme")
     lower, step = plane_of(surface, "sliding_scheme", "height", "surface"), shear_step_of(delta)
     facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height", "upper")
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.0), width_ratios=(1.0, 1.9))
@@ -114,7 +121,7 @@ def shear_step_of(delta: Any) -> ShearStep:
 
 def _draw_plan(ax: Axes, lower: xr.DataArray, step: ShearStep) -> None:
     length, extent = plane_scale(lower), extent_of(lower)
-    _maps.relief(ax, np.asarray(lower.values, float), extent, length, scale_for("m", lower.values))
+    _maps.relief(ax, np.asarray(lower.values, float), extent, length, scale_of(lower))
     left, right, bottom, top = extent_of(step.block)
     x, y = step.shear * step.unit
     draw_outline(ax, (left, right, bottom, top), length, linestyle=(0, (3, 2)))
@@ -168,7 +175,7 @@ def _draw_section(
     top, length = block_top + 0.6 * span, float(position[-1] - position[0])
     times = _one_digit(length / (top - low) / SECTION_SHAPE)
     low = top - length / times / SECTION_SHAPE
-    along, up = scale_for("m", position), scale_for("m", (low, top))
+    along, up = scale_of(lower["x"], position), scale_of(lower, (low, top))
     ax.fill_between(along(position), float(up(low)), up(lower_height), color=LOWER, lw=0)
     ax.plot(along(position), up(lower_height), color=_style.ink(), lw=0.9)
     block_bottom = up(upper_height + step.lift)
@@ -182,8 +189,8 @@ def _draw_section(
     ax.text(0.02, 0.04, "lower", transform=ax.transAxes)
     corner = (float(position[inside][0]), float(upper_height[0]), block_top + 0.14 * span)
     _draw_dimensions(ax, (along, up), step, lift_name, corner)
-    ax.set_xlabel(along.label("position along the sliding direction"))
-    ax.set_ylabel(up.label("height"))
+    label_axis(ax.xaxis, "position along the sliding direction", along)
+    label_axis(ax.yaxis, "height", up)
     return times
 
 

@@ -6,19 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import require_dims, result_of, words
-from fractalcontact.plotting._units import axis_label
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is out of its range
 
 
 @_style.checked
-def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None = None) -> Axes:
+def strength_envelope(
+    result: Any, *, tests: Any | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
     r"""Draw the peak shear strength against the normal stress, one curve per criterion.
 
     A curve is dotted where its criterion is used out of its range.
@@ -29,6 +32,8 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
         From `fractalcontact.joints.strength_envelope`.
     tests : Dataset or node of a DataTree, optional
         From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -51,6 +56,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     >>> print(fc.plotting.strength_envelope(result).get_ylabel())
     shear strength $\tau$ (MPa)
     """
+    result = shown_in(result, units, "strength_envelope")
     ax = _style.axes_or_new(ax)
     data = result_of(result, "strength_envelope", ("shear_strength", "in_range", "criterion"), ("criterion",))
     require_dims(data, "strength_envelope", {"shear_strength": "nominal_pressure"})
@@ -59,7 +65,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
     strength = data["shear_strength"].transpose("criterion", "nominal_pressure")
     in_range = data["in_range"].transpose("criterion", "nominal_pressure").values
     # one unit on both axes, so that a slope can be read as a friction coefficient
-    scale = scale_for("Pa", np.concatenate([pressure.values, strength.values.ravel()]))
+    scale = scale_of(data["shear_strength"], np.concatenate([pressure.values, strength.values.ravel()]))
     x = scale(pressure)
     entries = []
     for i, name in enumerate(words(data["criterion"])):
@@ -80,7 +86,7 @@ def strength_envelope(result: Any, *, tests: Any | None = None, ax: Axes | None 
             entries.append(_style.legend_line(f"direct shear, {name.partition('_')[0]}", **style))
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
-    ax.set_xlabel(axis_label(pressure, scale))
-    ax.set_ylabel(axis_label(data["shear_strength"], scale))
+    label_axis(ax.xaxis, name_of(pressure), scale)
+    label_axis(ax.yaxis, name_of(data["shear_strength"]), scale)
     _style.side_legend(ax, entries)
     return ax

@@ -11,10 +11,12 @@ from fractalcontact.base.units import Scale, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import as_dataset, extent_of
-from fractalcontact.plotting._units import axis_label, name_of, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 SIZE = (4.6, 3.8)
 POSITIVE = ("pressure", "gap")
@@ -27,6 +29,7 @@ def surface(
     block: xr.DataArray | None = None,
     shaded: bool = False,
     title: str = "",
+    units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a map of heights.
@@ -43,6 +46,8 @@ def surface(
         Light the surface from the north-west (upper left), its slopes exaggerated to an rms of 0.5. The
         colours are then those of the bar on average only.
     title : str
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -63,6 +68,7 @@ def surface(
     >>> [each.get_ylabel() for each in ax.figure.axes]
     ['$y$ (mm)', 'height (mm)']
     """
+    surface = shown_in(surface, units, "surface")
     plane = plane_of(surface, "surface", "height", "surface")
     outline = None if block is None else _block_extent(block)
     ax = _style.axes_or_new(ax, SIZE)
@@ -71,14 +77,14 @@ def surface(
     mappable = _maps.relief(ax, np.asarray(plane.values, float), extent, length, height, shaded=shaded)
     if outline is not None:
         draw_outline(ax, outline, length)
-    _maps.colour_bar(ax, mappable, axis_label(plane, height))
+    _maps.colour_bar(ax, mappable, name_of(plane), height)
     label_axes(ax, plane, length)
     ax.set_title(title)
     return ax
 
 
 @_style.checked
-def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Axes:
+def field(data: Any, *, title: str = "", units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw a map of one field of a result, for example contact pressure, gap or displacement.
 
     Parameters
@@ -86,6 +92,8 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Axes:
     data : DataArray
         Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale.
     title : str
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -107,13 +115,14 @@ def field(data: Any, *, title: str = "", ax: Axes | None = None) -> Axes:
     >>> print(ax.figure.axes[1].get_ylabel())
     contact pressure (MPa)
     """
+    data = shown_in(data, units, "field")
     plane = plane_of(data, "field", "", "data")
     ax = _style.axes_or_new(ax, SIZE)
     length, shown = plane_scale(plane), scale_of(plane)
     mappable = _maps.field(
         ax, np.asarray(plane.values, float), extent_of(plane), length, shown, positive=plane.name in POSITIVE
     )
-    _maps.colour_bar(ax, mappable, shown.label(name_of(plane)))
+    _maps.colour_bar(ax, mappable, name_of(plane), shown)
     label_axes(ax, plane, length)
     ax.set_title(title)
     return ax
@@ -149,13 +158,13 @@ def plane_scale(plane: xr.DataArray) -> Scale:
     if "x" not in plane.coords:
         return scale_for("cells", 1.0)
     left, right, bottom, top = extent_of(plane)
-    return scale_for("m", (right - left, top - bottom))
+    return scale_of(plane["x"], (right - left, top - bottom))
 
 
 def label_axes(ax: Axes, plane: xr.DataArray, length: Scale) -> None:
     """Label the axes of a map."""
-    for dim, setter in (("x", ax.set_xlabel), ("y", ax.set_ylabel)):
-        setter(length.label(f"${dim}$") if dim in plane.coords else f"${dim}$ (cells)")
+    for dim, axis in (("x", ax.xaxis), ("y", ax.yaxis)):
+        label_axis(axis, f"${dim}$", length if dim in plane.coords else Scale(1.0, "cells"))
 
 
 def draw_outline(ax: Axes, extent: tuple[float, float, float, float], length: Scale, **style: Any) -> None:

@@ -10,10 +10,12 @@ from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table, words
 from fractalcontact.plotting._paths import load_of, shear_words
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import axis_label, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 FLOW_LINES = ("-", (0, (4, 2)))
 # broad and pale, so that it is seen where the hydraulic aperture lies on it
@@ -21,7 +23,7 @@ MEAN_LINE: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", 
 
 
 @_style.checked
-def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
+def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the hydraulic aperture against load, one curve per shear displacement and flow direction.
 
     The aperture is zero where contacts block the flow from side to side. Broad pale lines show the
@@ -32,6 +34,8 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
         over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -53,6 +57,7 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
     >>> print(ax.get_ylabel())
     hydraulic aperture (µm)
     """
+    result = shown_in(result, units, "hydraulic_aperture")
     ax = _style.axes_or_new(ax)
     data = result_of(result, "hydraulic_aperture", ("hydraulic_aperture",), ("shear", "step", "axis"))
     by_shear = data.sizes["step"] == 1 and "shear" in data.coords
@@ -78,7 +83,7 @@ def hydraulic_aperture(result: Any, *, ax: Axes | None = None) -> Axes:
     if np.nanmax(aperture, initial=0.0) > 0:
         ax.set_ylim(bottom=0)
     ax.set_xlabel(axis_label(data[against], along) if labelled else against)
-    ax.set_ylabel(axis_label(data["hydraulic_aperture"], across))
+    label_axis(ax.yaxis, name_of(data["hydraulic_aperture"]), across)
     title, labels = ("", []) if by_shear else shear_words(data)
     if labels:
         shown = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.units import Scale, scale_for
+from fractalcontact.base.units import Scale, named_scale, scale_for
+from fractalcontact.base.validation import Problems
+
+Units: TypeAlias = Mapping[str, str]  # by the name of a variable
+WANTED = "display_units"  # attribute of a variable whose unit in a figure was chosen
 
 # names on axes, where the long name of the schema is too long
 SHORT = {
@@ -58,11 +66,64 @@ def units_of(data: xr.DataArray) -> str:
     return str(units)
 
 
-def scale_of(data: xr.DataArray) -> Scale:
-    """Return the scale that suits the largest value of a variable."""
+def shown_in(data: Any, units: Units | None, where: str) -> Any:
+    """Return a result whose variables have the units that a figure is to show them in as an attribute."""
+    if not units:
+        return data
+    if isinstance(data, xr.DataTree):
+        parts = [node.to_dataset() for node in data.subtree]
+    else:
+        parts = list(data.values()) if isinstance(data, Mapping) and not hasattr(data, "dims") else [data]
+    variables = {name: part[name] for part in parts if hasattr(part, "coords") for name in _names(part)}
+    with Problems(f"fc.plotting.{where}") as problems:
+        for name, unit in units.items():
+            place = f"units[{name!r}]"
+            if problems.require(name in variables, place, f"one of {', '.join(sorted(variables))}", name):
+                own = units_of(variables[name])
+                possible = named_scale(own, unit) is not None
+                problems.require(possible, place, f"{own or '1'}, with a prefix", unit)
+    if isinstance(data, xr.DataTree):
+        return data.map_over_datasets(lambda dataset: _marked(dataset, units))
+    if isinstance(data, Mapping) and not hasattr(data, "dims"):
+        return {key: _marked(part, units) for key, part in data.items()}
+    return _marked(data, units)
+
+
+def _names(data: xr.Dataset | xr.DataArray) -> list[str]:
+    """Return the names of the variables of a Dataset, or of a DataArray and its coordinates."""
+    own = (
+        ["height" if data.name is None else data.name]
+        if isinstance(data, xr.DataArray)
+        else list(data.data_vars)
+    )
+    return [str(name) for name in (*own, *data.coords)]
+
+
+def _marked(data: Any, units: Units) -> Any:
+    marked = data.copy(deep=False)
+    for name in set(units) & set(_names(data)):
+        target = marked if isinstance(marked, xr.DataArray) and name not in marked.coords else marked[name]
+        target.attrs[WANTED] = units[name]
+    return marked
+
+
+def scale_of(data: xr.DataArray, values: Any = None) -> Scale:
+    """Return the scale of a variable: the one chosen, else that which suits its largest value.
+
+    `values` are all that are shown on one axis, where that is more than the variable.
+    """
+    wanted = named_scale(units_of(data), str(data.attrs[WANTED])) if WANTED in data.attrs else None
+    if wanted is not None:
+        return wanted
     if str(data.name) in PERCENT:
         return Scale(0.01, "%")
-    return scale_for(units_of(data), data.values)
+    return scale_for(units_of(data), np.asarray(data.values if values is None else values))
+
+
+def label_axis(axis: Any, text: str, scale: Scale) -> None:
+    """Label an axis; its unit can be read with `axis.get_units()`."""
+    axis.set_label_text(scale.label(text))
+    axis.set_units(scale.unit)
 
 
 def name_of(data: xr.DataArray) -> str:

@@ -11,10 +11,11 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import extent_of, result_of, words
 from fractalcontact.plotting._surface import label_axes, plane_of, plane_scale
-from fractalcontact.plotting._units import axis_label, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 SIZE = (9.0, 3.6)  # inches
 LINES: dict[str, dict[str, Any]] = {
@@ -25,7 +26,7 @@ LINES: dict[str, dict[str, Any]] = {
 
 
 @_style.checked
-def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
+def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw the water pressure in a joint and, beside it, the uplift along the flow with its lines of action.
 
     The diagrams of guidelines are dashed. A triangle on the axis marks each line of action. Contacts and
@@ -35,6 +36,8 @@ def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.uplift`, of one gap.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -56,6 +59,7 @@ def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(uplift.get_ylabel())
     uplift (kPa)
     """
+    result = shown_in(result, units, "uplift")
     data = result_of(result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), ())
     plane = plane_of(data[["fluid_pressure"]], "uplift", "fluid_pressure")
     profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
@@ -66,7 +70,7 @@ def uplift(result: Any, *, axes: Panels | None = None) -> AxesArray:
     length, pressure = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
     mappable = _maps.field(left, np.asarray(plane.values, float), extent, length, pressure, positive=False)
-    _maps.colour_bar(left, mappable, axis_label(plane, pressure))
+    _maps.colour_bar(left, mappable, name_of(plane), pressure)
     label_axes(left, plane, length)
     left.set_title(_state(data))
     _draw_diagrams(right, data, profile, extent, length, pressure)
@@ -97,8 +101,8 @@ def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, p
         ax.plot([place], [0.0], marker="^", color=style["color"], clip_on=False, ls="", ms=6, zorder=3)
     ax.set_xlim(float(length(start)), float(length(end)))
     ax.set_ylim(bottom=0.0)
-    ax.set_xlabel(length.label(f"${dim}$"))
-    ax.set_ylabel(pressure.label("uplift"))
+    label_axis(ax.xaxis, f"${dim}$", length)
+    label_axis(ax.yaxis, "uplift", pressure)
     lines = [line for line in ax.lines if not line.get_label().startswith("_")]
     _style.side_legend(
         ax, [*lines, _style.legend_line("line of action", marker="^", ls="", color=_style.grey())]

@@ -96,7 +96,7 @@ def test_failed_write_keeps_old_file(study, tmp_path, monkeypatch):
 
     (tmp_path / "lacunarity.png").write_bytes(b"old")
 
-    def fails(canvas, path):
+    def fails(canvas, path, **options):
         path.write_bytes(b"half")
         raise OSError("disk full")
 

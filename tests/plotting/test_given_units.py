@@ -1,0 +1,68 @@
+"""Units of axes: as wanted, readable from the axes, and the shown number times the unit is the value."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from plotting_figures import drawn, factor
+
+from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
+
+
+def test_units_are_as_wanted_and_can_be_read(study):
+    closed = study["joints/closure"].to_dataset()
+    wanted = {"closure": "m", "normal_force": "kN", "shear": "um"}
+    ax, plain = plotting.closure_laws(closed, units=wanted), plotting.closure_laws(closed)
+    assert (ax.get_xlabel(), ax.xaxis.get_units()) == ("closure (m)", "m")
+    assert (ax.get_ylabel(), ax.yaxis.get_units()) == ("normal force $F$ (kN)", "kN")
+    assert ax.artists[0].get_title().get_text() == "shear $v$ (µm)"
+    for one, other in zip(drawn(ax), drawn(plain), strict=True):
+        assert np.allclose(one, other, rtol=1e-12)
+    assert "display_units" not in closed["closure"].attrs  # the data stay as they are
+
+
+def test_chosen_prefix_can_be_read(study):
+    ax = plotting.closure_laws(study["joints/closure"])
+    assert ax.xaxis.get_units() == "µm"
+    assert ax.xaxis.get_units() in ax.get_xlabel()
+
+
+def test_units_of_maps_and_of_both_axes_of_an_envelope(study):
+    surface = study["surfaces"]
+    ax = plotting.surface(surface, units={"x": "µm", "height": "nm"})
+    assert (ax.xaxis.get_units(), ax.yaxis.get_units()) == ("µm", "µm")
+    bar = ax.figure.axes[1]
+    assert bar.yaxis.get_units() == "nm"
+    assert bar.get_ylim()[1] * factor(bar.get_ylabel()) == pytest.approx(
+        float(surface["height"].max()), rel=0.3
+    )
+
+
+def test_percent_or_fraction(study):
+    data = study["joints/closure"].to_dataset()
+    percent, fraction = (plotting.contact_area(data, units={"contact_fraction": unit}) for unit in "%1")
+    highest = [max(line.get_ydata().max() for line in ax.lines) for ax in (percent, fraction)]
+    assert highest[0] == pytest.approx(100 * highest[1])
+    assert fraction.get_ylabel() == "real / nominal contact area"
+
+
+@pytest.mark.parametrize(
+    ("units", "named"),
+    [({"closure": "N"}, "closure"), ({"stiffness": "N"}, "stiffness"), ({"closure": "furlong"}, "closure")],
+)
+def test_wrong_units_are_refused(study, units, named):
+    with pytest.raises(InvalidInput, match=rf"units\['{named}'\]"):
+        plotting.closure_laws(study["joints/closure"], units=units, ax=Figure().add_subplot())
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_formats_of_files(study, tmp_path, suffix):
+    import xarray as xr
+
+    tree = xr.DataTree.from_dict({"/dimensions": study["dimensions"].to_dataset()})
+    files = plotting.draw(tree, tmp_path, formats=[suffix])
+    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
+    assert files
+    assert all(file.suffix == f".{suffix}" and file.read_bytes().startswith(start) for file in files)
+    with pytest.raises(InvalidInput, match="formats"):
+        plotting.draw(tree, tmp_path, formats=["gif"])
