@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from html import escape
 
 from tabulate import tabulate
@@ -93,3 +95,31 @@ def _total(widths: Sequence[int]) -> int:
 
 def _longest_word(cell: str) -> int:
     return min(WORD, max((len(word) for word in re.split(r" |(?<=-)", cell)), default=0))
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of words, the first row its head; as text it has aligned columns."""
+
+    rows: Sequence[Sequence[str]]
+
+    def __str__(self) -> str:
+        return table(self.rows)
+
+
+@dataclass(frozen=True)
+class Note:
+    """A remark, as text indented below its table and wrapped to the width of the screen."""
+
+    words: str
+
+    def __str__(self) -> str:
+        return textwrap.fill(self.words, screen_width(), initial_indent="  ", subsequent_indent="    ")
+
+
+Part = Table | Note | str  # of a summary; a word stands on a line of its own
+
+
+def text_of(parts: Sequence[Part]) -> str:
+    """Return the parts of a section as text."""
+    return "\n".join(str(part) for part in parts)

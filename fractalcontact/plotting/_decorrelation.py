@@ -55,12 +55,12 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     """
     memory = shown_in(memory, units, "correlation")
     ax = _style.axes_or_new(ax)
-    names = ("correlation", "decorrelation_length", "shear")
+    lengths = tuple(f"decorrelation_length{end}" for end in ("_low", "", "_high"))
+    names = ("correlation", "shear", *lengths)
     data = result_of(memory, "correlation", names, ("direction", "shear"), "memory")
     values = table(data, "correlation", ("direction", "shear"))
     along = scale_of(data["shear"])
-    lengths = data.isel(shear=0)
-    ends = [table(lengths, f"decorrelation_length{end}", ("direction",)) for end in ("_low", "", "_high")]
+    ends = [table(data.isel(shear=0), name, ("direction",)) for name in lengths]
     entries = []
     for i, (name, style) in enumerate(direction_styles(data)):
         ax.plot(along(data["shear"].values), values[i], **style)

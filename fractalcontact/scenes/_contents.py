@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.netcdf_header import Header, read_headers
-from fractalcontact.base.tables import screen_width, table
+from fractalcontact.base.tables import Part, Table, screen_width, text_of
 
 REASONS = ("comment", "reason")  # attributes with a reason for each method, as JSON
 
@@ -66,10 +66,16 @@ def stage_table(result: Any) -> str:
 
     `result` has the attributes of the root of a study, or of a single result.
     """
+    return text_of(stage_parts(result))
+
+
+def stage_parts(result: Any) -> list[Part]:
+    """Return the table of the stages of a study, or the call of a single result."""
     entry = _provenance(result)
     stages = entry.get("stages", {})
     if not stages or not _are_stages(stages):
-        return _single_call(entry)
+        call = _single_call(entry)
+        return [call] if call else []
     rows = [("stage", "run time (s)", "achieved")]
     for name, facts in stages.items():
         achieved = {key: value for key, value in facts.items() if key not in ("run_time", "origin")}
@@ -79,7 +85,7 @@ def stage_table(result: Any) -> str:
     if "run_time" in entry:  # workers share the stages, and take time to start
         rows.append(("all stages", f"{together:.2f}", ""))
     rows.append(("total", f"{entry.get('run_time', together):.2f}", ""))
-    return table(rows)
+    return [Table(rows)]
 
 
 def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from fractalcontact.base.tables import table
+from fractalcontact.base.tables import Note, Part, Table, table, text_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _paper_findings as findings
 from fractalcontact.scenes._caveats import member_count, of_member
-from fractalcontact.scenes._contents import note
 from fractalcontact.scenes._paper_study import NO, NOT_TESTED, YES, Finding
 
 
@@ -61,8 +60,13 @@ def paper_table(tree: xr.DataTree) -> str:
     """
     with Problems("fractalcontact.scenes.paper_table") as problems:
         problems.tree("tree", tree)
+    return text_of(paper_parts(tree))
+
+
+def paper_parts(tree: xr.DataTree) -> list[Part]:
+    """Return the table of the claims of the paper, with a remark; nothing without a joint."""
     if "joints" not in tree.children:
-        return ""
+        return []
     members = member_count(tree)
     studies = [of_member(tree, number) for number in range(members)] if members else [tree]
     column = f"member 0 of {members}" if members else "this study"
@@ -74,7 +78,7 @@ def paper_table(tree: xr.DataTree) -> str:
         "The paper states orders of magnitude and trends; neither its surface nor its modulus is published. "
         "fractalcontact.scenes.paper_criteria() states when each verdict is yes."
     )
-    return "\n".join([table(rows), note(remark)])
+    return [Table(rows), Note(remark)]
 
 
 def _verdict(findings_of_members: Sequence[Finding]) -> str:

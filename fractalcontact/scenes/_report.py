@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.tables import table
+from fractalcontact.base.tables import Note, Part, Table, text_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count, peak_remarks
-from fractalcontact.scenes._contents import note, reasons, stage_table
-from fractalcontact.scenes._paper import paper_table
+from fractalcontact.scenes._contents import reasons, stage_parts
+from fractalcontact.scenes._paper import paper_parts
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -49,10 +49,14 @@ def summary(tree: xr.DataTree) -> str:
     """
     with Problems("fractalcontact.scenes.summary") as problems:
         problems.tree("tree", tree)
-    members = member_count(tree)
-    sections = [
-        str(tree.attrs.get("title", tree.name or "result")),
-        _ensemble(members),
+    title = str(tree.attrs.get("title", tree.name or "result"))
+    return "\n\n".join([title, *(text_of(parts) for parts in summary_parts(tree))])
+
+
+def summary_parts(tree: xr.DataTree) -> list[list[Part]]:
+    """Return the sections of the summary, each a list of tables, remarks and lines."""
+    sections: list[list[Part]] = [
+        _ensemble(member_count(tree)),
         _selected(tree),
         _dimensions(tree),
         _contact(tree),
@@ -71,11 +75,11 @@ def summary(tree: xr.DataTree) -> str:
         _leakage(tree),
         _uplift(tree),
         _contact_set(tree),
-        "\n".join(note(caveat) for caveat in caveats(tree)),
-        paper_table(tree) if compares_with_paper(tree) else "",
-        stage_table(tree),
+        [Note(caveat) for caveat in caveats(tree)],
+        paper_parts(tree) if compares_with_paper(tree) else [],
+        stage_parts(tree),
     ]
-    return "\n\n".join(section for section in sections if section)
+    return [section for section in sections if section]
 
 
 def compares_with_paper(tree: xr.DataTree) -> bool:
@@ -87,10 +91,10 @@ def compares_with_paper(tree: xr.DataTree) -> bool:
     return isinstance(scene, dict) and scene.get("paper") is True
 
 
-def _ensemble(members: int) -> str:
+def _ensemble(members: int) -> list[Part]:
     if not members:
-        return ""
-    return f"ensemble of {members} members: mean ± standard deviation over the members"
+        return []
+    return [f"ensemble of {members} members: mean ± standard deviation over the members"]
 
 
 def amount(data: Any, digits: int = 3) -> str:
@@ -148,16 +152,14 @@ def length(value: Any) -> str:
     return quantity_text(value, "m")
 
 
-def _selected(tree: xr.DataTree) -> str:
-    return "\n".join(
-        f"selected: {choice}" for choice in str(tree.attrs.get("selected", "")).split("; ") if choice
-    )
+def _selected(tree: xr.DataTree) -> list[Part]:
+    return [f"selected: {choice}" for choice in str(tree.attrs.get("selected", "")).split("; ") if choice]
 
 
-def _dimensions(tree: xr.DataTree) -> str:
+def _dimensions(tree: xr.DataTree) -> list[Part]:
     estimates = group_of(tree, "dimensions")
     if estimates is None or "method" not in estimates.dims:
-        return ""
+        return []
     rows = [("fractal dimension", "D", "95 % interval of D", "range of scales", "goodness of fit")]
     largest = estimates["fractal_dimension"] + estimates["hurst"]
     for method in estimates["method"].values:
@@ -175,16 +177,16 @@ def _dimensions(tree: xr.DataTree) -> str:
             )
         )
     remarks = reasons(estimates["hurst"].attrs, "comment") | reasons(estimates["ci_low"].attrs, "reason")
-    lines = [table(rows), *(note(f"{names}: {reason}") for names, reason in remarks.items())]
+    parts: list[Part] = [Table(rows), *(Note(f"{names}: {reason}") for names, reason in remarks.items())]
     if MEMBER in estimates.dims:
-        lines.append(note("The intervals are those of one surface: the means of their ends."))
-    return "\n".join(lines)
+        parts.append(Note("The intervals are those of one surface: the means of their ends."))
+    return parts
 
 
-def _contact(tree: xr.DataTree) -> str:
+def _contact(tree: xr.DataTree) -> list[Part]:
     contact = group_of(tree, "contact")
     if contact is None:
-        return ""
+        return []
     rows: list[tuple[str, ...]] = [
         ("step", "nominal pressure", "closure", "contact area", "area, perimeter-corrected")
     ]
@@ -192,14 +194,14 @@ def _contact(tree: xr.DataTree) -> str:
     for step in range(contact.sizes["step"]):
         state = contact.isel(step=step)
         rows.append((str(step), *(amount(state[name]) for name in names)))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _mated_position(tree: xr.DataTree) -> str:
+def _mated_position(tree: xr.DataTree) -> list[Part]:
     upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
     if upper is None or "mismatch" not in upper:
-        return ""
-    lines = [
+        return []
+    lines: list[Part] = [
         f"mated position: shift {amount(upper['shift_x'])} along x and {amount(upper['shift_y'])} along y, "
         f"rotation {amount(upper['rotation'])}",
         f"mismatch {amount(upper['mismatch'])} rms, correlation {plain(upper['correlation'], 3)}",
@@ -209,25 +211,25 @@ def _mated_position(tree: xr.DataTree) -> str:
         lines.append(
             f"aperture: mean {length(aperture.mean())}, smallest {length(aperture.min())} (negative: overlap)"
         )
-    return "\n".join(lines)
+    return lines
 
 
-def _closure(tree: xr.DataTree) -> str:
+def _closure(tree: xr.DataTree) -> list[Part]:
     closure = group_of(tree, "joints/closure")
     if closure is None:
-        return ""
+        return []
     names = ("normal_force", "closure", "interface_closure", "contact_fraction", "corrected_contact_fraction")
     head = ("closure at shear", "normal force", "closure", "interface closure", "contact area")
     rows: list[tuple[str, ...]] = [(*head, "area, perimeter-corrected")]
     for shear, state in _at_shears(closure.isel(step=-1)):
         rows.append((shear, *(amount(state[name]) for name in names)))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _elimination(tree: xr.DataTree) -> str:
+def _elimination(tree: xr.DataTree) -> list[Part]:
     part = group_of(tree, "joints/elimination")
     if part is None:
-        return ""
+        return []
     rows = [("elimination at shear", "part of the block", "contact area, last step", "rounds")]
     for shear, state in _at_shears(part):
         rounds = _finite(state["iterations"])
@@ -236,49 +238,49 @@ def _elimination(tree: xr.DataTree) -> str:
         rows.append(
             (shear, amount(last["nominal_area"]), amount(last["contact_fraction"]), " to ".join(ends))
         )
-    return table(rows)
+    return [Table(rows)]
 
 
-def _area_by_spacing(tree: xr.DataTree) -> str:
+def _area_by_spacing(tree: xr.DataTree) -> list[Part]:
     areas = group_of(tree, "joints/area_dimension")
     if areas is None:
-        return ""
+        return []
     spacings = [f"area at {length(spacing)}" for spacing in areas["resolution"].values]
     rows: list[tuple[str, ...]] = [("spacing, at shear", "normal force", *spacings, "area dimension")]
     for shear, state in _at_shears(areas.isel(step=-1)):
         fractions = state["contact_fraction"]
         every = (amount(fractions.isel(resolution=i)) for i in range(len(spacings)))
         rows.append((shear, amount(state["normal_force"]), *every, plain(state["area_dimension"], 2)))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _delta_dimension(tree: xr.DataTree) -> str:
+def _delta_dimension(tree: xr.DataTree) -> list[Part]:
     delta = group_of(tree, "joints/delta_dimension")
     if delta is None:
-        return ""
+        return []
     names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
     rows: list[tuple[str, ...]] = [("delta-surface at shear", "D by area", "by variogram", "by spectrum")]
     rows += [(shear, *(plain(state[name], 3) for name in names)) for shear, state in _at_shears(delta)]
-    return table(rows)
+    return [Table(rows)]
 
 
-def _decorrelation(tree: xr.DataTree) -> str:
+def _decorrelation(tree: xr.DataTree) -> list[Part]:
     lengths = group_of(tree, "joints/decorrelation_length")
     if lengths is None:
-        return ""
+        return []
     names = ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high")
     rows = [("decorrelation", "length", "95 % interval")]
     for direction in np.atleast_1d(lengths["direction"].values):
         state = lengths.sel(direction=direction) if "direction" in lengths.dims else lengths
         value, low, high = (amount(state[name]) for name in names)
         rows.append((str(direction), value, "none" if low == "-" else f"{low} ... {high}"))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _self_weight(tree: xr.DataTree) -> str:
+def _self_weight(tree: xr.DataTree) -> list[Part]:
     strengths = group_of(tree, "joints/self_weight")
     if strengths is None:
-        return ""
+        return []
     sizes = [f"at {length(size)}" for size in strengths["structure_size"].values]
     faces = "" if "converged" in strengths else " (rigid faces)"  # nothing was pressed without a modulus
     title = f"strength under self-weight{faces}"
@@ -288,27 +290,27 @@ def _self_weight(tree: xr.DataTree) -> str:
             every = [amount(state["shear_strength"].isel(structure_size=i)) for i in range(len(sizes))]
             exponent = plain(state["strength_exponent"], 3)
             rows.append((str(direction), shear, *every, "the faces lock" if "-" in every else exponent))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _leakage(tree: xr.DataTree) -> str:
+def _leakage(tree: xr.DataTree) -> list[Part]:
     flow = group_of(tree, "joints/transmissivity")
     if flow is None:
-        return ""
+        return []
     axes = [str(axis) for axis in flow["axis"].values]
     heads = [f"hydraulic, along {axis}" for axis in axes]
     rows: list[tuple[str, ...]] = [("aperture at shear", "normal force", "mean", *heads)]
     for shear, state in _at_shears(flow.isel(step=-1)):
         every = (amount(state["hydraulic_aperture"].sel(axis=axis)) for axis in axes)
         rows.append((shear, amount(state["normal_force"]), amount(state["aperture"]), *every))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _uplift(tree: xr.DataTree) -> str:
+def _uplift(tree: xr.DataTree) -> list[Part]:
     """Return force and arm of the uplift, how they compare with the diagrams, and the stress that remains."""
     water = group_of(tree, "joints/uplift")
     if water is None:
-        return ""
+        return []
     balanced = "effective_stress" in water
     diagrams = [str(name) for name in water["diagram"].values]
     load = "effective_stress" if balanced else "nominal_pressure"
@@ -320,7 +322,7 @@ def _uplift(tree: xr.DataTree) -> str:
         arm = amount(state["uplift_arm"].sel(diagram="joint"))
         rows.append((shear, amount(state[load]), *map(amount, forces), arm))
         remarks += _uplift_remarks(shear, state, diagrams)
-    return "\n".join([table(rows), *map(note, remarks)])
+    return [Table(rows), *map(Note, remarks)]
 
 
 def _uplift_remarks(shear: str, state: xr.Dataset, diagrams: list[str]) -> Iterator[str]:
@@ -341,10 +343,10 @@ def _uplift_remarks(shear: str, state: xr.Dataset, diagrams: list[str]) -> Itera
         )
 
 
-def _partial_slip(tree: xr.DataTree, path: str) -> str:
+def _partial_slip(tree: xr.DataTree, path: str) -> list[Part]:
     slipped = group_of(tree, path)
     if slipped is None:
-        return ""
+        return []
     head = ("tangential force", "displacement", "sticks", "stiffness", "dissipated energy")
     names = ("tangential_displacement", "tangential_stiffness", "dissipated_energy")
     rows: list[tuple[str, ...]] = [
@@ -357,16 +359,16 @@ def _partial_slip(tree: xr.DataTree, path: str) -> str:
             share = 100 * state["stick_area"] / state["contact_area"].where(state["contact_area"] > 0)
             force = amount(state["tangential_force"])
             rows.append((shear or str(step), force, displacement, f"{plain(share, 1)} %", stiffness, energy))
-    text = table(rows)
+    parts: list[Part] = [Table(rows)]
     limit = slipped["friction_coefficient"] * slipped["normal_force"].max()
-    text += "\n" + note(f"all slides at {quantity_text(float(limit.mean()), 'N')}")
+    parts.append(Note(f"all slides at {quantity_text(float(limit.mean()), 'N')}"))
     if "stuck_ratio" in slipped:
         first = slipped["stiffness_ratio"].isel(step=0)
         ratios = (
             f"{plain(first, 3)} at the first step; {plain(slipped['stuck_ratio'], 3)} where nothing slips"
         )
-        text += "\n" + note(f"shear over normal stiffness of the joint: {ratios} (theory)")
-    return text
+        parts.append(Note(f"shear over normal stiffness of the joint: {ratios} (theory)"))
+    return parts
 
 
 def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -377,23 +379,23 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
         yield length(shear), data.sel(shear=shear) if "shear" in data.dims else data
 
 
-def _dilatancy(tree: xr.DataTree) -> str:
+def _dilatancy(tree: xr.DataTree) -> list[Part]:
     rigid = group_of(tree, "joints/rigid_dilatancy")
     if rigid is None:
-        return ""
+        return []
     rows = [("rigid dilatancy", "shear", "dilatancy", "mean slope")]
     last = rigid.isel(shear=-1)
     for direction in np.atleast_1d(rigid["direction"].values):
         state = last.sel(direction=direction) if "direction" in last.dims else last
         slope = plain(state["mean_slope"], 4, sign=True) if "mean_slope" in state else ""
         rows.append((str(direction), amount(state["shear"]), amount(state["rigid_dilatancy"]), slope))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _friction(tree: xr.DataTree) -> str:
+def _friction(tree: xr.DataTree) -> list[Part]:
     friction = group_of(tree, "joints/friction")
     if friction is None or "peak_shear_strength" not in friction:
-        return ""
+        return []
     column = f"from shear, over {length(friction['peak_distance'].max())}"
     rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", column)]
     names = ("peak_shear_strength", "peak_friction_angle", "peak_shear")
@@ -406,13 +408,13 @@ def _friction(tree: xr.DataTree) -> str:
             values = [amount(state[name]) for name in names] if _finite(strength).size else None
             pressure = amount(towards["nominal_pressure"].isel(step=step))
             rows.append((str(direction), pressure, *(values or ("none: the faces lock", "", ""))))
-    return "\n".join([table(rows), *(note(remark) for remark in peak_remarks(tree, friction))])
+    return [Table(rows), *(Note(remark) for remark in peak_remarks(tree, friction))]
 
 
-def _direct_shear(tree: xr.DataTree) -> str:
+def _direct_shear(tree: xr.DataTree) -> list[Part]:
     test = group_of(tree, "joints/direct_shear")
     if test is None:
-        return ""
+        return []
     rows = [("direct shear", "peak strength", "friction angle", "residual strength", "worn depth")]
     names = ("peak_shear_strength", "peak_friction_angle", "residual_shear_strength")
     for i in range(test.sizes["nominal_pressure"]):
@@ -420,13 +422,13 @@ def _direct_shear(tree: xr.DataTree) -> str:
         worn = state["wear_depth"].max("point", keep_attrs=True)
         strength, angle, residual = (amount(state[name]) for name in names)
         rows.append((amount(state["nominal_pressure"]), strength, angle, residual, amount(worn)))
-    return table(rows)
+    return [Table(rows)]
 
 
-def _contact_set(tree: xr.DataTree) -> str:
+def _contact_set(tree: xr.DataTree) -> list[Part]:
     boxes = group_of(tree, "domains/box_dimension")
     if boxes is None:
-        return ""
+        return []
     rows = [("contact domain, last step", "box dimension", "95 % interval", "boxes (cells)", "random null")]
     last = boxes.isel(step=-1) if "step" in boxes.dims else boxes
     for shear, state in _at_shears(last):
@@ -440,7 +442,7 @@ def _contact_set(tree: xr.DataTree) -> str:
                 plain(state["null_dimension"], 2),
             )
         )
-    return "\n".join([table(rows), note(_counts_beside_null(last))])
+    return [Table(rows), Note(_counts_beside_null(last))]
 
 
 def _boxes(state: xr.Dataset) -> str:

@@ -248,3 +248,42 @@ def test_report_works_in_a_browser(study, tmp_path):
         assert before
         assert after
         assert before != after
+
+
+class Summary(HTMLParser):
+    """Headings, cells and remarks of the summary of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.found, self._open = [], None
+        self.feed(text.partition('<section id="summary">')[2].partition("</section>")[0])
+
+    def handle_starttag(self, tag, attrs):
+        self._open = tag
+        if tag in ("h3", "th", "td", "p", "pre"):
+            self.found.append((tag, ""))
+
+    def handle_data(self, data):
+        if self._open in ("h3", "th", "td", "p", "pre"):
+            self.found[-1] = (self._open, self.found[-1][1] + data)
+
+    def handle_endtag(self, tag):
+        self._open = None
+
+
+def test_summary_has_the_words_of_the_text_as_tables(study):
+    tree, folder = study
+    found = Summary((folder / "report.html").read_text(encoding="utf-8")).found
+    tags = {tag for tag, _ in found}
+    assert "pre" not in tags  # it would scroll sideways on a narrow screen
+    assert {"h3", "th", "td", "p"} <= tags
+    headings = [words for tag, words in found if tag == "h3"]
+    assert "Closure at shear" in headings
+    assert "Caveats" in headings
+    text = " ".join(fc.scenes.summary(tree).split())
+    cells = [words for tag, words in found if tag in ("td", "p") and words]
+    assert len(cells) > 20
+    times = re.compile(r"\d+\.\d\d")  # of the report itself, which were not known when it was written
+    with_time = {words for words in cells if times.fullmatch(words)}
+    missing = [words for words in cells if words not in with_time and words.split()[0] not in text]
+    assert not missing
