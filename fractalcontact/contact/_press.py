@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges, read_grid
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STEEP, STOP_REASONS, YIELDED
+from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
@@ -27,6 +30,8 @@ UNDETERMINED = (
 )  # fmt: skip
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
 BEYOND_SMALL_STRAINS = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
+SMALL_PLANE = 512 * 512  # nodes up to which surfaces are pressed side by side, each on one thread
+SIDE_BY_SIDE = 8  # surfaces for each thread between two steps of the progress bar
 ALSO = ("stiffness", "pressure_distribution")
 PRESSURE_CLASSES = 50  # of a distribution of pressures, from 0 to the greatest of the step
 PUNCH_TOLERANCE = 1e-4  # the error of the stiffness is about its square
@@ -49,7 +54,7 @@ def _check(
     **keywords: Any,
 ) -> None:
     """Collect what is wrong with a call of `press`."""
-    surface_is_valid = problems.surface("surface", surface)
+    surface_is_valid = problems.surface("surface", surface, leading=True)
     problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
@@ -67,8 +72,9 @@ def _check(
     options.check_grid(grid, problems)
     if load is None or problems.messages:
         return
-    height_range = float(surface.values.max()) - float(surface.values.min())
-    check_scale(problems, grid, height_range, float(contact_modulus), options.hardness, load)
+    ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
+    for height_range in {float(ranges.min()), float(ranges.max())}:
+        check_scale(problems, grid, height_range, float(contact_modulus), options.hardness, load)
     options.check_load(load, grid.nominal_area, problems)
 
 
@@ -98,8 +104,8 @@ def press(
 
     Parameters
     ----------
-    surface : DataArray, dims (y, x)
-        Heights in m, without NaN; at least 3 points along each axis.
+    surface : DataArray, dims (..., y, x)
+        Heights in m, without NaN; at least 3 points along each axis. Each plane is pressed by itself.
     contact_modulus : float
         E* of the pair of bodies in Pa, see `effective_modulus`.
     closure, normal_force, nominal_pressure : float or sequence of float
@@ -127,7 +133,7 @@ def press(
 
     Returns
     -------
-    Dataset over `step`
+    Dataset over the leading dims and `step`
         Coordinates closure, normal_force, nominal_pressure; contact_area, contact_fraction,
         corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
         transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
@@ -172,30 +178,82 @@ def press(
     )
     grid = read_grid(surface)
     heights = np.asarray(surface.values, dtype=np.float64)
-    path = scaled_path(heights, grid, float(contact_modulus), options, load)
-    names, further = word_tuple(keep), Further(word_tuple(also), grid, float(contact_modulus))
-    scalars: list[dict[str, Any]] = []
-    maps: dict[str, list[Array]] = {name: [] for name in names}
-    for step in track(solve_path(path), progress, "press", total=len(path.values)):
-        scalars.append(_scalars(step, grid, path.body.periodic) | further.of(step))
-        for name in names:
-            maps[name].append(np.asarray(MAPS[name](step, heights)))
-    slope = rms_slope(heights, grid)
-    result = _dataset(surface, grid, path, scalars, maps, slope)
+    names, further = word_tuple(keep), word_tuple(also)
+
+    def pressed(plane: Array, progress: bool) -> PressedPlane:
+        path = scaled_path(plane, grid, float(contact_modulus), options, load)
+        return _press_plane(plane, grid, path, names, further, progress)
+
+    planes = _pressed_planes(heights.reshape(-1, *grid.shape), pressed, progress)
+    result = _dataset(surface, grid, planes)
     _add_reasons(result)
     _warn(result)
+    slope = max(plane.slope for plane in planes)
     if slope > STEEP:
         message = f"fractalcontact.contact.press: the surface has an rms slope of {slope:.2g}"
         warnings.warn(f"{message}; {BEYOND_SMALL_STRAINS}", SmallStrainWarning, stacklevel=3)
+    body = planes[0].path.body
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     result.attrs = {
         "references": options.references(grid),
-        "boundary": "periodic" if path.body.periodic else "free",
-        "influence": path.body.influence,
-        "achieved_residual": float(np.fmax.reduce(result.variables["residual"].values)),
+        "boundary": "periodic" if body.periodic else "free",
+        "influence": body.influence,
+        "achieved_residual": float(np.fmax.reduce(result.variables["residual"].values, axis=None)),
     }
     return result
+
+
+@dataclass(frozen=True)
+class PressedPlane:
+    """One plane of heights under its load path: the scalars of each step, its maps, its rms slope."""
+
+    path: ScaledPath
+    scalars: list[dict[str, Any]]
+    maps: dict[str, list[Array]]
+    slope: float
+
+
+def _press_plane(
+    heights: Array,
+    grid: Grid,
+    path: ScaledPath,
+    names: Sequence[str],
+    further: Sequence[str],
+    progress: bool,
+) -> PressedPlane:
+    """Press one plane along its load path."""
+    more = Further(further, grid, path.units.modulus)
+    scalars: list[dict[str, Any]] = []
+    maps: dict[str, list[Array]] = {name: [] for name in names}
+    for step in track(solve_path(path), progress, "press", total=len(path.values)):
+        scalars.append(_scalars(step, grid, path.body.periodic) | more.of(step))
+        for name in names:
+            maps[name].append(np.asarray(MAPS[name](step, heights)))
+    return PressedPlane(path, scalars, maps, rms_slope(heights, grid))
+
+
+def _pressed_planes(
+    planes: Array, pressed: Callable[[Array, bool], PressedPlane], progress: bool
+) -> list[PressedPlane]:
+    """Press all planes: small ones side by side on a thread each, large ones one after the other."""
+    if len(planes) == 1:
+        return [pressed(planes[0], progress)]
+    together = SIDE_BY_SIDE * thread_count() if planes[0].size <= SMALL_PLANE else 1
+    results: dict[int, PressedPlane] = {}
+
+    def press_some(start: int, stop: int, first: int) -> None:
+        with limit(1):
+            for number in range(first + start, first + stop):
+                results[number] = pressed(planes[number], False)
+
+    for first in track(range(0, len(planes), together), progress, "press", unit="group of surfaces"):
+        count = min(together, len(planes) - first)
+        if count > 1:
+            in_bands(press_some, count, count * SHARE, first)
+        else:
+            results[first] = pressed(planes[first], False)
+    return [results[number] for number in range(len(planes))]
 
 
 def rms_slope(heights: Array, grid: Grid) -> float:
@@ -298,34 +356,35 @@ def _pressure_distribution(pressure: Array) -> dict[str, Any]:
     return {"maximum_pressure": greatest, "area_share": area, "load_share": load / load.sum()}
 
 
-def _dataset(
-    surface: xr.DataArray,
-    grid: Grid,
-    path: ScaledPath,
-    scalars: list[dict[str, Any]],
-    maps: dict[str, list[Array]],
-    slope: float,
-) -> xr.Dataset:
-    """Return the Dataset over all steps, made at once: to add a variable later takes 0.3 ms."""
+def _dataset(surface: xr.DataArray, grid: Grid, planes: Sequence[PressedPlane]) -> xr.Dataset:
+    """Return the Dataset over all planes and steps, made at once: to add a variable later takes 0.3 ms."""
+    leading, lengths, path = surface.dims[:-2], surface.shape[:-2], planes[0].path
     columns: dict[str, Any] = {}
-    for name in scalars[0]:
-        values = np.array([step[name] for step in scalars])
-        columns[name] = (("step", "pressure_class")[: values.ndim], values)
-    coords: dict[str, Any] = {name: columns.pop(name) for name in CONTROLS}
-    coords["step"] = np.arange(len(scalars))
+    for name in planes[0].scalars[0]:
+        values = np.array([[step[name] for step in plane.scalars] for plane in planes])
+        dims = ("step", "pressure_class")[: values.ndim - 1]
+        columns[name] = ((*leading, *dims), values.reshape(*lengths, *values.shape[1:]))
+    imposed = ("closure",) if path.control == "closure" else ("normal_force", "nominal_pressure")
+    columns |= {name: ("step", columns[name][1].reshape(-1, len(path.values))[0]) for name in imposed}
+    coords: dict[str, Any] = dict(leading_coords(surface, leading, (*columns, "step")))
+    coords |= {name: columns.pop(name) for name in CONTROLS}
+    coords["step"] = np.arange(len(path.values))
     if "area_share" in columns:
         coords["pressure_class"] = (np.arange(PRESSURE_CLASSES) + 0.5) / PRESSURE_CLASSES
     variables: dict[str, Any] = dict(columns)
     variables["nominal_area"] = grid.nominal_area
     variables["contact_modulus"] = path.units.modulus
-    variables["rms_slope"] = slope
+    variables["rms_slope"] = (leading, np.array([plane.slope for plane in planes]).reshape(lengths))
     if not np.isfinite(path.hardness):
         del variables["plastic_work"]
     if path.body.influence == "disc":
         variables["disc_radius"] = path.body.radius * path.units.length
-    if maps:
+    for name in planes[0].maps:
+        maps = np.stack([one for plane in planes for one in plane.maps[name]])
+        shape = (*lengths, len(path.values), *grid.shape)
+        variables[name] = ((*leading, "step", "y", "x"), maps.reshape(shape))
+    if planes[0].maps:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
-        variables |= {name: (("step", "y", "x"), np.stack(planes)) for name, planes in maps.items()}
     return xr.Dataset(variables, coords)
 
 
@@ -342,12 +401,19 @@ def _add_reasons(result: xr.Dataset) -> None:
 
 def _warn(result: xr.Dataset) -> None:
     """Warn of the steps that did not converge."""
-    failed = np.flatnonzero(~result.variables["converged"].values)
-    if failed.size:
-        words, why = list(STOP_REASONS), result["stop_reason"].values
+    converged = result.variables["converged"]
+    failed = np.argwhere(~converged.values)
+    if len(failed):
+        words = list(STOP_REASONS)
+        why, residual = (result.variables[name].values for name in ("stop_reason", "residual"))
         reasons = ", ".join(
-            f"step {i}: {words[why[i]]} (residual {result['residual'].values[i]:.2g})" for i in failed[:5]
+            f"{_place(converged.dims, at)}: {words[why[tuple(at)]]} (residual {residual[tuple(at)]:.2g})"
+            for at in failed[:5]
         )
-        more = f" and {failed.size - 5} more" if failed.size > 5 else ""
+        more = f" and {len(failed) - 5} more" if len(failed) > 5 else ""
         message = f"fractalcontact.contact.press: not converged: {reasons}{more}"
         warnings.warn(message, ConvergenceWarning, stacklevel=4)
+
+
+def _place(dims: Sequence[Hashable], index: Sequence[int]) -> str:
+    return ", ".join(f"{dim} {i}" for dim, i in zip(dims, index, strict=True))
