@@ -23,11 +23,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.content_checksum import DAMAGED, append_checksum, require_checksum
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.schema import CONVENTIONS, encoded
 from fractalcontact.base.unpacked_size import require_unpacked, unpacked_limit
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, reading
 
 SAVE = "fractalcontact.save"
 PARTIAL = ".partial"
@@ -85,6 +86,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
         clear_partial(target.parent)
         with written_whole(target) as temporary:
             _write(groups, temporary)
+            append_checksum(temporary)
     except (TypeError, ValueError, AttributeError) as error:  # the last of netCDF4, for attributes
         expected = "names, values and attributes that a NetCDF file can hold"
         raise InvalidInput(where, [f"result: expected {expected}, got: {error}"]) from error
@@ -103,6 +105,7 @@ def replace_attribute(path: Path, name: str, value: str) -> None:
             shutil.copyfile(path, copy)
             with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
                 file.setncattr(name, value)
+            append_checksum(copy)
     except (OSError, RuntimeError) as error:
         reason = _failure_reason(path.parent, error)
         raise InvalidInput(SAVE, [f"path: {path.name!r} cannot be written here: {reason}"]) from error
@@ -116,7 +119,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     path : path-like
     chunks : "auto", int or mapping, optional
         Sizes of blocks as xarray takes them, for example ``{"step": 1}``: the arrays are read when they are
-        computed, and the file stays open. Needs dask (extra `dask`).
+        computed, and the file stays open; of its checksums only those of compressed arrays are compared.
+        Needs dask (extra `dask`).
 
     Returns
     -------
@@ -128,7 +132,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     InvalidInput
         `chunks` is no size of blocks.
     UnreadableFile
-        The file does not exist, is truncated, or is not NetCDF.
+        The file does not exist, is truncated or damaged, or is not NetCDF.
     MissingExtra
         `chunks` is given, and dask is not installed.
 
@@ -159,7 +163,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+        raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
     for node in tree.subtree:
         node.dataset = encoded(_with_fixed_width_strings(node.to_dataset(inherit=False)))
     saved_type = tree.attrs.get(_TYPE, "DataTree" if tree.children else "Dataset")
@@ -234,6 +238,8 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
     import netCDF4
     from xarray.backends import NetCDF4DataStore
 
+    with reading("fractalcontact.open", path):
+        require_checksum("fractalcontact.open", path)
     groups = {}
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
         unpacked = sum(_unpacked_size(group) for group in _groups(file))

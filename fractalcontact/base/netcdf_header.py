@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fractalcontact.base.content_checksum import DAMAGED, require_checksum
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, reading
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
     Raises
     ------
     UnreadableFile
-        The file does not exist, is truncated, or is not NetCDF.
+        The file does not exist, is truncated or damaged, or is not NetCDF.
     """
     import netCDF4  # loads slowly
 
@@ -54,11 +55,13 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
         for name, child in group.groups.items():
             walk(child, f"{name_of_group}/{name}")
 
+    with reading(where, source):
+        require_checksum(where, source)
     try:
         with NETCDF_LOCK, netCDF4.Dataset(source) as file:
             walk(file, "")
     except (OSError, RuntimeError) as error:
-        raise UnreadableFile(where, [f"path: {source.name!r} is not a complete NetCDF file"]) from error
+        raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
     return groups
 
 

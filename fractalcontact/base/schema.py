@@ -605,7 +605,7 @@ def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:
         return encoding
     is_map = variable.dims[-2:] == CORE_DIMS
     if is_map or variable.nbytes > SMALL:
-        encoding.update(zlib=True, complevel=4, shuffle=True)
+        encoding.update(zlib=True, complevel=4, shuffle=True, fletcher32=True)
         if is_map:
             encoding["chunksizes"] = (1,) * (variable.ndim - 2) + variable.shape[-2:]
     return encoding

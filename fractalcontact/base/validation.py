@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.numbers import float_array as float_array  # converts what `numbers` has passed
 from fractalcontact.base.numbers import is_real, number_of_axes, real_numbers
 
@@ -352,6 +352,16 @@ def check_flags(problems: Problems, signature: Signature, arguments: Mapping[str
     for name in sorted(flags):
         problems.boolean(name, arguments[name])
     return flags
+
+
+@contextmanager
+def reading(where: str, path: str | PathLike[str]) -> Iterator[None]:
+    """Raise `UnreadableFile` for an error of the file system in the block: no permission, a bad disk."""
+    try:
+        yield
+    except OSError as error:
+        message = f"path: {Path(path).name!r} cannot be read: {error.strerror or error}"
+        raise UnreadableFile(where, [message]) from error
 
 
 def word_list(value: Any) -> list[Any]:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -66,6 +67,7 @@ def test_encoding_in_the_file(tmp_path, result):
         assert dataset["gap"].encoding["zlib"]
         assert dataset["gap"].encoding["complevel"] == 4
         assert dataset["gap"].encoding["shuffle"]
+        assert dataset["gap"].encoding["fletcher32"]
         assert "_FillValue" not in dataset["x"].encoding
         assert dataset["state"].dtype == np.int8
 
@@ -100,6 +102,55 @@ def test_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
         fc.save(result, path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def numbers(tree):
+    return [
+        (node.path, name, variable.dims, variable.values.tobytes())
+        for node in tree.subtree
+        for name, variable in node.variables.items()
+        if variable.dtype != object
+    ]
+
+
+def test_flipped_bits_are_found(tmp_path, result):
+    """500 bits: every one leaves the numbers as they were, or is an error that calls the file damaged."""
+    tree = xr.DataTree.from_dict({"/": xr.Dataset({"run_time": 0.5}), "/joints": result})
+    path = fc.save(tree, tmp_path / "result.nc")
+    written, content, stream = numbers(fc.open(path)), path.read_bytes(), np.random.default_rng(1)
+    messages = []
+    for bit in stream.choice(8 * len(content), 500, replace=False):
+        damaged = bytearray(content)
+        damaged[bit // 8] ^= 1 << (bit % 8)
+        path.write_bytes(damaged)
+        try:
+            assert numbers(fc.open(path)) == written
+        except UnreadableFile as error:
+            messages.append(str(error))
+    assert len(messages) > 490
+    assert all("'result.nc' is damaged" in message for message in messages)
+
+
+def test_flipped_bit_of_one_number_is_found(tmp_path):
+    path = fc.save(xr.Dataset({"run_time": 0.123456789}), tmp_path / "number.nc")
+    content = bytearray(path.read_bytes())
+    content[content.index(np.float64(0.123456789).tobytes())] ^= 1
+    path.write_bytes(content)
+    with xr.open_dataset(path) as dataset:
+        assert float(dataset["run_time"]) != 0.123456789  # the NetCDF library does not find it
+    for read in (fc.open, fc.scenes.contents):
+        with pytest.raises(UnreadableFile, match="'number.nc' is damaged"):
+            read(path)
+
+
+def test_file_changed_by_another_program_is_read(tmp_path, result):
+    path = fc.save(result, tmp_path / "result.nc")
+    with netCDF4.Dataset(path, "a") as file:
+        file["normal_force"][:] = [5.0, 6.0]
+    assert fc.open(path)["normal_force"].values.tolist() == [5.0, 6.0]
+    with xr.open_dataset(path) as dataset:
+        dataset.isel(step=0).to_netcdf(tmp_path / "step.nc")
+    assert float(fc.open(tmp_path / "step.nc")["normal_force"]) == 5.0
 
 
 @pytest.mark.parametrize("name", ["result.txt", "result"])
