@@ -1,7 +1,8 @@
 """The command `fractalcontact`: run a scene, answer a question, measure accuracy, show what a file has.
 
-Exit codes: 0 success, 1 too little memory, 2 invalid input (nothing was written), 130 or 143 stopped by
-SIGINT or SIGTERM. SIGINT finishes the current task and keeps the results; a second SIGINT stops at once.
+Exit codes: 0 success, 1 too little memory or an error of the file system, 2 invalid input (nothing was
+written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT finishes the current task and keeps the results; a
+second SIGINT stops at once.
 """
 
 from __future__ import annotations
@@ -49,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except OSError as error:  # of a file or folder that is written, or of the terminal
+        name = "" if error.filename is None else f"{Path(os.fsdecode(error.filename)).name!r}: "
+        print(f"fractalcontact: {name}{error.strerror or error}", file=sys.stderr)
+        return FAILED
     return code
 
 

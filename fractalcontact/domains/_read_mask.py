@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, reading
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -97,9 +98,10 @@ def _grey_values(path: Path) -> Array:
     from skimage.color import rgb2gray
     from skimage.io import imread
 
+    with reading("fractalcontact.domains.read_mask", path):
+        content = path.read_bytes()
     try:
-        with path.open("rb") as file:
-            image = np.asarray(imread(file))
+        image = np.asarray(imread(io.BytesIO(content)))
     except Exception as error:  # each of the image libraries raises exceptions of its own
         raise UnreadableFile(path.name, [f"path: expected an image, got {type(error).__name__}"]) from error
     if image.ndim == 3 and image.shape[-1] == 2:  # grey value and opacity

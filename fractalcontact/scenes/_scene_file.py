@@ -176,8 +176,11 @@ def _text(source: Path) -> str:
 
 
 def _find(path: Path) -> Path:
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:  # a folder on the way may not be searched
+        raise UnreadableFile("scene", [f"path: {path.name!r}: {error.strerror}"]) from error
     shipped = datasets_folder() / f"{path.name.removesuffix('.toml')}.toml"
     if path.parent.name in ("", "datasets") and shipped.is_file():
         return shipped

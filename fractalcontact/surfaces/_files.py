@@ -53,14 +53,14 @@ def open_bytes(path: Path) -> IO[bytes]:
 
 def check_unpacked(name: str, file: IO[bytes]) -> None:
     """Refuse an archive (zip: npz, x3p), HDF5 or MATLAB file that unpacks to far more than its size."""
-    head = file.read(8)
+    head = file.read(10)
     limit, unpacked = unpacked_limit(file.seek(0, io.SEEK_END), RATIO), 0
     file.seek(0)
     try:
         if head.startswith(b"PK"):
             with zipfile.ZipFile(file) as archive:
                 unpacked = sum(entry.file_size for entry in archive.infolist())
-        elif head == b"\x89HDF\r\n\x1a\n":
+        elif head.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")):
             unpacked = _hdf5_size(file)
         elif head.startswith(b"MATLAB"):
             from scipy.io import whosmat
@@ -147,9 +147,13 @@ def read_table(path: Path) -> Table:
     delimiter = _delimiter(first)
     is_named = len(lines) > 1 and _has_no_number(first.split(delimiter))
     rows = lines[1:] if is_named else lines
-    comma = _has_decimal_comma(rows[0][1])
+    comma = _has_decimal_comma(next((content for _, content in rows if "," in content), ""))
     if comma:
         delimiter = None if delimiter == "," else delimiter
+        pointed = next((number for number, content in rows if "." in content), 0)
+        if pointed:
+            fault = f"line {pointed}: expected decimal commas as in the lines before, got a decimal point"
+            raise NotATable(fault, pointed)
         rows = [(number, content.replace(",", ".")) for number, content in rows]
     try:
         # the fast path, for a table without missing cells
@@ -262,12 +266,20 @@ def _number(cell: str, line: int, column: int) -> float:
 
 
 def read_npy(path: Path) -> Array:
-    """Return the array of an npy file; raise ValueError if it is damaged or has no numbers."""
+    """Return the array of an npy file; raise ValueError if it is damaged, of another format or has objects.
+
+    Its header is compared with the length of the file before memory for the array is taken.
+    """
     with open_bytes(path) as file:
-        try:
-            return np.asarray(np.load(io.BytesIO(file.read()), allow_pickle=False))
-        except (OSError, EOFError, KeyError) as error:
-            raise ValueError(str(error) or "it ends too early") from error
+        content = io.BytesIO(file.read())
+    npy = np.lib.format
+    is_first = npy.read_magic(content) == (1, 0)
+    shape, _, dtype = (npy.read_array_header_1_0 if is_first else npy.read_array_header_2_0)(content)
+    stated, there = math.prod(shape) * dtype.itemsize, len(content.getbuffer()) - content.tell()
+    if not dtype.hasobject and stated > there:
+        raise ValueError(f"it states {stated} bytes of numbers and has {there}")
+    content.seek(0)
+    return np.asarray(npy.read_array(content, allow_pickle=False))
 
 
 def read_npz(path: Path) -> dict[str, Array]:

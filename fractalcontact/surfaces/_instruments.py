@@ -23,6 +23,7 @@ from fractalcontact.surfaces._files import check_unpacked, file_suffix, open_byt
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
+ARRAYS = ("h5", "mat", "npz")  # arrays of (row, column), in metres as those of an npy file
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
 # formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map
 FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "xyz")
@@ -95,13 +96,13 @@ def read_instrument(
         file.seek(0)
         reader = _open(file, path, try_points)
         chosen = _channel(reader, channel, path.name)
-        size, unit, lateral = _stated(chosen, other_unit, units)
+        name = str(reader.format())
+        size, unit, lateral = _stated(chosen, other_unit, units or ("m" if name in ARRAYS else None))
         with Problems(WHERE, UnreadableFile) as problems:
             _check(problems, chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
     points = tuple(int(n) for n in heights.shape)
     steps = _steps(points, size, lateral, spacing)
-    name = str(reader.format())
     entries = {
         "format": name,
         "channel": str(chosen.name),
@@ -238,9 +239,20 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
         raise UnreadableFile(
             WHERE, [f"channel {chosen.name!r}: expected real heights, got shape {values.shape}"]
         )
-    heights = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
-    heights = np.where(np.isfinite(heights), heights, np.nan)
-    return np.ascontiguousarray(heights.T), bool(topography.is_periodic)
+    if reader.format() not in ARRAYS:  # the library has x first
+        heights = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+        return np.ascontiguousarray(_observed(heights).T), bool(topography.is_periodic)
+    heights = np.ma.getdata(values).astype(np.float64)  # without the mask of the library for infinite ones
+    with Problems(WHERE, UnreadableFile) as problems:
+        infinite = int(np.count_nonzero(np.isinf(heights)))
+        expected = "finite heights, or NaN where missing"
+        problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
+    return np.ascontiguousarray(heights), bool(topography.is_periodic)
+
+
+def _observed(heights: Array) -> Array:
+    """Return heights with NaN in place of the infinite ones by which some formats mark a missing point."""
+    return np.where(np.isfinite(heights), heights, np.nan)
 
 
 def _steps(
@@ -293,8 +305,7 @@ def read_raster(path: Path, channel: str | int | None, units: str | None, spacin
         "origin": [transform.c * factor, transform.f * factor],
         "reader": f"rasterio {rasterio.__version__}",
     }
-    heights = np.where(np.isfinite(heights), heights, np.nan)
-    return Reading(heights, (float(steps[0]), float(steps[1])), False, False, entries, "bottom")
+    return Reading(_observed(heights), (float(steps[0]), float(steps[1])), False, False, entries, "bottom")
 
 
 def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:

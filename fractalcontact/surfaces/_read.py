@@ -15,13 +15,13 @@ import xarray as xr
 
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
-from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
+from fractalcontact.base.grid import METRES, core_dims, is_length, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import NONE, Problems, reading
 from fractalcontact.surfaces._files import (
     EmptyTable,
     NotATable,
@@ -188,15 +188,17 @@ def read(
     (3, 1.5e-06, 1)
     """
     source = Path(path)
-    content = file_content(
-        source,
-        channel=channel,
-        units=units,
-        spacing=spacing,
-        first_row=first_row,
-        columns=columns,
-        plane=plane,
-    )
+    with reading(WHERE, source):
+        content = file_content(
+            source,
+            channel=channel,
+            units=units,
+            spacing=spacing,
+            first_row=first_row,
+            columns=columns,
+            plane=plane,
+        )
+        digest = file_checksum(source)
     stated = content.entries["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
@@ -206,7 +208,7 @@ def read(
     surface.attrs = {
         "title": f"Surface read from {source.name}",
         "parameters": {"path": source.name},
-        "file_sha256": file_checksum(source),
+        "file_sha256": digest,
         **content.entries,
     }
     return surface
@@ -337,7 +339,8 @@ def _archive_content(
         )
         problems.require(name in names, "channel", expected, name)
     values = arrays[str(name)]
-    axes = [np.ravel(arrays.get(dim, ())).astype(np.float64) for dim in ("y", "x")]
+    axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
+    axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
     if spacing is None and [axis.size for axis in axes] == list(values.shape[-2:]):
         steps = [np.diff(in_metres(axis, units or "m")) for axis in axes]
         with Problems(WHERE, UnreadableFile) as problems:
@@ -353,7 +356,8 @@ def _array_content(
     path: Path, values: Array, units: str | None, spacing: Any, first_row: str | None
 ) -> FileContent:
     """Return an array of a numpy file: heights, or points in two or three columns."""
-    if values.ndim == 2 and values.shape[1] in (2, 3) and len(values) >= LEAST_POINTS:
+    has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
+    if has_points and len(values) >= LEAST_POINTS:
         return _gridded_points(Points(values.astype(np.float64)), path, units, spacing, None)
     return _heights_content(path, values, units, spacing, first_row)
 
@@ -417,6 +421,7 @@ def _netcdf_content(path: Path, channel: Any, units: str | None, spacing: Any) -
             array = _in_metres(candidates[name], units, spacing, problems)
             problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = candidates[name].attrs.get("units")
+    stated = stated if stated is None else str(stated)
     array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
     return FileContent(array, {"stated_unit": stated, "before": provenance_of(candidates[name]) or None})
 
@@ -440,9 +445,10 @@ def _in_metres(array: xr.DataArray, units: str | None, spacing: Any, problems: P
     core = core_dims(array)
     array = array.transpose(..., *core)
     stated = array.attrs.get("units")
-    unit = units or ("m" if stated in METRES else stated)
+    unit = units or ("m" if isinstance(stated, str) and stated in METRES else stated)
     expected = 'a unit of length, or give `units` ("m", "um" ...)'
-    if problems.require(unit in UNITS, f"{array.name}.units", expected, stated or NONE):
+    is_unit = isinstance(unit, str) and unit in UNITS
+    if problems.require(is_unit, f"{array.name}.units", expected, NONE if stated is None else stated):
         array = array.copy(data=in_metres(np.asarray(array.values, dtype=np.float64), str(unit)))
     array.attrs["units"] = "m"
     for dim in set(core) & set(array.coords):
@@ -459,9 +465,10 @@ def _ascending_metres(array: xr.DataArray, dim: str) -> xr.DataArray:
     """Convert the coordinate of a dim to metres, and reverse the array if it descends."""
     axis = array.coords[dim]
     unit = axis.attrs.get("units", "m")
-    if unit not in METRES and unit in UNITS:
+    is_other = isinstance(unit, str) and unit not in METRES and unit in UNITS
+    if is_other and axis.dtype.kind in "iuf":
         attributes = dict(axis.attrs) | {"units": "m"}
-        if "period" in attributes:
+        if is_length(attributes.get("period")):  # another one is refused afterwards
             attributes["period"] = in_metres(float(attributes["period"]), unit)
         centres = in_metres(axis.values.astype(np.float64), unit)
         array = array.assign_coords({dim: (dim, centres, attributes)})

@@ -17,7 +17,7 @@ from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, reading
 from fractalcontact.surfaces._files import NotATable, Table, file_suffix, open_bytes, read_table
 from fractalcontact.surfaces._instruments import PROJECT
 
@@ -78,7 +78,7 @@ def _check(problems: Problems, *, path: Any, units: Any, columns: Any) -> None:
     if not problems.path("path", path):
         return
     source = Path(path)
-    problems.require(source.is_file(), "path", "an existing file", source.name)
+    problems.file("path", path)
     suffixes = (*MESHES, *CLOUDS, *LISTS)
     known = file_suffix(source) in suffixes
     problems.require(known, "path", f"a file of points: {', '.join(suffixes)}", source.name)
@@ -134,13 +134,14 @@ def read_points(
     [0.002, 0.005]
     """
     source = Path(path)
-    content = point_content(source, columns)
+    with reading(WHERE, source):
+        content, digest = point_content(source, columns), file_checksum(source)
     unit = units or content.unit or "m"
     axes = ["x", "y", "z"] if content.position.shape[1] == 3 else ["x", "z"]
     variables: dict[str, Any] = {"position": (("point", "point_axis"), in_metres(content.position, unit))}
     if content.triangles is not None:
         variables["triangles"] = (("triangle", "corner"), content.triangles)
-    facts = {"parameters": {"path": source.name}, "file_sha256": file_checksum(source), **content.entries}
+    facts = {"parameters": {"path": source.name}, "file_sha256": digest, **content.entries}
     return xr.Dataset(variables, {"point_axis": axes}, facts | {"stated_unit": content.unit})
 
 
