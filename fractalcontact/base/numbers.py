@@ -55,8 +55,9 @@ def real_numbers(value: Any) -> Array | None:
 
 
 def python_number(value: Any) -> Any:
-    """Return a NumPy number as one of Python, whose arithmetic does not overflow; all else as it is."""
-    return value.item() if isinstance(value, (np.floating, np.integer)) and is_real(value) else value
+    """Return one number of NumPy or xarray as one of Python, whose arithmetic does not overflow."""
+    has_no_axes = getattr(value, "ndim", None) == 0 and getattr(value, "dtype", np.dtype("O")).kind in "iuf"
+    return value.item() if has_no_axes and not np.ma.is_masked(value) else value
 
 
 def float_array(value: Any) -> Array:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import as_array, float_array
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._options import BOUNDARIES, ContactOptions
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
@@ -105,10 +105,7 @@ def flat_stiffness(
 
 
 def _has_two_entries(shape: Any) -> bool:
-    try:
-        return bool(np.shape(shape) == (2,))
-    except ValueError:  # a ragged sequence
-        return False
+    return getattr(as_array(shape), "shape", None) == (2,)
 
 
 def _grid(shape: Any, spacing: Any, boundary: str) -> Grid:

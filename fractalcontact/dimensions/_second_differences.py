@@ -193,7 +193,7 @@ class EqualLags:
             else:
                 continue
             rows.append(row)
-        return np.array(rows).reshape(-1, multiples.size)
+        return np.array(rows).reshape(len(rows), multiples.size)
 
 
 def _in_spacings(surface: Surface, scales: Scales) -> tuple[float, float]:

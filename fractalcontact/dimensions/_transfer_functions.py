@@ -78,6 +78,7 @@ class Window:
         if square <= _NO_ALIASES:
             tail = self.frame.tail(hurst, square)
             total, by_hurst, by_square = total + tail[0], by_hurst + tail[1], by_square + tail[2]
+        total = np.maximum(total, np.exp(_LEAST_LOG))  # 0 for waves that the blur has removed
         return np.log(total), by_hurst / total, by_square / total
 
     def _lattice_filter(self, square: float) -> Iterable[tuple[Array, Array]]:

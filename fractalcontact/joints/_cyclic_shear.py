@@ -60,6 +60,10 @@ def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turn
     """Check that the dilatancy covers the path, on both sides where it has negative positions."""
     if not problems.require("azimuth" in dilatancy.variables, "dilatancy", "an azimuth", NONE):
         return
+    if "direction" not in dilatancy.dims and dilatancy["azimuth"].ndim:
+        dims = dilatancy["azimuth"].dims
+        problems.add("dilatancy.azimuth", "one number, or a dim direction", f"dims {dims}")
+        return
     shears = read_dilatancy(dilatancy)[1]
     for sign, azimuth in _side_azimuths(dilatancy, direction, turning_points).items():
         places = _places(dilatancy, azimuth)

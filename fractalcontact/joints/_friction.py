@@ -199,7 +199,7 @@ def _strength(angle: xr.DataArray, pressure: xr.DataArray) -> xr.DataArray:
 
 def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
     """Return the shear over which the peak is taken: 1 % of the side of the block, if the shears allow."""
-    side = float(dilatancy["nominal_area"]) ** 0.5 if "nominal_area" in dilatancy else 0.0
+    side = float(np.nan_to_num(dilatancy["nominal_area"])) ** 0.5 if "nominal_area" in dilatancy else 0.0
     resolved = max(PEAK_SHARE * side, FEWEST_STEPS * float(np.median(np.diff(shears))))
     return min(resolved, float(np.ptp(shears)))
 

@@ -183,7 +183,8 @@ def local_slopes(
     result = shown_in(result, units, "local_slopes")
     data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
     scale = next((name for name in ("box_size", "radius") if name in data.variables), "box_size")
-    require_dims(data, "local_slopes", {"local_slope": scale, scale: scale})
+    nulls = [name for name in ("null_count", "null_mass", "null_fraction") if name in data]
+    require_dims(data, "local_slopes", dict.fromkeys(("local_slope", scale, *nulls), scale))
     if "null_count" in data or "null_mass" in data:
         curve, sign = ("null_count", -1.0) if "null_count" in data else ("null_mass", 1.0)
         slope = sign * local_slope(data["box_size"].values, data[curve].values)

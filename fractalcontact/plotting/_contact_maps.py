@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._inputs import extent_of, result_of
+from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of
 from fractalcontact.plotting._paths import load_text, select_path, shear_text
 from fractalcontact.plotting._surface import draw_outline, plane_scale
 from fractalcontact.plotting._units import shown_in
@@ -78,6 +78,7 @@ def contact_domains(
     """
     result = shown_in(result, units, "contact_domains")
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
+    require_known_dims(data, "contact_domains", {"state": ("shear", "step", "y", "x")})
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
     count, columns = path.sizes[dim], number_of_columns(path.sizes[dim])
     width = _style.WIDTH * columns / COLUMNS

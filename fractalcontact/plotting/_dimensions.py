@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, require_variables, result_of, table, words
+from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -119,9 +119,7 @@ def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.D
         problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
     if estimates is None:
         return datasets, None
-    estimates = as_dataset(estimates, "dimension_curves", "estimates")
-    require_variables(estimates, "dimension_curves", ESTIMATES, "estimates")
-    return datasets, estimates
+    return datasets, result_of(estimates, "dimension_curves", ESTIMATES, ("method",), "estimates")
 
 
 def curve_of(curve: xr.Dataset) -> tuple[str, str]:

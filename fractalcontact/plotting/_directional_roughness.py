@@ -8,7 +8,7 @@ import numpy as np
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import result_of
+from fractalcontact.plotting._inputs import require_dims, result_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,6 +54,7 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
     ['$\\theta^*_{max}/(C+1)$', 'mean dip']
     """
     data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
+    require_dims(data, "directional_roughness", dict.fromkeys(CURVES, "azimuth"))
     polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
     with Problems("fc.plotting.directional_roughness") as problems:
         problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)

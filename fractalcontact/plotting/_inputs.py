@@ -102,6 +102,14 @@ def require_dims(dataset: xr.Dataset, where: str, dims: Mapping[str, str], argum
                 problems.require(dim in own, f"{argument}.{name}", f"the dim {dim}", own)
 
 
+def require_known_dims(dataset: xr.Dataset, where: str, dims: Mapping[str, Sequence[str]]) -> None:
+    """Raise InvalidInput if one of the variables has another dim than these."""
+    with Problems(f"fc.plotting.{where}") as problems:
+        for name, known in dims.items():
+            own = dataset[name].dims
+            problems.require(set(own) <= set(known), f"result.{name}", f"dims out of {', '.join(known)}", own)
+
+
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     """Return a variable as an array with exactly `dims`, repeated along those it does not have."""
     variable = data[name]

@@ -8,7 +8,14 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._inputs import as_dataset, extent_of, nearest, require_variables
+from fractalcontact.plotting._inputs import (
+    as_dataset,
+    extent_of,
+    nearest,
+    require_dims,
+    require_known_dims,
+    require_variables,
+)
 from fractalcontact.plotting._paths import load_words, shear_words
 from fractalcontact.plotting._surface import label_axes, plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
@@ -62,6 +69,8 @@ def islands(result: Any, *, units: Units | None = None, axes: Panels | None = No
     """
     result = shown_in(result, units, "islands")
     data = _checked_islands(result, ("label", "area"))
+    require_dims(data, "islands", {"area": "island"})
+    require_known_dims(data, "islands", {"area": ("island",)})
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
     island_map(data, ax=left)
     _island_areas(right, data)

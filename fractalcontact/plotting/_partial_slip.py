@@ -10,7 +10,7 @@ import xarray as xr
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_of_columns
-from fractalcontact.plotting._inputs import extent_of, result_of, table
+from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of, table
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._surface import plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
@@ -75,6 +75,7 @@ def slip_domains(
     with Problems("fc.plotting.slip_domains") as problems:
         problems.integer("panels", panels, at_least=1)
     data = result_of(result, "slip_domains", ("slip_state",), ("step",))
+    require_known_dims(data, "slip_domains", {"slip_state": ("step", "y", "x")})
     path = data.isel(step=_style.spread_indices(data.sizes["step"], panels))
     count, columns = path.sizes["step"], number_of_columns(path.sizes["step"])
     width = _style.WIDTH * columns / COLUMNS

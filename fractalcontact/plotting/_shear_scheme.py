@@ -96,6 +96,10 @@ def sliding_scheme(
     surface = shown_in(surface, units, "sliding_scheme")
     lower, step = plane_of(surface, "sliding_scheme", "height", "surface"), shear_step_of(delta)
     facing = lower if upper is None else plane_of(upper, "sliding_scheme", "height", "upper")
+    with Problems("fc.plotting.sliding_scheme") as problems:
+        shape = lower.shape
+        problems.require(min(shape) > 1, "surface", "at least two points along x and y", shape)
+        problems.require(facing.shape == shape, "upper", f"the shape of surface, {shape}", facing.shape)
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.0), width_ratios=(1.0, 1.9))
     _draw_plan(left, lower, step)
     name = r"$\delta_\mathrm{r}$" if upper is None else "lift"

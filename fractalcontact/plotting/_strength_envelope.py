@@ -59,7 +59,8 @@ def strength_envelope(
     result = shown_in(result, units, "strength_envelope")
     ax = _style.axes_or_new(ax)
     data = result_of(result, "strength_envelope", ("shear_strength", "in_range", "criterion"), ("criterion",))
-    require_dims(data, "strength_envelope", {"shear_strength": "nominal_pressure"})
+    for dim in ("criterion", "nominal_pressure"):
+        require_dims(data, "strength_envelope", {"shear_strength": dim, "in_range": dim})
     data = data.sortby("nominal_pressure")
     pressure = data["nominal_pressure"]
     strength = data["shear_strength"].transpose("criterion", "nominal_pressure")

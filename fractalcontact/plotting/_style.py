@@ -321,9 +321,10 @@ def halo() -> list[Any]:
 
 
 def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
-    """Make an axis logarithmic if it has any positive value to show."""
+    """Make an axis logarithmic if it has several positive values to show: one gives it no limits."""
     for values, setter in ((x, ax.set_xscale), (y, ax.set_yscale)):
-        if values is not None and np.any(np.asarray(values, dtype=float) > 0):
+        shown = np.asarray([] if values is None else values, dtype=float)
+        if np.unique(shown[shown > 0]).size > 1:
             setter("log")
 
 

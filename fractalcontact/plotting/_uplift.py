@@ -9,7 +9,7 @@ import numpy as np
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._inputs import extent_of, result_of, words
+from fractalcontact.plotting._inputs import extent_of, require_dims, result_of, words
 from fractalcontact.plotting._surface import label_axes, plane_of, plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
@@ -64,8 +64,13 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     plane = plane_of(data[["fluid_pressure"]], "uplift", "fluid_pressure")
     profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
                                               and d not in ("diagram", "x", "y")])  # fmt: skip
+    names = ("uplift_profile", "uplift_x", "uplift_y", "diagram")
+    require_dims(data, "uplift", dict.fromkeys(names, "diagram"))
     with Problems("fc.plotting.uplift") as problems:
         problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
+        diagrams = words(data["diagram"])
+        are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
+        problems.require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
     left, right = shown = _style.panel_row(axes, 2, SIZE, width_ratios=(1.0, 1.1))
     length, pressure = plane_scale(plane), scale_of(plane)
     extent = extent_of(plane)
