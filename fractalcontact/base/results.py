@@ -29,6 +29,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, LoadedWarning
+from fractalcontact.base.missing_numbers import give_reasons
 from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.references import NO_REFERENCES
@@ -123,7 +124,10 @@ def public_result(
             if isinstance(result, xr.Dataset):
                 _set_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
-            result = stamp(label(result, keep_notes=True), name, parameters, **entries)
+            result = label(result, keep_notes=True)
+            if isinstance(result, xr.Dataset):
+                give_reasons(result)
+            result = stamp(result, name, parameters, **entries)
             if notes:
                 result.attrs["history"] += f" (surface: {notes})"
             return result

@@ -91,7 +91,10 @@ def heterogeneity(moments: Moments, spacing: tuple[float, ...], hurst: float) ->
     levels = logs[:, ::2].mean(axis=1)
     limit = float(chdtri(len(logs) - 1, _FALSE_ALARM))
     if not is_finite.all() or _chi_square(levels, shares / (level @ covariance @ level)) > limit:
-        weight = shares * np.exp(levels - levels.max())
+        # without variation along one axis, as beside a step, no block has a level: the axes are summed then
+        has_levels = bool(np.isfinite(levels).any())
+        squared = np.exp(levels - levels.max()) if has_levels else squares[:, ::2].sum(axis=1)
+        weight = shares * squared
         widening = max(1.0, float(np.sqrt(weight.size * np.sum(weight**2)) / np.sum(weight)))
         notes.append(
             f"parts of the surface are not equally rough: the interval is {widening:.2f} times as wide as "

@@ -124,7 +124,7 @@ def decorrelation_length(
         variances.append(variance)
         lengths.append(estimate_length(sums, shears, min(crack.block)))
     dims = ("direction", "shear")
-    return xr.Dataset(
+    result = xr.Dataset(
         {
             "correlation": (dims, np.stack(correlations)),
             "structure_function": (dims, np.stack(variances)),
@@ -136,6 +136,12 @@ def decorrelation_length(
         coords={"shear": ("shear", shears), **direction_coords(directions)},
         attrs={"correlation_threshold": THRESHOLD},
     )
+    reasons = [f"{towards.name}: {length.reason}" for towards, length in zip(directions, lengths, strict=True)
+               if length.reason]  # fmt: skip
+    for name in ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high"):
+        if reasons and bool(result[name].isnull().any()):
+            result[name].attrs["reason"] = f"NaN: {'; '.join(reasons)}"
+    return result
 
 
 def _whole_cell_shears(crack: Crack, directions: Sequence[Direction]) -> Array:

@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.joints._compass import Direction, check_directions, direction_coords, read_directions
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -65,6 +65,8 @@ def _check(
     problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=1e100, optional=True)
     if not problems.surface("surface", surface, finite=False, profile=True):
         return
+    is_observed = bool(np.isfinite(surface.values).any())
+    problems.require(is_observed, "surface", "observed heights", Words("nothing but NaN"))
     if not (directions_are_valid and lag_is_valid):
         return
     grid = read_grid(surface, core_dims(surface))

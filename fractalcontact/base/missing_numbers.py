@@ -1,0 +1,57 @@
+"""Why a number of a result is missing: the reason that a variable with NaN has in its attributes.
+
+A function that knows more states it itself, in the attributes `reason` or `comment` of the variable.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+_FIT = "NaN where no power law was fitted: the set or the surface is empty, flat or too small"
+_AMPLITUDE = "NaN where the method gives no amplitude, or no power law was fitted"
+_EMPTY = "NaN where the set is empty, or the mask is too small"
+_LENGTH = "NaN where the mask has no coordinates in metres, or cells that are not square"
+_AREA = "NaN where the set is empty, or the mask has no coordinates in metres"
+_SLOPE = "NaN where a value is not positive, or stands alone"
+_OCTAVES = "NaN where no run of octaves has one exponent"
+_HEIGHTS = "NaN where too few heights are observed at this scale"
+_FLAT = "NaN where the heights do not vary, or too few are observed"
+
+REASONS = {
+    **dict.fromkeys(
+        ("scale_min", "scale_max", "fitted_hurst", "fractal_dimension", "singularity_strength"), _FIT
+    ),
+    **dict.fromkeys(("singularity_spectrum", "mass_exponent"), _FIT),
+    **dict.fromkeys(("rms_increment", "topothesy"), _AMPLITUDE),
+    "noise_height": "NaN where the method has no model of noise, or no power law was fitted",
+    "blur_spread": "NaN where the method has no model of blur, or no power law was fitted",
+    "misfit": "NaN where the method has no test of its model, or no power law was fitted",
+    **dict.fromkeys(("window_hurst", "window_ci_low", "window_ci_high"), _OCTAVES),
+    **dict.fromkeys(("hurst", "standard_error"), _FLAT),
+    **dict.fromkeys(("covering_area", "cube_count", "roughness", "madogram", "variogram"), _HEIGHTS),
+    **dict.fromkeys(("second_variogram", "variation"), _HEIGHTS),
+    **dict.fromkeys(("box_length", "radius_length"), _LENGTH),
+    **dict.fromkeys(("area", "perimeter", "x_min", "x_max", "y_min", "y_max"), _AREA),
+    **dict.fromkeys(("total_perimeter", "largest_island", "mean_island_area"), _AREA),
+    **dict.fromkeys(("null_dimension", "null_spread", "mean_mass", "null_mass"), _EMPTY),
+    **dict.fromkeys(("minkowski_null_dimension", "correlation_null_dimension"), _EMPTY),
+    **dict.fromkeys(
+        ("lacunarity", "null_lacunarity", "relative_lacunarity", "normalised_lacunarity"), _EMPTY
+    ),
+    **dict.fromkeys(("lacunarity_slope", "lacunarity_area"), _EMPTY),
+    **dict.fromkeys(("null_lacunarity_slope", "null_lacunarity_area"), _EMPTY),
+    **dict.fromkeys(("box_local_slope", "minkowski_local_slope", "correlation_local_slope"), _SLOPE),
+    "correlation": "NaN where the heights of a face do not vary",
+    "uplift_arm": "NaN where there is no uplift",
+}
+
+
+def give_reasons(dataset: xr.Dataset) -> None:
+    """Set the attribute `reason` of every variable with NaN that states none, in place."""
+    variables = dataset.variables
+    for name in variables.keys() & REASONS.keys():
+        variable = variables[name]
+        stated = "reason" in variable.attrs or "NaN" in variable.attrs.get("comment", "")
+        if variable.dtype.kind == "f" and not stated and np.isnan(variable.values).any():
+            variable.attrs["reason"] = REASONS[str(name)]

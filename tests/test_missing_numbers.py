@@ -1,0 +1,183 @@
+"""Results of surfaces, sets and joints that have no answer: every NaN comes with its reason."""
+
+import warnings
+
+import numpy as np
+import pytest
+import test_labels as labels
+import xarray as xr
+from fuzz_calls import CALLS, function_of
+
+import fractalcontact as fc
+from fractalcontact.base.errors import FractalContactError
+
+STREAM = np.random.default_rng(1)
+NOISE = STREAM.normal(size=(24, 24)) * 1e-6
+RAMP = np.arange(24.0) * np.ones((24, 1)) * 1e-6
+SPIKE = np.where((np.arange(24) == 5) & (np.arange(24) == 5)[:, None], 1e-5, 0.0)
+
+HEIGHTS = {
+    "flat": np.zeros((24, 24)),
+    "flat, 4 x 4": np.zeros((4, 4)),
+    "3 x 3": NOISE[:3, :3],
+    "8 x 8": NOISE[:8, :8],
+    "3 x 24": NOISE[:3],
+    "ramp": RAMP,
+    "spike": SPIKE,
+    "step": np.where(RAMP < 12e-6, 0.0, 1e-6),
+    "grooves": np.sin(9e5 * RAMP) * 1e-6,
+    "with gaps": np.where(STREAM.random((24, 24)) < 0.6, np.nan, NOISE),
+    "mostly missing": np.where(STREAM.random((24, 24)) < 0.95, np.nan, NOISE),
+    "missing": np.full((24, 24), np.nan),
+    "profile": NOISE[0],
+    "flat profile": np.zeros(24),
+    "short profile": NOISE[0, :4],
+}
+SHAPES = ((1, 1), (2, 2), (3, 3), (1, 50), (7, 11), (24, 24))
+
+
+def surfaces():
+    found = {name: fc.surfaces.from_array(heights, 1e-4) for name, heights in HEIGHTS.items()}
+    flat = found["flat"].copy()
+    for dim in flat.dims:
+        flat[dim].attrs["period"] = 24e-4
+    return found | {"flat and periodic": flat}
+
+
+def masks():
+    def of(cells):
+        return xr.DataArray(cells, dims=("y", "x"))
+
+    found = {"line": of(np.eye(24, dtype=bool)), "noise": of(NOISE > 1e-6)}
+    for shape in SHAPES:
+        one = np.zeros(shape, bool)
+        one[0, 0] = True
+        found |= {f"empty {shape}": of(one & False), f"one {shape}": of(one), f"full {shape}": of(one | True)}
+    steps = [found[f"{word} (24, 24)"] for word in ("empty", "one", "full")]
+    return found | {"steps": xr.concat(steps, "step"), "empty steps": xr.concat([steps[0]] * 3, "step")}
+
+
+def cracks():
+    names = ("flat", "ramp", "spike", "step", "grooves")
+    found = {name: crack_of(HEIGHTS[name]) for name in names}
+    return found | {"rigid": crack_of(NOISE, young=None, poisson=None), "small": crack_of(NOISE[:8, :8])}
+
+
+def crack_of(heights, **options):
+    options = {"young": 30e9, "poisson": 0.2} | options
+    block = len(heights) * 2 // 3 * 1e-4
+    return fc.joints.Crack(fc.surfaces.from_array(heights, 1e-4), block=block, **options)
+
+
+def gaps():
+    flat = fc.surfaces.from_array(np.zeros((24, 24)), 1e-4)
+    wall = (flat + 1e-5).where(flat.x > flat.x[0], 0.0)
+    return {"closed": flat, "open": flat + 1e-5, "wall": wall}
+
+
+def closures():
+    loads = [0.0, 1.0, 10.0, 30.0, 100.0]
+    return {
+        name: fc.joints.closure(crack, shear=[0.0, 1e-4], normal_force=loads)
+        for name, crack in cracks().items()
+        if name != "rigid"
+    }
+
+
+def dilatancies():
+    shear = {"shear": [0.0, 0.5e-4, 1e-4], "direction": ["E", "W"]}
+    found = {name: fc.joints.dilatancy(crack, **shear) for name, crack in cracks().items()}
+    return found | {"spike under force": fc.joints.dilatancy(cracks()["spike"], normal_force=[1.0], **shear)}
+
+
+INPUTS = {
+    "surface": surfaces,
+    "lower": surfaces,
+    "mask": masks,
+    "masks": lambda: {name: [mask, mask] for name, mask in masks().items()},
+    "crack": cracks,
+    "gap": gaps,
+    "closure": closures,
+    "dilatancy": dilatancies,
+}
+# calls that the fuzzers do not make
+MORE = {
+    "contact.theories": lambda: {"surface": None, "contact_modulus": 1e9, "nominal_pressure": [1e4, 1e5]},
+    "dimensions.hurst_map": lambda: {"surface": None, "window": 1.6e-3},
+    "dimensions.scaling": lambda: {"surface": None},
+    "dimensions.waves": lambda: {"surface": None},
+    "joints.area_dimension": lambda: {
+        "crack": None, "shear": [1e-4], "factors": [1, 2], "normal_force": [1.0, 10.0],
+    },
+    "joints.direct_shear": lambda: {"crack": None, "path": 2e-4, "nominal_pressure": [1e6], "hardness": 1e9},
+    "joints.partial_slip": lambda: {
+        "crack": None, "shear": [1e-4], "normal_force": [1.0, 10.0], "tangential_force": [0.1, 0.5],
+    },
+    "joints.self_weight": lambda: {
+        "crack": None, "structure_size": [1.0, 10.0], "unit_weight": 24e3, "shear": [1e-4],
+    },
+}  # fmt: skip
+FUNCTIONS = {
+    name: make
+    for name, make in (CALLS | MORE).items()
+    if name.partition(".")[0] in labels.SUBPACKAGES and name not in labels.UNLABELLED
+}
+
+
+def unexplained(result):
+    """Return the names of the variables that have NaN and no reason; missing heights have none."""
+    if not isinstance(result, (xr.Dataset, xr.DataArray)):
+        return set()
+    dataset = result.to_dataset(name=result.name or "values") if isinstance(result, xr.DataArray) else result
+    return {
+        str(name)
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "f"
+        and name != "height"
+        and np.isnan(variable.values).any()
+        and not ("reason" in variable.attrs or "NaN" in variable.attrs.get("comment", ""))
+    }
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_missing_number_has_a_reason(name):
+    arguments, faults = FUNCTIONS[name](), {}
+    argument = next((word for word in INPUTS if word in arguments), None)
+    for case, value in INPUTS[argument]().items() if argument else [("as it stands", None)]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                result = function_of(name)(**(arguments | ({argument: value} if argument else {})))
+            except FractalContactError:
+                continue
+        if found := unexplained(result):
+            faults[case] = found
+    assert faults == {}
+
+
+@pytest.mark.parametrize("method", fc.dimensions.methods())
+def test_every_method_gives_its_reasons(method):
+    for case, surface in surfaces().items():
+        try:
+            result = fc.dimensions.estimate(surface, method)
+        except FractalContactError:
+            continue
+        assert unexplained(result) == set(), case
+
+
+def test_reason_of_the_decorrelation_length_is_that_of_its_direction():
+    result = fc.joints.decorrelation_length(cracks()["ramp"], direction=["E", "N"])
+    for end in ("", "_low", "_high"):
+        reason = result[f"decorrelation_length{end}"].attrs["reason"]
+        assert reason == "NaN: E: the faces are planes; N: the faces are planes"
+
+
+def test_reasons_come_back_from_a_file(tmp_path):
+    result = fc.domains.describe(masks()["empty (24, 24)"])
+    assert "set is empty" in result["largest_island"].attrs["reason"]
+    xr.testing.assert_identical(fc.open(fc.save(result, tmp_path / "empty.nc")), result)
+
+
+def test_number_that_is_there_has_no_reason():
+    mask = masks()["noise"].assign_coords(x=np.arange(24) * 1e-4, y=np.arange(24) * 1e-4)
+    assert "reason" not in fc.domains.describe(mask)["largest_island"].attrs
