@@ -149,15 +149,13 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     where = "fractalcontact.open"
     with Problems(where, UnreadableFile) as problems:
         problems.file("path", path)
+        is_auto = isinstance(chunks, str) and chunks == "auto"
+        expected = "'auto', a size of blocks, or a mapping of dims to sizes"
+        are_sizes = chunks is None or is_auto or _is_size(chunks) or _are_sizes(chunks)
+        problems.require(are_sizes, "chunks", expected, chunks)
+    if chunks is not None and importlib.util.find_spec("dask") is None:
+        raise MissingExtra("chunks", "dask", "dask")
     source = Path(path)
-    if chunks is not None:
-        if importlib.util.find_spec("dask") is None:
-            raise MissingExtra("chunks", "dask", "dask")
-        with Problems(where) as problems:
-            is_auto = isinstance(chunks, str) and chunks == "auto"
-            expected = "'auto', a size of blocks, or a mapping of dims to sizes"
-            are_sizes = is_auto or _is_size(chunks) or _are_sizes(chunks)
-            problems.require(are_sizes, "chunks", expected, chunks)
     try:
         tree = xr.DataTree.from_dict(_read(source) if chunks is None else _opened(source, chunks))
     except UnreadableFile:

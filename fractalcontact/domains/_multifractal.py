@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import LARGEST_INTEGER, Problems
 from fractalcontact.domains._mask_input import (
     EXPECTED,
     Array,
@@ -42,6 +42,9 @@ def _check(problems: Problems, *, mask: Any, q: Any, scales: Any, valid: Any) ->
     problems.numbers("q", q, at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
     if not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biuf":
         problems.add("mask", EXPECTED_MEASURE, mask)
+        check_box_sizes(problems, "scales", scales, LARGEST_INTEGER)
+        is_mask = valid is None or (isinstance(valid, xr.DataArray) and valid.dtype.kind == "b")
+        problems.require(is_mask, "valid", "a boolean DataArray with dims (y, x)", valid)
         return
     if mask.dtype.kind == "f":
         values = mask.values

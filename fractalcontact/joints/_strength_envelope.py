@@ -84,10 +84,13 @@ def _check(
             needs = CRITERIA[name].needs
             missing = needs is not None and given[needs] is None
             problems.require(not missing, str(needs), f"a value, for criterion {name!r}", None)
-    if check_direction(problems, direction):
+    has_direction = check_direction(problems, direction)
+    for check, options in (
+        (roughness_coefficient.validate, {"direction": direction} if has_direction else {}),
+        (directional_roughness.validate, {}),
+    ):
         with problems.collect():
-            roughness_coefficient.validate(surface, direction=direction)
-            directional_roughness.validate(surface)
+            check(surface, **options)
 
 
 @public_result(

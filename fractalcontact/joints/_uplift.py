@@ -73,21 +73,24 @@ def _check(
     problems.number("total_stress", total_stress, above=0, at_most=LARGEST_PRESSURE, optional=True)
     both = normal_stiffness is not None and total_stress is not None
     problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
-    if not check_gap(problems, gap, RESULTS):
+    has_gap = check_gap(problems, gap, RESULTS)
+    plane = gap if has_gap else None
+    sides = [_check_side(problems, "upstream", upstream, plane)]
+    sides += [_check_side(problems, "downstream", downstream, plane)] if downstream is not None else []
+    has_drains = drains is not None and problems.numbers("drains", drains, any_shape=True)
+    if not has_gap:
         return
-    sides = [_check_side(problems, "upstream", upstream, gap)]
-    sides += [_check_side(problems, "downstream", downstream, gap)] if downstream is not None else []
     if all(sides):
         high_side, low_side = _sides(upstream, downstream, gap)
         differ = high_side.axis != low_side.axis or high_side.place != low_side.place
         problems.require(differ, "downstream", "another edge or line than upstream", downstream)
-    if drains is not None:
+    if has_drains:
         _check_drains(problems, drains, gap)
     if total_stress is not None:
         _check_path(problems, gap)
 
 
-def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray) -> bool:
+def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray | None) -> bool:
     expected = "'W', 'E', 'S', 'N', or a line as ('x', its x in m) or ('y', its y in m)"
     if isinstance(value, str):
         return problems.require(value in EDGES, name, expected, value)
@@ -96,6 +99,8 @@ def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray) ->
         return False
     if not problems.number(name, value[1], at_least=-LARGEST_PRESSURE, at_most=LARGEST_PRESSURE):
         return False
+    if gap is None:
+        return True
     axis = "yx".index(value[0])
     place, extent = _from_edge(gap, axis, float(value[1])), read_grid(gap).extent[axis]
     return problems.require(0.0 < place < extent, name, "a line inside the plane", value)
@@ -103,11 +108,7 @@ def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray) ->
 
 def _check_drains(problems: Problems, drains: Any, gap: xr.DataArray) -> None:
     expected = "points (x, y) in m inside the plane"
-    try:
-        points = np.asarray(drains, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        problems.add("drains", expected, drains)
-        return
+    points = np.asarray(drains, dtype=np.float64)
     if points.ndim not in (1, 2) or points.shape[-1] != 2 or points.size == 0:
         problems.add("drains", expected, f"an array of shape {points.shape}")
         return

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.numbers import is_real, number_of_entries
 from fractalcontact.base.validation import Problems, Words
@@ -77,14 +78,16 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
         with Problems(where) as problems:
             for name, value in signature.bind(*arguments, **options).arguments.items():
-                _check_option(problems, name, value, str(signature.parameters[name].annotation))
+                parameter = signature.parameters[name]
+                if not (value is None and parameter.default is None):
+                    _check_option(problems, name, value, str(parameter.annotation))
         return function(*arguments, **options)
 
     return wrapper
 
 
 def _check_option(problems: Problems, name: str, value: Any, declared: str) -> None:
-    """Check the value of an option whose annotation is one of a few; data are checked where they are read."""
+    """Check the value of an option whose annotation is one of a few; data are read, and checked, later."""
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
@@ -106,6 +109,14 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
     elif words[0] == "Figure":
         expected = "a Figure or SubFigure, or None"
         problems.require(value is None or isinstance(value, FigureBase), name, expected, value)
+    elif words[0] == "Any":  # labelled data, or several by name
+        expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
+        got = type(value).__name__
+        problems.require(isinstance(value, (xr.DataArray, Mapping)), name, expected, got)
+    elif words[0] == "xr.DataArray":
+        problems.require(isinstance(value, xr.DataArray), name, "a DataArray with x and y", value)
+    elif words[0] == "xr.DataTree":
+        problems.tree(name, value)
     elif words[0] == "bool":
         problems.boolean(name, value)
     elif words[0] == "str":

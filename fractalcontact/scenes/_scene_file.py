@@ -15,6 +15,7 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.validation import NONE, Problems, did_you_mean
 from fractalcontact.scenes._plan import check_loads
 from fractalcontact.scenes._scene import (
@@ -269,14 +270,15 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
             _check_keys(table, (*keys, "generate", "level"), name, problems)
             for key in sorted(required - set(table)):
                 problems.add(f"{name}.{key}", f"a value for {generator}", NONE)
-            if "shape" in table:  # one number would make a profile, and studies are of surfaces
-                shape = table["shape"]
-                is_pair = isinstance(shape, list) and len(shape) == 2
-                problems.require(is_pair, f"{name}.shape", "[ny, nx]", shape)
+        if "shape" in table:  # one number would make a profile, and studies are of surfaces
+            shape = table["shape"]
+            is_pair = isinstance(shape, list) and len(shape) == 2
+            problems.require(is_pair, f"{name}.shape", "[ny, nx]", shape)
         if "members" in table:
             problems.integer(f"{name}.members", table["members"], at_least=1, at_most=LONGEST_RANGE)
     else:
         _check_keys(table, READING, name, problems)
+        problems.choice(f"{name}.units", table.get("units"), UNITS, optional=True)
         if sources == ["read"]:
             problems.path(f"{name}.read", table["read"])
             problems.choice(f"{name}.plane", table.get("plane"), PLANES[name], optional=True)

@@ -37,10 +37,13 @@ from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
 from fractalcontact.scenes._stages import (
+    DOMAIN_STAGES,
     FIGURES,
     JOINT_STAGES,
     PARTIAL_SLIP,
+    PRESS,
     STAGES,
+    WANTED,
     arguments_of,
     public_function,
 )
@@ -90,9 +93,10 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
         if not _is_valid(problems, "material"):
             known = {key: table for key, table in scene.tables.items() if key != "material"}
             scene = replace(scene, tables=known)
+        if not _is_valid(problems, "want"):
+            scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
-        if _is_valid(problems, "want"):
-            _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
+        _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
     warn(implausible_input(scene, surfaces["surface"]))
     return scene
 
@@ -114,6 +118,23 @@ def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
                 problems.note(f"{tables[0] or place}.{argument}", f"{place}: {line}")
 
 
+def _with_possible_want(scene: Scene) -> Scene:
+    """Return a scene that wants what its tables are for, in place of words that were refused.
+
+    Otherwise a wrong word would hide the problems of the calls.
+    """
+    want = {name: [word for word in scene.wanted(name) if word in words] for name, words in WANTED.items()}
+    own = {"joints": ("joint", JOINT_STAGES), "domains": ("domains", DOMAIN_STAGES)}
+    for name, (table, stages) in own.items():
+        want[name] += [word for word in scene.table(table) if word in stages]
+    if "contact" in scene.tables:
+        want["contact"].append(PRESS)
+    if "dimensions" in scene.tables:
+        want["dimensions"] = ["default"]
+    possible = {name: list(dict.fromkeys(words)) for name, words in want.items() if words}
+    return replace(scene, tables={**scene.tables, "want": possible})
+
+
 def _is_valid(problems: Problems, *keys: str) -> bool:
     """Return whether these keys of the scene, with their tables and sub-tables, passed the checks so far."""
     pairs = [(f"{key}.", f"{failed}.") for key in keys for failed in problems.arguments]
@@ -124,17 +145,25 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
     """Return the valid surfaces of the scene; of an ensemble one."""
     surfaces: dict[str, xr.DataArray] = {}
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
-        if table is None or (name == "upper" and not (_is_valid(problems, "want") and scene.want.joints)):
+        if table is None:
             continue
-        if table.generate in GENERATORS:
+        if generator := _generator(table):
             with _collected(problems, name, name):
-                _validate_call(f"surfaces.{table.generate}", **generator_options(table))
-        if _is_valid(problems, name):
+                _validate_call(f"surfaces.{generator}", **generator_options(table))
+        if _is_valid(problems, name) and (name == "surface" or scene.want.joints):
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
                 lower = surfaces.get("surface")
                 surfaces[name] = read_surface(table, scene.folder, lower) if flat is None else flat
     return surfaces
+
+
+def _generator(table: SurfaceTable) -> str | None:
+    """Return the generator of a table; for an unknown one the first that takes all its arguments."""
+    if table.generate is None or table.generate in GENERATORS:
+        return table.generate
+    keys = {name: arguments_of(f"surfaces.{name}")[0] for name in GENERATORS}
+    return next((name for name in GENERATORS if set(table.options) <= set(keys[name])), None)
 
 
 def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
