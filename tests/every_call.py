@@ -29,22 +29,21 @@ from fractalcontact.base import threads
 SCENE = SOUND.replace("[48, 48]", "[24, 24]").replace("2.4e-3", "1e-3")
 SCENE += 'dimensions = ["variogram"]\nfigures = true\n'
 LIMIT = 240.0  # seconds after which a process counts as hanging
-# classes and constants; `extremes` runs every case in a process of its own, `worst_results` sorts them
+# classes and constants
 LEFT_OUT = {
     "accuracy.Benchmark",
     "accuracy.Case",
     "accuracy.Method",
     "accuracy.Result",
     "accuracy.cases",
-    "accuracy.extremes",
-    "accuracy.worst_results",
     "contact.ContactOptions",
     "contact.LoadPath",
     "joints.PARK_PAULAY",
     "scenes.Scene",
     "surfaces.SelfAffine",
 }
-# these draw what others have computed; `scenes.run` draws figures too
+# figures draw on the axes of a caller what others have computed, and Matplotlib promises nothing for threads;
+# of `plotting` only `draw`, which reads a study and writes files, is called here, and by `scenes.run`
 SUBPACKAGES = [name for name in fc.__all__ if name not in ("plotting", "save", "open")]
 
 
@@ -73,6 +72,11 @@ def run(folder):
 def measured():
     method = fc.accuracy.Method("m", [4, 8], lambda n: n, lambda n: n, lambda n, _: 1.0 / n)
     return fc.accuracy.measure({"surfaces": [fc.accuracy.Benchmark("b", "e", "t", (method,))]}, budget=0.1)
+
+
+def extremes():
+    """Return the results of one case, which is examined in a process of its own."""
+    return fc.accuracy.extremes("one cell")
 
 
 CALLS = {
@@ -116,13 +120,18 @@ CALLS = {
     "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
     "accuracy.examine": lambda _: str([r.name for r in fc.accuracy.examine(fc.accuracy.cases["one cell"])]),
     "accuracy.measure": lambda _: str(sorted(measured().children)),
+    "accuracy.extremes": lambda _: extremes(),
+    "accuracy.worst_results": lambda _: fc.accuracy.worst_results(extremes()),
+    "plotting.draw": lambda folder: str(
+        sorted(path.name for path in fc.plotting.draw(study()[0], folder / "figures"))
+    ),
     "accuracy.summary": lambda _: fc.accuracy.summary(measured())[:20],
 }
 
 
 def names():
     """Return every public function that computes or reads; a new one is in it by itself."""
-    found = ["save", "open"]
+    found = ["save", "open", "plotting.draw"]
     for subpackage in SUBPACKAGES:
         module = importlib.import_module(f"fractalcontact.{subpackage}")
         found += [name for function in module.__all__ if (name := f"{subpackage}.{function}") not in LEFT_OUT]
