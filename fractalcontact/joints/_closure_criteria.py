@@ -279,15 +279,12 @@ def _check_hydraulic(aperture: Any, model: Any, given: dict[str, Any]) -> None:
     """Check the arguments of `hydraulic_aperture`, and that they are those of the model."""
     with Problems("fractalcontact.joints.hydraulic_aperture") as problems:
         positive = problems.numbers("aperture", aperture, above=1 / LARGEST, at_most=LARGEST, any_shape=True)
-        if not problems.choice("model", model, MODELS):
-            return
-        for name, value in given.items():
+        is_model = problems.choice("model", model, MODELS)
+        for name, value in given.items() if is_model else ():
             if name in NEEDS[model]:
                 problems.require(value is not None, name, f"a value for {model!r}", "none")
             else:
                 problems.require(value is None, name, f"nothing with {model!r}", value)
-        if problems.messages:
-            return
         roughness, spread, contact = (given[name] for name in ("roughness", "spread", "contact_fraction"))
         problems.number("roughness", roughness, above=0, at_most=20, optional=True)
         series = model == "zimmerman_bodvarsson"
