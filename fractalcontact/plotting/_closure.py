@@ -122,7 +122,7 @@ def closure_laws(
 
 
 @_style.checked
-def closure_fits(closure: Any, laws: Any, *, ax: Axes | None = None) -> Axes:
+def closure_fits(closure: Any, laws: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the closure against the nominal pressure with both closure laws, one colour per shear.
 
     Points are the steps of the first loading and beyond; the law that they prefer is a thick line, and laws
@@ -135,6 +135,8 @@ def closure_fits(closure: Any, laws: Any, *, ax: Axes | None = None) -> Axes:
         step), or over one of them.
     laws : Dataset or node of a DataTree
         From `fractalcontact.joints.closure_laws` of the same closure, also with a seating pressure.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -159,6 +161,7 @@ def closure_fits(closure: Any, laws: Any, *, ax: Axes | None = None) -> Axes:
     >>> ax.get_xlabel(), len(ax.lines)  # for each shear the steps and two laws
     ('nominal pressure (MPa)', 6)
     """
+    closure = shown_in(closure, units, "closure_fits")
     ax = _style.axes_or_new(ax)
     names = ("interface_closure", "nominal_pressure")
     data = result_of(closure, "closure_fits", names, ("shear", "step"), "closure")

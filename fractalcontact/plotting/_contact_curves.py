@@ -12,10 +12,12 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import draw_theories, shear_legend
 from fractalcontact.plotting._inputs import as_dataset, result_of, table
 from fractalcontact.plotting._paths import load_words
-from fractalcontact.plotting._units import axis_label, name_of, scale_of
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 STIFFNESSES = ("contact_stiffness", "stiffness", "interface_stiffness")
 PER_LENGTH = Scale(1e9, "MPa/mm")
@@ -25,7 +27,12 @@ MOST_STEPS = 6  # of the distributions in one figure
 
 @_style.checked
 def mean_gap(
-    result: Any, *, against: str = "nominal_pressure", theory: Any = None, ax: Axes | None = None
+    result: Any,
+    *,
+    against: str = "nominal_pressure",
+    theory: Any = None,
+    units: Units | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the mean gap between two surfaces, one curve per shear displacement.
 
@@ -38,6 +45,8 @@ def mean_gap(
         Variable on the x axis: nominal_pressure, normal_force or closure.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -59,12 +68,18 @@ def mean_gap(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | mean gap (µm)
     """
+    result = shown_in(result, units, "mean_gap")
     return _draw("mean_gap", result, "mean_gap", against, theory, ax)
 
 
 @_style.checked
 def stiffness(
-    result: Any, *, against: str = "nominal_pressure", theory: Any = None, ax: Axes | None = None
+    result: Any,
+    *,
+    against: str = "nominal_pressure",
+    theory: Any = None,
+    units: Units | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the normal stiffness per nominal area, one curve per shear displacement.
 
@@ -78,6 +93,8 @@ def stiffness(
         Variable on the x axis: nominal_pressure, normal_force or closure.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -100,6 +117,7 @@ def stiffness(
     >>> print(fc.plotting.stiffness(pressed, theory=theory).get_ylabel())
     normal stiffness (MPa/mm)
     """
+    result = shown_in(result, units, "stiffness")
     data = as_dataset(result, "stiffness")
     name = next((name for name in STIFFNESSES if name in data.variables), None)
     with Problems("fc.plotting.stiffness") as problems:
@@ -109,7 +127,9 @@ def stiffness(
 
 
 @_style.checked
-def pressure_distribution(result: Any, *, theory: Any = None, ax: Axes | None = None) -> Axes:
+def pressure_distribution(
+    result: Any, *, theory: Any = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
     """Draw how the nominal area is distributed over the pressures, one curve per step.
 
     Parameters
@@ -119,6 +139,8 @@ def pressure_distribution(result: Any, *, theory: Any = None, ax: Axes | None = 
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves of Persson (2001), a Gaussian about the
         nominal pressure less that about its negative.
+    units : mapping of str to str, optional
+        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -141,6 +163,7 @@ def pressure_distribution(result: Any, *, theory: Any = None, ax: Axes | None = 
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     pressure (MPa) | nominal area per pressure (1/MPa)
     """
+    result = shown_in(result, units, "pressure_distribution")
     ax = _style.axes_or_new(ax)
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
     data = result_of(result, "pressure_distribution", names, ("step",))
@@ -165,7 +188,7 @@ def pressure_distribution(result: Any, *, theory: Any = None, ax: Axes | None = 
             beside = np.linspace(0.0, float(pressure[-1]), 400)
             density = _persson(beside, float(scale(nominal[i])), float(scale(spread)))
             ax.plot(beside, density, color=colour, **THEORY)
-    ax.set_xlabel(scale.label("pressure"))
+    label_axis(ax.xaxis, "pressure", scale)
     ax.set_ylabel(f"nominal area per pressure (1/{scale.unit})")
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
@@ -202,8 +225,8 @@ def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axe
         beside = "interface_stiffness" if name in STIFFNESSES else name
         entries = draw_theories(ax, theory, where, beside, against, scale, up)
     _style.plain_ticks(ax)
-    ax.set_xlabel(axis_label(data[against], scale))
-    ax.set_ylabel(up.label("normal stiffness" if name in STIFFNESSES else name_of(data[name])))
+    label_axis(ax.xaxis, name_of(data[against]), scale)
+    label_axis(ax.yaxis, "normal stiffness" if name in STIFFNESSES else name_of(data[name]), up)
     shear_legend(ax, data, colours)
     _style.side_legend(ax, entries, title="theory", low=True)
     return ax
