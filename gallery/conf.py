@@ -33,7 +33,7 @@ extensions = [
     "site_parts",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["_build", "GALLERY_HEADER.rst", "README.*"]
+exclude_patterns = ["_build", "GALLERY_HEADER.rst", "*/GALLERY_HEADER.rst", "README.*"]
 
 # sphinx-gallery copies the examples from the source folder of the site to a folder below it
 suppress_warnings = ["sphinx_gallery.duplicate_filename"]
@@ -45,12 +45,15 @@ autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
+SECTIONS = ("paper", "tutorials", "rough_surfaces", "contacts", "crack_joints", "contact_sets")
+
 sphinx_gallery_conf = {
     "examples_dirs": ".",
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"[\\/]plot_",
-    "ignore_pattern": r"(conf|site_parts|shared_study|__init__)\.py$",
+    "ignore_pattern": r"(conf|site_parts|__init__)\.py$",
     "within_subsection_order": "ExampleTitleSortKey",
+    "subsection_order": [f"./{name}" for name in SECTIONS],
     "nested_sections": False,
     "reset_modules": (),
     "abort_on_example_error": True,
@@ -59,13 +62,18 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "remove_config_comments": True,
     "min_reported_time": 1,
-    "copyfile_regex": r".*_study\.py",
 }
 
 PAGES = (
     "index",
     "install",
     "first_scan",
+    "tutorials",
+    "scene_reference",
+    "measured_surfaces",
+    "contributing",
+    "changelog",
+    "citation",
     "howto",
     "faq",
     "validation",

@@ -5,9 +5,10 @@ From a surface to its contact domain
 A rough surface, the pressure where a flat touches it, and the islands of contact.
 """
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 from PIL import Image
-from shared_study import HERE
 
 import fractalcontact as fc
 
@@ -35,6 +36,8 @@ fc.plotting.island_map(islands, title="islands of contact", ax=right)
 # %%
 # The picture of the first page is this figure with fewer colours.
 
-picture = HERE / "images" / "overview.png"
-overview.savefig(picture, dpi=100)
-Image.open(picture).convert("RGB").quantize(256).save(picture, optimize=True)
+folder = Path("images")
+if folder.is_dir():
+    overview.savefig(folder / "overview.png", dpi=100)
+    picture = Image.open(folder / "overview.png").convert("RGB").quantize(256)
+    picture.save(folder / "overview.png", optimize=True)

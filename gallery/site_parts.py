@@ -12,6 +12,7 @@ def setup(app):
     app.add_directive("names", Names)
     app.add_directive("extremes", Extremes)
     app.add_directive("extras", Extras)
+    app.add_directive("scene-tables", SceneTables)
     app.connect("autodoc-process-docstring", prepare_docstring)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -53,6 +54,92 @@ class Extras(Directive):
             if purpose:
                 rows.append((nodes.literal(text=name), ", ".join(packages), purpose[1]))
         return [table((10, 34, 56), ("extra", "installs", "for"), rows)]
+
+
+class SceneTables(Directive):
+    """The tables of a scene, their keys and values, from the JSON Schema of scenes."""
+
+    def run(self):
+        from fractalcontact import scenes
+
+        schema = scenes.json_schema()
+        settings = {
+            key: value for key, value in schema["properties"].items() if "properties" not in _object(value)
+        }
+        tables = {key: value for key, value in schema["properties"].items() if key not in settings}
+        sections = [self.section("Before the tables", "", settings, ())]
+        for name, table_schema in tables.items():
+            for words, form in self.forms(table_schema):
+                title = f"[{name}]{words}"
+                stages = {key: _object(value) for key, value in form["properties"].items()}
+                stages = {key: value for key, value in stages.items() if "properties" in value}
+                own = {key: value for key, value in form["properties"].items() if key not in stages}
+                purpose = table_schema.get("description", "")
+                required = form.get("required", ())
+                sections.append(self.section(title, purpose, own, required))
+                for key, value in stages.items():
+                    text = value.get("description", "")
+                    sections.append(self.section(f"[{name}.{key}]", text, value["properties"], ()))
+        return sections
+
+    @staticmethod
+    def forms(schema):
+        """Yield a title and a schema for every form of a table."""
+        for form in schema.get("oneOf", [schema]):
+            source = next(
+                (key for key in ("read", "sample", "generate") if key in form.get("required", ())), ""
+            )
+            words = form["properties"].get("generate", {}).get("const", "")
+            yield (f", {source} = {words!r}" if words else f", {source}" if source else ""), form
+
+    @staticmethod
+    def section(title, purpose, keys, required):
+        result = nodes.section(ids=[nodes.make_id(title)], names=[nodes.fully_normalize_name(title)])
+        result += nodes.title("", title)
+        if purpose:
+            result += nodes.paragraph("", purpose)
+        rows = [
+            (
+                nodes.literal(text=key),
+                _values(value),
+                value.get("description", "") + " Required." * (key in required),
+            )
+            for key, value in keys.items()
+        ]
+        if rows:
+            result += table((24, 26, 50), ("key", "value", "meaning"), rows)
+        return result
+
+
+def _object(schema):
+    """Return the form of a value that is a table, an empty schema if none is."""
+    forms = [schema, *schema.get("anyOf", ())]
+    return next((form for form in forms if "properties" in form or "oneOf" in form), {})
+
+
+def _values(schema):
+    """Return the values that a key takes, in words."""
+    if "anyOf" in schema:
+        kinds = [_values(form) for form in schema["anyOf"] if "$ref" not in form and "properties" not in form]
+        ranges = ["a range"] if any("$ref" in form for form in schema["anyOf"]) else []
+        return ", or ".join(dict.fromkeys([*kinds, *ranges]))
+    if "enum" in schema:
+        return ", ".join(f'"{word}"' for word in schema["enum"])
+    if "const" in schema:
+        return f'"{schema["const"]}"'
+    if schema.get("type") == "array":
+        inner = _values(schema.get("items", {}))
+        return (
+            "[ny, nx]"
+            if schema.get("maxItems") == 2 and not inner
+            else "a list of these"
+            if inner
+            else "a list"
+        )
+    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+    bounds = " and ".join(f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema)
+    names = {"boolean": "true or false", "string": "text", "number": "number", "integer": "integer"}
+    return f"{names.get(schema.get('type'), 'see the function')} {bounds}".strip()
 
 
 class Extremes(Directive):

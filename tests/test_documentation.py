@@ -63,13 +63,21 @@ def test_docstring_starts_with_one_sentence_and_fits_a_screen(name):
 LONGEST_DOCSTRING: dict[str, int] = {}
 
 
-def test_readme_example_runs():
+def test_readme_example_prints_what_is_shown(capsys):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    assert blocks
-    for block in blocks:
-        exec(compile(block, "README.md", "exec"), {})
-    assert list(Path().glob("*.nc"))
+    ((block, shown),) = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, flags=re.DOTALL)
+    exec(compile(block, "README.md", "exec"), {})
+    assert capsys.readouterr().out == shown
+    assert {path.name for path in Path().iterdir()} == {"closure.nc", "closure.png"}
+    assert len(text.splitlines()) < 150
+
+
+def test_links_of_the_readme_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#]+)\)", text)
+    assert len(links) > 10
+    missing = [link for link in links if not link.startswith("https://") and not (ROOT / link).exists()]
+    assert not missing
 
 
 def test_loop_over_members_of_the_data_model_runs():

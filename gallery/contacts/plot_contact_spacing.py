@@ -12,7 +12,7 @@ import warnings
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
@@ -121,7 +121,7 @@ order = -np.log(error).assign_coords(radius=np.log(RADII)).polyfit("radius", 1).
 order = order.rename({name: name.removesuffix("_polyfit_coefficients") for name in order})
 print(order.to_dataframe().T.round(2).to_string())
 
-figure = Figure(figsize=(8.4, 6.4), layout="constrained")
+figure = plt.figure(figsize=(8.4, 6.4), layout="constrained")
 axes = figure.subplots(3, 3, sharex=True)
 for ax, name in zip(axes.flat, error, strict=True):
     for number, influence in enumerate([*FREE, "spectral"]):

@@ -8,7 +8,7 @@ compares solutions at growing tolerance with a solution at the smallest toleranc
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
@@ -47,7 +47,7 @@ print(errors)
 # itself (dotted), that of the closure at a given force is smaller, and the contact area is exact long
 # before the default tolerance of 1e-8.
 
-figure = Figure(figsize=(8.4, 3.2), layout="constrained")
+figure = plt.figure(figsize=(8.4, 3.2), layout="constrained")
 axes = figure.subplots(1, 3, sharex=True)
 for ax, name in zip(axes, names[1:], strict=True):
     ax.set_prop_cycle(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])  # for any colour vision

@@ -8,7 +8,7 @@ elastic until the previous force is exceeded.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
@@ -32,7 +32,7 @@ print("work of the force / (elastic energy + plastic work):", work[-1] / energy[
 
 last = plastic.isel(step=-1)
 row = int((surface - last["residual_height"]).max("x").argmax("y"))
-figure = Figure(figsize=(8.4, 3.4), layout="constrained")
+figure = plt.figure(figsize=(8.4, 3.4), layout="constrained")
 left, middle, right = figure.subplots(1, 3)
 left.plot(elastic["closure"] * 1e6, path / 1e6, c="0.6", label="elastic")
 left.plot(plastic["closure"] * 1e6, path / 1e6, ".-", c="C0", label="with hardness")

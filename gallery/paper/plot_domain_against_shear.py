@@ -9,13 +9,18 @@ cells, it soon rises, away from that of the null: the contacts that are left sta
 the paper is one of coverage.
 """
 
+import os
+from pathlib import Path
+
 import numpy as np
-from matplotlib.figure import Figure
-from shared_study import study
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
-study = study()
+folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", "concrete_crack_out"))
+if not (folder / "result.nc").exists():
+    fc.scenes.run("concrete_crack", out=folder, progress=False)
+study = fc.open(folder / "result.nc")
 state = study["joints/closure/state"].isel(step=-1)
 windows = {
     "boxes of 1 to 12 cells": fc.domains.box_dimension(state),
@@ -23,7 +28,7 @@ windows = {
 }
 print(windows["boxes of 1 to 250 cells"])
 
-figure = Figure(figsize=(8.5, 3.4), layout="constrained")
+figure = plt.figure(figsize=(8.5, 3.4), layout="constrained")
 panels = figure.subplots(1, 2, sharex=True)
 for ax, (title, result) in zip(panels, windows.items(), strict=True):
     shear = result["shear"] * 1e3

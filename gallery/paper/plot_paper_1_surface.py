@@ -6,11 +6,15 @@ The crack surface has 512 x 512 points, 80 µm apart. A block of 2 x 2 cm from i
 mm towards West. The delta-surface is the height difference of the two faces.
 """
 
-from shared_study import study
+import os
+from pathlib import Path
 
 import fractalcontact as fc
 
-study = study()
+folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", "concrete_crack_out"))
+if not (folder / "result.nc").exists():
+    fc.scenes.run("concrete_crack", out=folder, progress=False)
+study = fc.open(folder / "result.nc")
 print(study["surfaces"].to_dataset())
 
 figure = fc.plotting.paper_figure(study, 1)

@@ -7,12 +7,17 @@ interface becomes softer, and the contact area at equal force decreases. The are
 proportion to the force.
 """
 
+import os
+from pathlib import Path
+
 import numpy as np
-from shared_study import study
 
 import fractalcontact as fc
 
-study = study()
+folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", "concrete_crack_out"))
+if not (folder / "result.nc").exists():
+    fc.scenes.run("concrete_crack", out=folder, progress=False)
+study = fc.open(folder / "result.nc")
 closure = study["joints/closure"].to_dataset()
 print(closure)
 

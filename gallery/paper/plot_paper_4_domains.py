@@ -6,11 +6,15 @@ At a shear displacement of 0.4 mm the contacts begin as scattered points and gro
 letters are those on the closure law of figure 3.
 """
 
-from shared_study import study
+import os
+from pathlib import Path
 
 import fractalcontact as fc
 
-study = study()
+folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", "concrete_crack_out"))
+if not (folder / "result.nc").exists():
+    fc.scenes.run("concrete_crack", out=folder, progress=False)
+study = fc.open(folder / "result.nc")
 print(study["domains/box_dimension"].to_dataset())
 
 figure = fc.plotting.paper_figure(study, 4)

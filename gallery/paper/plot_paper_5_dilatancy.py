@@ -8,11 +8,15 @@ contact domains under 30 kN; at
 8 mm the two faces are no longer correlated.
 """
 
-from shared_study import study
+import os
+from pathlib import Path
 
 import fractalcontact as fc
 
-study = study()
+folder = Path(os.environ.get("FRACTALCONTACT_GALLERY", "concrete_crack_out"))
+if not (folder / "result.nc").exists():
+    fc.scenes.run("concrete_crack", out=folder, progress=False)
+study = fc.open(folder / "result.nc")
 print(study["joints/elastic_dilatancy"].to_dataset())
 
 figure = fc.plotting.paper_figure(study, 5)

@@ -9,7 +9,7 @@ not depend on it.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
@@ -30,7 +30,7 @@ estimates = fc.dimensions.estimate(surface, ["variogram", "cube_counts"])
 variogram, cube_counts = (float(value) for value in estimates.fractal_dimension)
 print(estimates)
 
-figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+figure = plt.figure(figsize=(6.4, 3.6), layout="constrained")
 ax = figure.add_subplot()
 ax.semilogx(scales, slopes, marker="o", label="cube counts, heights multiplied")
 ax.axhline(cube_counts, color="C0", lw=0.9, ls="--", label="cube counts, height range = extent")

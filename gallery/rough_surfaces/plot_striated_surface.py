@@ -8,7 +8,7 @@ This example compares a striated surface with an isotropic one; both are cut fro
 """
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
@@ -39,7 +39,7 @@ for name, result in results.items():
 # %%
 # Heights change least along the striae, while the exponent is the same in all directions.
 
-figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+figure = plt.figure(figsize=(7.2, 3.4), layout="constrained")
 left, right = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
 for name, result in results.items():
     angle = np.radians(np.concatenate([result.azimuth, result.azimuth + 180.0, result.azimuth[:1]]))

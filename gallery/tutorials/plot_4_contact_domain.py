@@ -1,0 +1,47 @@
+"""
+Contact domain, random null and lacunarity
+==========================================
+
+The set of true contacts looks like a fractal dust. How much of its box dimension and lacunarity says
+something about the surface, and how much about the number of cells?
+"""
+
+from matplotlib import pyplot as plt
+
+import fractalcontact as fc
+
+surface = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.8, rms_increment=3e-6, rng=5)
+modulus = 2e10
+pressed = fc.contact.press(surface, contact_modulus=modulus, nominal_pressure=[2e5, 1e6, 5e6, 2e7])
+print(pressed)
+maps = fc.plotting.contact_domains(pressed)
+
+# %%
+# The null is a set of as many cells, placed at random. A dimension that differs from it by more than its
+# scatter is a property of the set.
+
+box = fc.domains.box_dimension(pressed.state)
+print(box[["coverage", "box_dimension", "null_dimension", "differs_from_random"]].to_dataframe().round(3))
+
+# %%
+# Contacts cluster, so their dimension is below that of the null at the same coverage, and boxes hold them
+# more unevenly: the lacunarity is above that of the null at every box size.
+
+lacunarity = fc.domains.lacunarity(pressed.state)
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+left.semilogx(box.coverage, box.box_dimension, "o-", label="contacts")
+left.semilogx(box.coverage, box.null_dimension, "s--", color="0.5", label="random null")
+left.set(xlabel="coverage", ylabel="box dimension", ylim=(0, 2))
+left.legend()
+for step in range(pressed.sizes["step"]):
+    one = lacunarity.isel(step=step)
+    right.loglog(one.box_length * 1e3, one.lacunarity, label=f"{pressed.nominal_pressure[step] / 1e6:g} MPa")
+right.set(xlabel="box edge (mm)", ylabel="lacunarity")
+right.legend()
+
+# %%
+# Islands: how many, and how large. Those of a few cells are not resolved at any load.
+
+islands = fc.domains.islands(pressed.state)
+print(islands.n_islands.values, "islands")
+sizes = fc.plotting.islands(islands)
