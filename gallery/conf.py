@@ -53,7 +53,7 @@ sphinx_gallery_conf = {
     "filename_pattern": r"[\\/]plot_",
     "ignore_pattern": r"(conf|site_parts|__init__)\.py$",
     "within_subsection_order": "ExampleTitleSortKey",
-    "subsection_order": [f"./{name}" for name in SECTIONS],
+    "subsection_order": [*(f"./{name}" for name in SECTIONS), "*"],
     "nested_sections": False,
     "reset_modules": (),
     "abort_on_example_error": True,
