@@ -20,6 +20,23 @@ from fractalcontact.scenes._paper import paper_parts
 Array = np.ndarray[Any, np.dtype[Any]]
 
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
+# symbol of ISO 25178 and variable of `surfaces.describe`
+ISO_25178 = {
+    "Sq": "rms_height",
+    "Sa": "mean_absolute_height",
+    "Sp": "peak_height",
+    "Sv": "valley_depth",
+    "Sz": "peak_to_valley",
+    "Ssk": "skewness",
+    "Sku": "kurtosis",
+    "Sdq": "rms_slope",
+    "Sdr": "developed_area_excess",
+    "Sal": "autocorrelation_length",
+    "Str": "texture_aspect_ratio",
+    "Sk": "core_height",
+    "Spk": "reduced_peak_height",
+    "Svk": "reduced_valley_depth",
+}
 FRACTIONS = frozenset({"contact_fraction", "corrected_contact_fraction"})
 
 
@@ -59,6 +76,8 @@ def summary_parts(tree: xr.DataTree) -> list[list[Part]]:
         _ensemble(member_count(tree)),
         _selected(tree),
         _dimensions(tree),
+        _surface_parameters(tree),
+        _joint_roughness(tree),
         _contact(tree),
         _mated_position(tree),
         _closure(tree),
@@ -181,6 +200,43 @@ def _dimensions(tree: xr.DataTree) -> list[Part]:
     if MEMBER in estimates.dims:
         parts.append(Note("The intervals are those of one surface: the means of their ends."))
     return parts
+
+
+def _surface_parameters(tree: xr.DataTree) -> list[Part]:
+    """Return the parameters of ISO 25178 that the description of the surface has."""
+    statistics = group_of(tree, "surfaces")
+    if statistics is None or "rms_height" not in statistics:
+        return []
+    rows: list[tuple[str, ...]] = [("ISO 25178", "parameter", "value")]
+    for symbol, name in ISO_25178.items():
+        if name in statistics:
+            values = statistics[name]
+            text = amount(values) if values.attrs.get("units") == "m" else plain(values, 3)
+            rows.append((symbol, QUANTITIES[name].long_name, text))
+    return [Table(rows)]
+
+
+def _joint_roughness(tree: xr.DataTree) -> list[Part]:
+    """Return the roughness coefficient and the directional roughness of a joint, by direction."""
+    tables: list[Part] = []
+    if (jrc := group_of(tree, "joints/roughness_coefficient")) is not None:
+        rows: list[tuple[str, ...]] = [
+            ("joint roughness coefficient (JRC)", "mean", "scatter of the profiles")
+        ]
+        for direction in np.atleast_1d(jrc["direction"].values):
+            one = jrc.sel(direction=direction) if "direction" in jrc.dims else jrc
+            low, high = (plain(one[f"roughness_coefficient_{end}"], 1) for end in ("low", "high"))
+            rows.append((str(direction), plain(one["roughness_coefficient"], 1), f"{low} ... {high}"))
+        tables.append(Table(rows))
+    if (polar := group_of(tree, "joints/directional_roughness")) is not None:
+        metric = polar["roughness_metric"].mean(MEMBER) if MEMBER in polar.dims else polar["roughness_metric"]
+        if metric.notnull().any():
+            rows = [("directional roughness (Grasselli)", "azimuth", "theta_max / (C + 1)")]
+            for word, place in (("largest", np.nanargmax), ("smallest", np.nanargmin)):
+                at = metric.isel(azimuth=int(place(metric.values)))
+                rows.append((word, f"{float(at['azimuth']):g}°", f"{float(at):.2f}°"))
+            tables.append(Table(rows))
+    return tables
 
 
 def _contact(tree: xr.DataTree) -> list[Part]:

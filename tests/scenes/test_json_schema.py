@@ -68,7 +68,7 @@ def scene(name):
 
 
 def test_the_shipped_schema_is_that_of_this_version():
-    """To write it: json.dump(fc.scenes.json_schema(), file, indent=1) and a newline."""
+    """To write it anew: `Path(name).write_text(json.dumps(fc.scenes.json_schema(), indent=1) + chr(10))`."""
     jsonschema.Draft7Validator.check_schema(SCHEMA)
     shipped = (DATASETS / "fractalcontact.schema.json").read_text(encoding="utf-8")
     assert shipped == json.dumps(SCHEMA, indent=1) + "\n"

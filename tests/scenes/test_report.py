@@ -202,3 +202,26 @@ def test_no_negative_zero_and_no_contradiction_beside_the_dimension():
     number = int(boxes.differs_from_random.sum())
     assert f"{number} of 2 sets differ" in words
     assert "yes" not in words
+
+
+def test_summary_has_roughness_and_parameters_of_iso_25178():
+    """The numbers are those of the functions, for the same surface."""
+    surface = fc.surfaces.fbm((64, 64), 2e-4, hurst=0.7, rms_increment=3e-5, rng=3)
+    jrc, rose = fc.joints.roughness_coefficient(surface), fc.joints.directional_roughness(surface)
+    statistics = fc.surfaces.describe(surface)
+    tree = xr.DataTree.from_dict(
+        {
+            "/surfaces": statistics,
+            "/joints/roughness_coefficient": jrc,
+            "/joints/directional_roughness": rose,
+        }
+    )
+    text = fc.scenes.summary(tree)
+    rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
+    assert rows["Sq"].endswith(f"{float(statistics.rms_height) * 1e6:.3g} µm")
+    assert rows["Sdq"].endswith(f"{float(statistics.rms_slope):.3f}")
+    assert rows["E"].split()[1] == f"{float(jrc.roughness_coefficient[0]):.1f}"
+    metric = rose.roughness_metric
+    assert rows["largest"].split()[1:] == [
+        f"{float(metric.azimuth[int(metric.argmax('azimuth'))]):g}°", f"{float(metric.max()):.2f}°"
+    ]  # fmt: skip
