@@ -33,7 +33,7 @@ extensions = [
     "site_parts",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["_build", "GALLERY_HEADER.rst", "*/GALLERY_HEADER.rst", "README.*"]
+exclude_patterns = ["_build", "examples", "README.*"]
 
 # sphinx-gallery copies the examples from the source folder of the site to a folder below it
 suppress_warnings = ["sphinx_gallery.duplicate_filename"]
@@ -48,12 +48,12 @@ numpydoc_xref_param_type = False
 SECTIONS = ("paper", "tutorials", "rough_surfaces", "contacts", "crack_joints", "contact_sets")
 
 sphinx_gallery_conf = {
-    "examples_dirs": ".",
+    "examples_dirs": "examples",
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"[\\/]plot_",
     "ignore_pattern": r"(conf|site_parts|__init__)\.py$",
     "within_subsection_order": "ExampleTitleSortKey",
-    "subsection_order": [*(f"./{name}" for name in SECTIONS), "*"],
+    "subsection_order": [*(f"examples/{name}" for name in SECTIONS), "*"],
     "nested_sections": False,
     "reset_modules": (),
     "abort_on_example_error": True,

@@ -9,11 +9,7 @@ from pathlib import Path
 import pytest
 
 GALLERY = Path(__file__).parents[2] / "gallery"
-SCRIPTS = sorted(
-    path.relative_to(GALLERY).as_posix()
-    for path in GALLERY.glob("**/plot_*.py")
-    if "auto_examples" not in path.parts
-)
+SCRIPTS = sorted(path.relative_to(GALLERY).as_posix() for path in (GALLERY / "examples").glob("**/plot_*.py"))
 NO_NETWORK = (
     "import runpy, socket, sys\n"
     "def refuse(*a, **k): raise OSError('no network here')\n"

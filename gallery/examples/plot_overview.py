@@ -36,7 +36,7 @@ fc.plotting.island_map(islands, title="islands of contact", ax=right)
 # %%
 # The picture of the first page is this figure with fewer colours.
 
-folder = Path("images")
+folder = Path("../images")
 if folder.is_dir():
     overview.savefig(folder / "overview.png", dpi=100)
     picture = Image.open(folder / "overview.png").convert("RGB").quantize(256)
