@@ -34,6 +34,7 @@ print(pressed)
 # (Yastrebov, Anciaux and Molinari 2017) takes half of them off.
 
 area = fc.plotting.contact_area(pressed, against="nominal_pressure", theory=theories)
+area.set(xscale="log", yscale="log")
 
 # %%
 # Contact fraction over pressure / (modulus x rms slope). Persson's theory starts at :math:`\sqrt{8/\pi} =

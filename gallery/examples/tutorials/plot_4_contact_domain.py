@@ -10,9 +10,9 @@ from matplotlib import pyplot as plt
 
 import fractalcontact as fc
 
-surface = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.8, rms_increment=3e-6, rng=5)
+surface = fc.surfaces.spectral((256, 256), 1e-4, hurst=0.8, rms_slope=0.1, rolloff=6.4e-3, rng=5)
 modulus = 2e10
-pressed = fc.contact.press(surface, contact_modulus=modulus, nominal_pressure=[2e5, 1e6, 5e6, 2e7])
+pressed = fc.contact.press(surface, contact_modulus=modulus, nominal_pressure=[5e6, 2e7, 8e7, 3e8])
 print(pressed)
 maps = fc.plotting.contact_domains(pressed)
 
@@ -21,11 +21,14 @@ maps = fc.plotting.contact_domains(pressed)
 # scatter is a property of the set.
 
 box = fc.domains.box_dimension(pressed.state)
-print(box[["coverage", "box_dimension", "null_dimension", "differs_from_random"]].to_dataframe().round(3))
+names = ["coverage", "box_dimension", "null_dimension", "differs_from_random"]
+print(box[names].to_dataframe()[names].round(3).to_string())
 
 # %%
-# Contacts cluster, so their dimension is below that of the null at the same coverage, and boxes hold them
-# more unevenly: the lacunarity is above that of the null at every box size.
+# Contacts cluster. At small coverage random cells lie alone, and their dimension over the boxes in use is near
+# 0, below that of the contacts; at larger coverage random cells reach every box, and theirs is the larger one.
+# So a dimension says nothing without its coverage and its boxes. The lacunarity tells more directly: beyond
+# one cell it is above that of the null (dashed) at every box size.
 
 lacunarity = fc.domains.lacunarity(pressed.state)
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
@@ -35,7 +38,9 @@ left.set(xlabel="coverage", ylabel="box dimension", ylim=(0, 2))
 left.legend()
 for step in range(pressed.sizes["step"]):
     one = lacunarity.isel(step=step)
-    right.loglog(one.box_length * 1e3, one.lacunarity, label=f"{pressed.nominal_pressure[step] / 1e6:g} MPa")
+    label = f"{pressed.nominal_pressure[step] / 1e6:g} MPa"
+    (line,) = right.loglog(one.box_length * 1e3, one.lacunarity, label=label)
+    right.loglog(one.box_length * 1e3, one.null_lacunarity, "--", color=line.get_color())
 right.set(xlabel="box edge (mm)", ylabel="lacunarity")
 right.legend()
 
