@@ -93,7 +93,7 @@ def plane_coords(
     """Return coordinates with their period for a plane or profile that starts at the origin."""
     coords = {}
     for dim, n, step, wraps in zip(dims, shape, spacing, periodic, strict=True):
-        attributes = {"period": float(n * step)} if wraps else {}
+        attributes = {"units": "m"} | ({"period": float(n * step)} if wraps else {})
         coords[dim] = xr.DataArray(centres(int(n), float(step)), dims=dim, attrs=attributes)
     return coords
 

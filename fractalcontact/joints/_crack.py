@@ -355,6 +355,6 @@ def block_coords(crack: Crack) -> dict[str, xr.DataArray]:
     coords = {}
     for axis, dim in enumerate(("y", "x")):
         values = np.asarray(crack.lower[dim].values, dtype=np.float64)[layout.slices[axis]]
-        attributes = {"period": float(layout.edges[axis])} if layout.periodic[axis] else {}
+        attributes = {"units": "m"} | ({"period": float(layout.edges[axis])} if layout.periodic[axis] else {})
         coords[dim] = xr.DataArray(values, dims=dim, attrs=attributes)
     return coords

@@ -25,10 +25,10 @@ names = ["coverage", "box_dimension", "null_dimension", "differs_from_random"]
 print(box[names].to_dataframe()[names].round(3).to_string())
 
 # %%
-# Contacts cluster. At small coverage random cells lie alone, and their dimension over the boxes in use is near
-# 0, below that of the contacts; at larger coverage random cells reach every box, and theirs is the larger one.
-# So a dimension says nothing without its coverage and its boxes. The lacunarity tells more directly: beyond
-# one cell it is above that of the null (dashed) at every box size.
+# Contacts cluster. At small coverage random cells lie alone, and their dimension over the boxes in use is
+# near 0, below that of the contacts; at larger coverage random cells reach every box, and theirs is the
+# larger one. So a dimension says nothing without its coverage and its boxes. The lacunarity tells more
+# directly: beyond one cell it is above that of the null (dashed) at every box size.
 
 lacunarity = fc.domains.lacunarity(pressed.state)
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
