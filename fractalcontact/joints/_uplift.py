@@ -168,7 +168,7 @@ def uplift(
     upstream, downstream : {"W", "E", "S", "N"} or ("x" or "y", float)
         The two sides: an edge (E is +x), or the line of cells at this x or y (m), beyond which the pressure
         is the same. Default: W, and the edge opposite; of a line E or N.
-    drains : sequence of (x, y), optional
+    drains, drain_pressure, drain_diameter : sequence of (x, y), float, float, optional
         Drains, m. The open cells within `drain_diameter` (m), or the nearest cell, are held at
         `drain_pressure` (Pa, default `downstream_pressure`). One cell is a drain with a radius of 0.2
         spacings (Peaceman 1978). A drain in contact has no effect.
