@@ -154,12 +154,25 @@ CALLS = {
     "surfaces.read": lambda: {"path": file("surface")},
     "surfaces.sample": lambda: {"name": "concrete_crack"},
     "surfaces.level": lambda: {"surface": rough()},
+    "surfaces.gaussian_filter": lambda: {"surface": rough(), "cutoff": 4.0 * SPACING},
+    "surfaces.texture": lambda: {"surface": rough()},
     "surfaces.fill": lambda: {"surface": rough().where(rough().x > 2e-4)},
     "surfaces.despike": lambda: {"surface": rough()},
     "surfaces.describe": lambda: {"surface": rough()},
     **{
         f"dimensions.{name}": lambda: {"surface": rough()}
-        for name in ("covering", "cube_counts", "directions", "madogram", "roughness_length", "variation")
+        for name in (
+            "covering",
+            "cube_counts",
+            "detrended_fluctuation",
+            "directions",
+            "divider",
+            "height_lacunarity",
+            "higuchi",
+            "madogram",
+            "roughness_length",
+            "variation",
+        )
     },
     "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "likelihood"]},
     "dimensions.second_variogram": lambda: {"surface": rough()},

@@ -53,6 +53,11 @@ def test_variogram():
     assert float(result.variogram[0]) == pytest.approx(0.5 * along.mean(), rel=1e-12)
 
 
+def test_dividers_on_a_slope():
+    result = fc.dimensions.divider(fc.surfaces.from_array(0.75 * np.arange(17.0), 1.0))
+    np.testing.assert_allclose(result.divider_length, 20.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize("method", ["increments", "likelihood"])
 def test_exponent_is_that_of_the_surface(method):
     surface = fc.surfaces.fbm((24, 24), SPACING, hurst=0.7, rms_increment=1e-6, rng=3)

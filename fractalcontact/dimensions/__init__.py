@@ -11,7 +11,11 @@ variogram         half the mean square increment against the lag
 madogram          half the mean absolute increment against the lag
 second_variogram  mean square second difference against the lag
 roughness_length  rms height in windows against their edge
-variation         range of the heights over segments against their length
+variation         range of the heights over segments or squares against their length
+higuchi           length of profiles by increments against the lag
+detrended_fluctuation  rms height of profiles about lines in windows (DFA)
+divider           length of profiles walked with dividers against their opening
+height_lacunarity  lacunarity of the heights (grey values) by gliding windows
 cube_counts       number of cubes that meet the surface against their edge
 covering          area of the triangulated surface against the edge of the triangles
 

@@ -5,31 +5,33 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions import (
     _covering_area,
     _cube_counts,
+    _detrended_fluctuation,
+    _divider,
+    _higuchi,
     _roughness_length,
     _spectrum,
     _variation,
     _variogram,
 )
 from fractalcontact.dimensions._curve import Curve
+from fractalcontact.dimensions._curve_method import CurveMethod
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._methods import DEFAULT, METHODS
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
-from fractalcontact.dimensions._records import CONSTANT, Estimate, plane, undefined
+from fractalcontact.dimensions._records import Estimate
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -206,99 +208,6 @@ def _with_reasons(result: xr.Dataset, names: Sequence[str], estimates: Sequence[
     return result
 
 
-@dataclass(frozen=True)
-class CurveMethod:
-    """A straight line through a curve in log-log scale.
-
-    Attributes
-    ----------
-    measure : callable
-        From a surface (and the longest lag, with `has_lags`) to its curve.
-    to_hurst : callable
-        From slope and number of axes to H.
-    power : float or None
-        Weights of the points, scale^power; None: their counts.
-    window : callable
-        From a surface to the shortest scale, the longest scale and the rule in words.
-    as_wavelength : bool
-        The scales of the curve are wavenumbers.
-    equal_octaves : bool
-        Give every octave of a free surface the same weight: a measured surface leaves its power law at the
-        short end first, where most of the modes are. Counts are right for a periodic one.
-    ignores_plane : bool
-        The curve does not change when a plane is added.
-    corrects_windows : bool
-        Compare the line with the expectation for windows of few points.
-    has_lags : bool
-        The curve can be measured up to a longest lag.
-    unit_note : str
-        Note of a method that depends on the unit of height.
-    """
-
-    measure: Callable[..., Curve]
-    to_hurst: Callable[[float, int], float]
-    power: float | None
-    window: Callable[[Surface], tuple[float, float, str]]
-    as_wavelength: bool = False
-    equal_octaves: bool = False
-    ignores_plane: bool = False
-    corrects_windows: bool = False
-    has_lags: bool = False
-    unit_note: str = ""
-
-    def __call__(self, surface: Surface, scales: Scales, noise: bool) -> Estimate:
-        """Measure the curve, choose the window, fit."""
-        if self.ignores_plane and surface.is_plane:
-            return undefined(CONSTANT) if surface.is_constant else plane()
-        if surface.is_constant and not self.unit_note:
-            return undefined(CONSTANT)
-        low, high, rule = self.window(surface) if scales is None else (*scales, "asked for")
-        if surface.finest_scale and scales is None:
-            low, high = max(low, surface.finest_scale), max(high, 4.0 * surface.finest_scale)
-            rule = f"{rule}; not below the shortest wavelength that the points resolve"
-        longest = (high,) if self.has_lags and (scales is not None or surface.finest_scale) else ()
-        # slopes do not depend on the unit of height, except for methods with a natural scale
-        overflows = not self.unit_note and surface.squares_overflow
-        curve = self.measure(surface.in_own_unit() if overflows else surface, *longest)
-        lengths = 2.0 * np.pi / curve.scale if self.as_wavelength else curve.scale
-        inside = (lengths >= low * (1 - 1e-9)) & (lengths <= high * (1 + 1e-9)) & (curve.value > 0)
-        if np.count_nonzero(inside) < 2:
-            return undefined(f"fewer than two points of the curve between {low:g} m and {high:g} m")
-        x, y = curve.scale[inside], curve.value[inside]
-        power = -1.0 if self.equal_octaves and not all(surface.grid.periodic) else self.power
-        weights = curve.count[inside].astype(float) if power is None else (x / x[0]) ** power
-        slope = fit_line(x, y / y[0], weights).slope  # a constant curve has slope 0 to the last bit
-        hurst = self.to_hurst(slope, surface.axes)
-        if self.corrects_windows and curve.edges is not None:
-            edges = curve.edges[inside]
-            hurst = _small_window_hurst(x, y / y[0], weights, edges, surface.plane_spacing, hurst)
-        return Estimate(
-            hurst,
-            scale_min=float(lengths[inside].min()),
-            scale_max=float(lengths[inside].max()),
-            window=rule,
-            reason="the points of the curve are correlated, so the scatter about a straight line gives no "
-            "interval",
-            note="noise is not in the model of this method" if noise else self.unit_note,
-        )
-
-
-def _small_window_hurst(
-    x: Array, y: Array, weights: Array, edges: Array, spacing: tuple[float, float], uncorrected: float
-) -> float:
-    """Return the exponent whose expected roughness grows as measured; the uncorrected one if none does."""
-    from scipy.optimize import brentq
-
-    def excess_slope(hurst: float) -> float:
-        expected = _roughness_length.expected_roughness(edges, spacing, hurst)
-        return fit_line(x, y / expected, weights).slope
-
-    low, high = 1e-3, 0.999
-    if not excess_slope(low) > 0.0 > excess_slope(high):
-        return uncorrected
-    return float(brentq(excess_slope, low, high, xtol=1e-6))
-
-
 def _wavelength_window(surface: Surface) -> tuple[float, float, str]:
     """Return the wavelengths of a spectrum to fit."""
     spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
@@ -335,6 +244,27 @@ def _roughness_window(surface: Surface) -> tuple[float, float, str]:
     return 4.0 * spacing, extent / 2.0, "a small surface: 4 spacings to half the extent"
 
 
+def _higuchi_window(surface: Surface) -> tuple[float, float, str]:
+    """Return the lags of Higuchi's lengths to fit."""
+    spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
+    longest = max(extent / 16.0, 4.0 * spacing)
+    return spacing, longest, "one spacing to a 16th of the profile: longer lags have few independent pairs"
+
+
+def _fluctuation_window(surface: Surface) -> tuple[float, float, str]:
+    """Return the windows of the fluctuation to fit."""
+    spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
+    if extent / 8.0 >= 16.0 * spacing:
+        return 8.0 * spacing, extent / 8.0, "8 spacings to an 8th of the profile"
+    return 4.0 * spacing, extent / 4.0, "a short profile: 4 spacings to a quarter of it"
+
+
+def _divider_window(surface: Surface) -> tuple[float, float, str]:
+    """Return the openings of dividers to fit."""
+    spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
+    return spacing, max(extent / 8.0, 2.0 * spacing), "one spacing to an 8th of the profile"
+
+
 def _cube_window(surface: Surface) -> tuple[float, float, str]:
     """Return the edges of cubes and triangles to fit."""
     spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
@@ -352,6 +282,56 @@ def _segment_window(surface: Surface) -> tuple[float, float, str]:
     return _cube_window(surface)
 
 
+def _expected_roughness(surface: Surface, curve: Curve, hurst: float) -> Array:
+    assert curve.edges is not None
+    return _roughness_length.expected_roughness(curve.edges, surface.plane_spacing, hurst)
+
+
+def _roughness_covariance(surface: Surface, curve: Curve, hurst: float) -> Array | str:
+    assert curve.edges is not None
+    if any(surface.grid.periodic):
+        return _PERIODIC
+    if min(surface.grid.extent) < _LEAST_WINDOWS * max(surface.grid.spacing):
+        return "the windows of so small a surface are too few"
+    return _roughness_length.roughness_covariance(curve.edges, surface.shape, hurst)
+
+
+def _fluctuation_covariance(surface: Surface, curve: Curve, hurst: float) -> Array | str:
+    assert curve.edges is not None
+    if surface.axes == 2 or any(surface.grid.periodic):
+        return _ROWS if surface.axes == 2 else _PERIODIC
+    return _detrended_fluctuation.fluctuation_covariance(curve.edges, surface.shape[1], hurst)
+
+
+def _higuchi_covariance(surface: Surface, curve: Curve, hurst: float) -> Array | str:
+    if surface.axes == 2 or any(surface.grid.periodic):
+        return _ROWS if surface.axes == 2 else _PERIODIC
+    lags = np.rint(curve.scale / surface.spacing[1]).astype(np.int64)
+    return _higuchi.mean_increment_covariance(lags, surface.shape[1], hurst)
+
+
+def _expected_spectrum(surface: Surface, _: Curve, hurst: float) -> Array | None:
+    """Return the expected spectrum of a free surface; None of a profile or a periodic surface."""
+    if surface.axes == 1 or any(surface.grid.periodic):
+        return None
+    return _spectrum.expected_spectrum(surface.shape, surface.spacing, hurst)
+
+
+def _spectrum_covariance(surface: Surface, curve: Curve, _: float) -> Array | str:
+    if surface.axes == 1:
+        return "a ring of a profile is one mode, whose logarithm is no normal variable"
+    sides = surface.grid.extent
+    if abs(sides[0] - sides[1]) > _SQUARE * max(sides):
+        return "the covariance of the rings is known for squares only"
+    if any(surface.grid.periodic) and not all(surface.grid.periodic):
+        return _PERIODIC
+    return _spectrum.ring_covariance(curve.count, is_tapered=not all(surface.grid.periodic))
+
+
+_LEAST_WINDOWS = 128  # points along an axis from which on windows are at most an eighth of the surface
+_SQUARE = 0.02  # relative difference of the sides of a square
+_PERIODIC = "a periodic surface is not fractional Brownian, for which the covariance of the curve is known"
+_ROWS = "the covariance of the curve is known for a single profile, not for the rows of a surface"
 _UNIT = "depends on the unit of height: see the curve's vertical_scale"
 _ESTIMATORS: dict[str, Callable[[Surface, Scales, bool], Estimate]] = {
     "likelihood": likelihood,
@@ -364,6 +344,8 @@ _ESTIMATORS: dict[str, Callable[[Surface, Scales, bool], Estimate]] = {
         as_wavelength=True,
         equal_octaves=True,
         ignores_plane=True,
+        expected=_expected_spectrum,
+        covariance=_spectrum_covariance,
     ),
     "variogram": CurveMethod(
         _variogram.variogram_curve, lambda slope, _: 0.5 * slope, -2.0, _lag_window, has_lags=True
@@ -385,9 +367,29 @@ _ESTIMATORS: dict[str, Callable[[Surface, Scales, bool], Estimate]] = {
         0.0,
         _roughness_window,
         ignores_plane=True,
-        corrects_windows=True,
+        expected=_expected_roughness,
+        covariance=_roughness_covariance,
     ),
     "variation": CurveMethod(_variation.variation_curve, lambda slope, _: slope, 0.0, _segment_window),
+    "higuchi": CurveMethod(
+        _higuchi.higuchi_curve,
+        lambda slope, _: 2.0 + slope,
+        0.0,
+        _higuchi_window,
+        covariance=_higuchi_covariance,
+    ),
+    "detrended_fluctuation": CurveMethod(
+        _detrended_fluctuation.detrended_fluctuation_curve,
+        lambda slope, _: slope,
+        0.0,
+        _fluctuation_window,
+        ignores_plane=True,
+        expected=_expected_roughness,
+        covariance=_fluctuation_covariance,
+    ),
+    "divider": CurveMethod(
+        _divider.divider_curve, lambda slope, _: 1.0 + slope, 0.0, _divider_window, unit_note=_UNIT
+    ),
     "cube_counts": CurveMethod(
         _cube_counts.cube_count_curve,
         lambda slope, axes: 1.0 + axes + slope,

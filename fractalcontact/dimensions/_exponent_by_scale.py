@@ -425,25 +425,24 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
         # the deviance of the blur does not count the amplitude as a parameter
         gain = np.inf if two is None else two.penalised - 2.0 - fit.penalised
         if two is not None and gain < -_DECISIVE and two.rough.hurst > _LEAST_EXPONENT:
-            return _two_estimate(two, run if run.first == 0 else None, blocks, surface)
+            return _two_estimate(two, record[0], blocks, surface)
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
     gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
     return run_estimate(run, surface) if gain < (_SHORTENED if is_shortened else -_DECISIVE) else None
 
 
-def _two_estimate(two: TwoExponents, run: Run | None, blocks: Blocks, surface: Surface) -> Estimate:
+def _two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: Surface) -> Estimate:
     """Return the estimate of the rougher of two surfaces, which holds the shorter waves.
 
-    The interval also holds that of the run of the shortest octaves, for the exponent may change suddenly.
+    The interval also holds that of the shortest octave alone, for the exponent may change suddenly.
     """
     dx, rough, smooth = surface.spacing[1], two.rough, two.smooth
-    sudden = (np.nan, np.nan) if run is None else (run.fit.low, run.fit.high)
     return Estimate(
         rough.hurst,
         0.5 * (rough.high - rough.low) / NORMAL,
-        float(np.fmin(rough.low, sudden[0])),
-        float(np.fmax(rough.high, sudden[1])),
+        min(rough.low, shortest.fit.low),
+        max(rough.high, shortest.fit.high),
         scale_min=float(blocks.wavelength.min()) * dx,
         scale_max=two.crossover * dx,
         window=_TWO_WINDOW,

@@ -210,3 +210,42 @@ def roughness_sums(
             if square == square:
                 sums[r] += (max(square, 0.0) / number) ** 0.5
                 counts[r] += 1
+
+
+@kernel
+def walk(heights: Array, spacing: float, opening: float) -> tuple[float, float]:
+    """Walk along every line (lines, n) with dividers; return the length, the rest included, and the steps.
+
+    The next step ends where the straight lines between the points first leave the circle of radius `opening`
+    about the last one. Lengths are in openings, and steps on one line are taken at once: no square overflows.
+    """
+    total, count = 0.0, 0.0
+    n = heights.shape[1]
+    for line in range(heights.shape[0]):
+        z = heights[line]
+        at_x, at_z = 0.0, z[0] / opening
+        k = 1
+        while k < n:
+            end_x, end_z = k * spacing / opening, z[k] / opening
+            if np.hypot(end_x - at_x, end_z - at_z) < 1.0:
+                k += 1
+                continue
+            # from the point before, or from the last step if that is on the same line
+            from_x, from_z = (k - 1) * spacing / opening, z[k - 1] / opening
+            if at_x > from_x:
+                from_x, from_z = at_x, at_z
+            length = np.hypot(end_x - from_x, end_z - from_z)
+            along_x, along_z = (end_x - from_x) / length, (end_z - from_z) / length
+            back_x, back_z = from_x - at_x, from_z - at_z
+            along = back_x * along_x + back_z * along_z
+            outside = back_x * back_x + back_z * back_z - 1.0
+            far = np.sqrt(max(along * along - outside, 0.0)) - along
+            more = np.floor(max(length - far, 0.0))
+            at_x, at_z = from_x + (far + more) * along_x, from_z + (far + more) * along_z
+            total += 1.0 + more
+            count += 1.0 + more
+            if more > 1e15:  # beyond the digits of a number the end of the line is reached
+                at_x, at_z = end_x, end_z
+                k += 1
+        total += np.hypot((n - 1) * spacing / opening - at_x, z[n - 1] / opening - at_z)
+    return total * opening, count

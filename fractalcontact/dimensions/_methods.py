@@ -35,8 +35,8 @@ METHODS = {
         _INCREMENTS,
     ),
     "spectrum": Method(
-        "slope of the radially averaged power spectral density; periodic surfaces; "
-        "underestimates H of free surfaces where it is below 0.6; no interval",
+        "slope of the radially averaged power spectral density, that of a free surface over the one expected "
+        "under its window; squares; interval",
         "Jacobs, Junge and Pastewka, Surface Topography: Metrology and Properties 5 (2017) 013001",
         gaps=False,
     ),
@@ -56,7 +56,7 @@ METHODS = {
     ),
     "roughness_length": Method(
         "growth of the rms height in windows about their planes, corrected for small windows; fractional "
-        "Brownian surfaces; no interval",
+        "Brownian surfaces; interval",
         "Malinverno, Geophysical Research Letters 17 (1990) 1953-1956",
         smallest=5,
     ),
@@ -65,6 +65,20 @@ METHODS = {
         "to 0.25 where it is below 0.8; no interval",
         "Dubuc, Quiniou, Roques-Carmes, Tricot and Zucker, Physical Review A 39 (1989) 1500-1512; Hall and "
         "Wood, Biometrika 80 (1993) 246-252",
+    ),
+    "higuchi": Method(
+        "growth of the mean absolute increment of profiles by Higuchi's lengths; interval for profiles",
+        "Higuchi, Physica D 31 (1988) 277-283",
+    ),
+    "detrended_fluctuation": Method(
+        "growth of the rms height of profiles about lines in windows (detrended fluctuation analysis), "
+        "corrected for small windows; interval for profiles",
+        "Peng, Buldyrev, Havlin, Simons, Stanley and Goldberger, Physical Review E 49 (1994) 1685-1689",
+    ),
+    "divider": Method(
+        "slope of the length of profiles walked with dividers in natural scale (compass); gives a dimension "
+        "of 1 for flat profiles and 1 / H for steep ones; no interval",
+        "Mandelbrot, Science 156 (1967) 636-638; Brown, Geophysical Research Letters 14 (1987) 1095-1098",
     ),
     "cube_counts": Method(
         "slope of the number of cubes that meet the surface, heights scaled to the extent; "

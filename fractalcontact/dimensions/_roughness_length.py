@@ -130,3 +130,87 @@ def _autocorrelations(n: int) -> tuple[Array, Array]:
     flat[1:] *= 2.0  # lags of both signs
     tilted[1:] *= 2.0
     return flat, tilted
+
+
+# Variance of the logarithm of the mean roughness in windows of some points, times the number of windows side
+# by side that the surface holds; rows: H .1 .3 .5 .7 .9. Its correlation between windows of two lengths falls
+# with their ratio; columns: powers of sqrt 2. Measured on 160 surfaces of 256 x 256 points, and on 1500
+# profiles of 2048.
+_HURST = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+_POINTS = np.array([4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0])
+_VARIANCES = {
+    2: np.array(
+        [
+            [0.041, 0.017, 0.010, 0.0050, 0.0030, 0.0030, 0.0020],
+            [0.039, 0.022, 0.015, 0.012, 0.011, 0.012, 0.012],
+            [0.042, 0.032, 0.026, 0.024, 0.024, 0.024, 0.026],
+            [0.049, 0.046, 0.038, 0.038, 0.037, 0.038, 0.041],
+            [0.055, 0.054, 0.053, 0.058, 0.062, 0.069, 0.072],
+        ]
+    ),
+    1: np.array(
+        [
+            [0.237, 0.121, 0.084, 0.052, 0.038, 0.026, 0.021],
+            [0.228, 0.122, 0.090, 0.064, 0.052, 0.044, 0.041],
+            [0.221, 0.127, 0.102, 0.082, 0.072, 0.069, 0.071],
+            [0.214, 0.135, 0.117, 0.101, 0.095, 0.095, 0.101],
+            [0.200, 0.154, 0.139, 0.128, 0.120, 0.117, 0.119],
+        ]
+    ),
+}
+_CORRELATIONS = {
+    2: np.array(
+        [
+            [1.0, 0.883, 0.753, 0.587, 0.465, 0.386],
+            [1.0, 0.842, 0.669, 0.467, 0.322, 0.233],
+            [1.0, 0.849, 0.675, 0.466, 0.315, 0.203],
+            [1.0, 0.868, 0.710, 0.510, 0.365, 0.227],
+            [1.0, 0.905, 0.790, 0.625, 0.501, 0.369],
+        ]
+    ),
+    1: np.array(
+        [
+            [1.0, 0.901, 0.835, 0.727, 0.632, 0.537],
+            [1.0, 0.838, 0.725, 0.557, 0.419, 0.300],
+            [1.0, 0.821, 0.689, 0.504, 0.356, 0.235],
+            [1.0, 0.825, 0.684, 0.495, 0.342, 0.218],
+            [1.0, 0.840, 0.690, 0.496, 0.337, 0.208],
+        ]
+    ),
+}
+
+
+def roughness_covariance(edges: Array, shape: tuple[int, int], hurst: float) -> Array:
+    """Return the covariance of the logarithms of the mean roughness in windows of some edges.
+
+    Parameters
+    ----------
+    edges : ndarray of int, shape (k, 2)
+        In points along y and x; one row of points for a profile.
+    shape : (ny, nx)
+    hurst : float
+    """
+    axes = 2 if shape[0] > 1 else 1
+    return windowed_covariance(
+        edges[:, 2 - axes :], shape[2 - axes :], hurst, _VARIANCES[axes], _CORRELATIONS[axes]
+    )
+
+
+def windowed_covariance(
+    edges: Array, shape: tuple[int, ...], hurst: float, variances: Array, correlations: Array
+) -> Array:
+    """Interpolate a covariance in tables over H and points, and over H and powers of sqrt 2."""
+    row = float(np.interp(hurst, _HURST, np.arange(_HURST.size)))
+    low = min(int(row), _HURST.size - 2)
+    variance, correlation = (
+        table[low] + (row - low) * (table[low + 1] - table[low]) for table in (variances, correlations)
+    )
+    length = np.exp(np.log(edges).mean(axis=1))
+    number = np.prod(np.asarray(shape) / edges, axis=1)
+    deviation = np.sqrt(np.interp(np.log(length), np.log(_POINTS), variance) / number)
+    steps = 2.0 * np.abs(np.log2(length[:, None] / length))
+    last = correlation.size - 1
+    # beyond the table it goes on falling by the same factor
+    fall = np.clip(correlation[last] / correlation[last - 2], 0.0, 1.0) ** 0.5
+    shared = np.interp(steps, np.arange(last + 1), correlation) * fall ** np.maximum(steps - last, 0.0)
+    return np.asarray(shared * np.outer(deviation, deviation))

@@ -167,3 +167,85 @@ def _local_slope(scale: Array, value: Array, count: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (w * wxy - wx * wy) / (w * wxx - wx * wx)
     return np.where(good & np.isfinite(slope), slope, np.nan)
+
+
+_EXACT_RINGS = 128  # rings whose covariance is summed mode by mode
+_LARGEST = 512  # points along an axis up to which the expectation is summed over all lags
+_TAPER = (1.0, 4.0 / 9.0, 1.0 / 36.0)  # squared correlation of modes 0, 1 and 2 apart under a Hann window
+
+
+def expected_spectrum(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
+    """Return the expected ring averages of a fractional Brownian surface under a Hann window, up to a factor.
+
+    The transform of the autocorrelation of the window times the covariance, which is known up to a constant
+    that no mode beyond the first feels. For large surfaces the effect of the window, which depends on the
+    number of waves in the surface, is taken from a smaller one.
+    """
+    factor = -(-max(shape) // _LARGEST)
+    if abs(spacing[0] / spacing[1] - 1.0) > 1e-6:  # the sum over aliases is that of a square grid
+        factor = 1
+    small = shape if factor == 1 else (max(shape[0] // factor, 8), max(shape[1] // factor, 8))
+    exact = spectra.radial_average(_tapered_power(small, spacing, hurst), small, spacing)[1]
+    if factor == 1:
+        return exact
+    window_effect = exact / _ring_power_law(small, spacing, hurst)
+    power = _ring_power_law(shape, spacing, hurst)
+    near = min(power.size, window_effect.size // 2)
+    power[:near] *= window_effect[:near] / window_effect[near - 1]
+    return power
+
+
+def _ring_power_law(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
+    """Return the ring averages of the aliased power law, up to a factor."""
+    y, x = (2.0 * np.pi * np.fft.fftfreq(n) for n in shape)
+    x = x[: shape[1] // 2 + 1]
+    with np.errstate(divide="ignore"):
+        power = spectra.aliased_power_law((y[:, None], x), hurst, images=2)
+    power[0, 0] = 0.0
+    return spectra.radial_average(power, shape, spacing)[1]
+
+
+def _tapered_power(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
+    """Return the expected power of the modes of a half-plane."""
+    ratio, lags, weights = spacing[0] / spacing[1], [], []
+    for n in shape:
+        taper = spectra.window_weights(n, "hann")
+        both = np.correlate(taper, taper, "full")
+        # lags 0 ... n - 1, and those n less that have the same phase in every mode
+        lags.append(np.stack([np.arange(n), np.arange(n) - n]).astype(float))
+        weights.append(np.stack([both[n - 1 :], np.append(0.0, both[: n - 1])]))
+    total = np.zeros(shape)
+    for y, of_y in zip(lags[0], weights[0], strict=True):
+        for x, of_x in zip(lags[1], weights[1], strict=True):
+            squares = (y[:, None] * ratio) ** 2 + x**2
+            total -= 0.5 * np.outer(of_y, of_x) * squares**hurst
+    modes = np.fft.rfft2(total).real
+    return np.asarray(np.maximum(modes, 1e-300))
+
+
+def ring_covariance(counts: Array, *, is_tapered: bool) -> Array:
+    """Return the covariance of the logarithms of ring averages of a square; `counts` are those of all rings.
+
+    Without a window the modes are independent. Under a Hann window those up to two apart are correlated; far
+    rings are so alike that the covariance with their neighbours can be counted as variance.
+    """
+    counts = np.maximum(np.asarray(counts, dtype=float), 1.0)
+    if not is_tapered:
+        return np.diag(2.0 / counts)
+    total = (2.0 * sum(_TAPER) - _TAPER[0]) ** 2
+    result = np.diag(2.0 * total / counts)
+    rings = min(_EXACT_RINGS, counts.size)
+    reach = rings + 3
+    mode = np.arange(-reach, reach + 1)
+    ring = np.floor(np.hypot(mode[:, None], mode) + 0.5).astype(np.int64) - 1
+    inner = ring[2:-2, 2:-2]
+    pairs = np.zeros(((rings + 5) ** 2,))
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            other = ring[2 + dy : ring.shape[0] - 2 + dy, 2 + dx : ring.shape[1] - 2 + dx]
+            both = (inner >= 0) & (other >= 0) & (inner < rings) & (other < rings)
+            index = inner[both] * (rings + 5) + other[both]
+            pairs += _TAPER[abs(dy)] * _TAPER[abs(dx)] * np.bincount(index, minlength=pairs.size)
+    exact = 2.0 * pairs.reshape(rings + 5, rings + 5)[:rings, :rings]
+    result[:rings, :rings] = exact / np.outer(counts[:rings], counts[:rings])
+    return result

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
     from fractalcontact.plotting._units import Units
 
-SCALES = ("lag", "wavenumber", "cube_size", "window_size", "box_length", "box_size")
+SCALES = ("lag", "wavenumber", "cube_size", "window_size", "divider", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
 # profile; the first name present in a Dataset is its curve
 CURVES = {
@@ -31,6 +31,9 @@ CURVES = {
     "cube_count": (1.0, -1.0, 0.0),
     "roughness": (1.0, 0.0, 0.0),
     "variation": (1.0, 0.0, 0.0),
+    "higuchi_length": (1.0, 0.0, -2.0),
+    "fluctuation": (1.0, 0.0, 0.0),
+    "divider_length": (1.0, 0.0, -1.0),
     "covering_area": (1.0, 0.0, -1.0),
     "covering_length": (1.0, 0.0, -1.0),
 }

@@ -162,6 +162,8 @@ def _reasons(scene: Scene) -> dict[str, str]:
         reasons["surfaces"] = "height is wanted"
     if "describe" in want.surfaces:
         reasons["surfaces/description"] = "describe is wanted"
+    if "texture" in want.surfaces:
+        reasons["surfaces/texture"] = "texture is wanted"
     if want.dimensions:
         reasons["dimensions"] = f"wanted: {', '.join(want.dimensions)}"
         if want.figures:

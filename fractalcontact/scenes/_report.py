@@ -207,6 +207,8 @@ def _surface_parameters(tree: xr.DataTree) -> list[Part]:
     statistics = group_of(tree, "surfaces")
     if statistics is None or "rms_height" not in statistics:
         return []
+    if (texture := group_of(tree, "surfaces/texture")) is not None:
+        statistics = statistics.assign(texture.data_vars)
     rows: list[tuple[str, ...]] = [("ISO 25178", "parameter", "value")]
     for symbol, name in ISO_25178.items():
         if name in statistics:

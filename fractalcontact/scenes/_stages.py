@@ -119,6 +119,7 @@ def _domain(name: str, **more: Any) -> StageType:
 _ROWS = (
     StageType("surfaces", (), "surfaces.read", "surface"),
     StageType("surfaces/description", _SURFACE, "surfaces.describe"),
+    StageType("surfaces/texture", _SURFACE, "surfaces.texture"),
     StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions"),
     _curve("spectrum"),
     _curve("variogram"),
@@ -127,6 +128,9 @@ _ROWS = (
     _curve("cube_counts"),
     _curve("roughness_length"),
     _curve("variation"),
+    _curve("higuchi"),
+    _curve("detrended_fluctuation"),
+    _curve("divider"),
     _curve("covering"),
     StageType("contact", _SURFACE, "contact.press", "contact", keeps=CONTACT_MAPS),
     # not below contact: its steps are others than those of the load path
@@ -183,7 +187,7 @@ DOMAIN_STAGES = _words("domains")
 READ_THE_GAP = tuple(row.word for row in _ROWS if row.reads == "gap")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
-    "surfaces": ("height", "describe"),
+    "surfaces": ("height", "describe", "texture"),
     "contact": (PRESS, PARTIAL_SLIP),
     "joints": JOINT_STAGES,
     "domains": DOMAIN_STAGES,

@@ -130,7 +130,10 @@ def _file_table(
 
 
 def _roughness(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:
-    want: dict[str, Any] = {"surfaces": ["height", "describe"], "dimensions": ["default", "variogram"]}
+    want: dict[str, Any] = {
+        "surfaces": ["height", "describe", "texture"],
+        "dimensions": ["default", "variogram"],
+    }
     if facts["spacing"] <= JRC_LAG and facts["extent"] >= JRC_LENGTHS * JRC_LAG:
         want["joints"] = ["roughness_coefficient", "directional_roughness"]
     return [("want", want | {"figures": True})]

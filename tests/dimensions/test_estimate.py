@@ -17,7 +17,7 @@ VARIABLES = {
 }  # fmt: skip
 NAMES = list(fc.dimensions.methods())
 VALIDATED = ["likelihood", "increments"]
-SCALE_FREE = [name for name in NAMES if name != "covering"]
+SCALE_FREE = [name for name in NAMES if name not in ("covering", "divider")]
 
 
 def estimate(*arguments, **options):
@@ -327,11 +327,11 @@ def test_invalid_arguments(rough):
 def test_heights_whose_squares_overflow(rough, factor):
     """Exponents are dimensionless; the curves, in m2 and m4, raise an error."""
     far = rough.copy(data=rough.values * factor)
-    unitless = [name for name in NAMES if name != "covering"]
+    unitless = SCALE_FREE
     here, there = estimate(rough, unitless), estimate(far, unitless)
     np.testing.assert_array_equal(here.hurst, there.hurst)
     np.testing.assert_array_equal(here.rms_increment * factor, there.rms_increment)
-    assert np.isfinite(estimate(far, "covering").hurst).all()
+    assert np.isfinite(estimate(far, ["covering", "divider"]).hurst).all()
     for curve in ("spectrum", "variogram", "second_variogram", "cube_counts", "roughness_length"):
         with pytest.raises(InvalidInput, match="whose squares are numbers"):
             getattr(fc.dimensions, curve)(far)

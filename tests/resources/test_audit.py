@@ -33,7 +33,7 @@ SUBPACKAGE = ["WORD"]
 """
 )
 WANTED = {
-    "surfaces": ("height", "describe"),
+    "surfaces": ("height", "describe", "texture"),
     "dimensions": ("default", *fc.dimensions.methods()),
     "contact": ("press",),
     "joints": (

@@ -1,0 +1,122 @@
+"""Length of profiles measured with increments over growing lags (Higuchi), and its sampling covariance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._methods import METHODS
+from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_PER_OCTAVE = 2  # lags in an octave
+_SHARE = 0.25  # longest lag over the profile
+
+
+def _check(problems: Problems, *, surface: Any) -> None:
+    reserved = ("higuchi_length", "lag", "pair_count", *ALWAYS)
+    check_surface(problems, surface, smallest=5, squares=True, reserved=reserved)
+
+
+@public_result(
+    title="Higuchi lengths of a profile",
+    references=METHODS["higuchi"].references,
+    achieved_error=EXACT_MEAN,
+    check=_check,
+)
+def higuchi(surface: xr.DataArray) -> xr.Dataset:
+    """Return the length of a profile by Higuchi's method against the lag.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in m, dims (..., x); of a surface (..., y, x) the mean over its rows and columns. Increments
+        that need a missing point are left out.
+
+    Returns
+    -------
+    Dataset over `lag` (m)
+        `higuchi_length` (m): the mean absolute increment over a lag of k points, times (n - 1) / k^2;
+        `pair_count` (of increments); and `local_slope`, which is -D, D the dimension of the profile. Lags
+        grow by about sqrt 2 from one spacing to a quarter of the profile.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is not uniform, nothing was observed, or an axis has fewer than 5 points.
+
+    References
+    ----------
+    Higuchi (1988), Physica D 31.
+
+    Examples
+    --------
+    >>> import numpy as np, fractalcontact as fc
+    >>> ramp = fc.surfaces.from_array(0.5 * np.arange(33.0), 1.0)
+    >>> curve = fc.dimensions.higuchi(ramp)
+    >>> curve.higuchi_length.values[:3].tolist(), round(float(curve.local_slope[1]), 6)
+    ([16.0, 8.0, 5.333333333333333], -1.0)
+    """
+    surfaces = read_surfaces(surface)
+    curves = [higuchi_curve(single) for single in surfaces]
+    slopes = [window_slope(curve) for curve in curves]
+    return curve_dataset(surface, surfaces, "lag", curves, slopes, value="higuchi_length", count="pair_count")
+
+
+def higuchi_curve(surface: Surface) -> Curve:
+    """Return the mean Higuchi length of the rows and columns of one surface."""
+    axes = [axis for axis in (0, 1) if surface.shape[axis] > 1]
+    shortest = min(surface.shape[axis] for axis in axes)
+    lags = higuchi_lags(shortest)
+    coarse = max(surface.spacing[axis] for axis in axes)
+    sums, counts = np.zeros(lags.size), np.zeros(lags.size, dtype=np.int64)
+    for axis in axes:
+        lines = np.moveaxis(surface.heights, axis, -1)
+        steps = np.maximum(np.rint(lags * coarse / surface.spacing[axis]).astype(int), 1)
+        for k, step in enumerate(steps):
+            if step >= lines.shape[-1]:
+                continue
+            jumps = np.abs(lines[:, step:] - lines[:, :-step])
+            jumps = jumps[np.isfinite(jumps)]
+            sums[k] += float(jumps.sum())
+            counts[k] += jumps.size
+    mean = np.divide(sums, counts, out=np.full(lags.size, np.nan), where=counts > 0)
+    return Curve(lags * coarse, mean * surface.unit * (shortest - 1) / lags.astype(float) ** 2, counts)
+
+
+def higuchi_lags(points: int) -> Array:
+    """Return the lags in points of a profile."""
+    most = max(2, int(_SHARE * (points - 1)))
+    number = int(_PER_OCTAVE * np.log2(most) + 1e-9) + 1
+    lags = np.rint(2.0 ** (np.arange(number) / _PER_OCTAVE)).astype(np.int64)
+    return np.unique(np.append(lags[lags <= most], [1, 2]))
+
+
+def mean_increment_covariance(lags: Array, points: int, hurst: float) -> Array:
+    """Return the covariance of the logarithms of mean absolute increments of a fractional Brownian profile.
+
+    The covariance of the absolute values of two normal variables of correlation r and unit variance is
+    (2 / pi) (sqrt(1 - r^2) + r arcsin r - 1); it is summed over all pairs of increments.
+    """
+    result = np.empty((lags.size, lags.size))
+    shifts = np.arange(-points, points + 1).astype(float)
+
+    def power(distance: Array) -> Array:
+        return np.asarray(np.abs(distance) ** (2.0 * hurst))
+
+    for i, k in enumerate(lags):
+        for j, m in enumerate(lags[: i + 1]):
+            first, second = points - k, points - m
+            pairs = np.maximum(np.minimum(first, second - shifts) - np.maximum(0.0, -shifts), 0.0)
+            product = 0.5 * (power(shifts + m) + power(shifts - k) - power(shifts) - power(shifts + m - k))
+            r = np.clip(product / float(k * m) ** hurst, -1.0, 1.0)
+            absolute = (2.0 / np.pi) * (np.sqrt(1.0 - r * r) + r * np.arcsin(r) - 1.0)
+            relative = float(np.sum(pairs * absolute)) / (first * second) * np.pi / 2.0
+            result[i, j] = result[j, i] = relative
+    return result

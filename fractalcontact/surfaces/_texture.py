@@ -1,0 +1,225 @@
+"""Texture of a surface after ISO 25178-2: correlation lengths, and the core of the heights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base import fft
+from fractalcontact.base.coords import check_leading, leading_coords
+from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.polynomial import shifted
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._height_planes import check_planes, height_planes
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+DECAY = 0.2  # of the autocorrelation at the lengths
+_CORE_WIDTH = 0.4  # of the material ratio under the secant of the core
+_RAYS = 360  # directions over the half circle
+_PER_POINT = 4  # values of the autocorrelation in a spacing along a ray
+_LEAST = 8  # observed points
+_CORRELATION = ("autocorrelation_length", "texture_aspect_ratio")
+_CORE = (
+    "core_height",
+    "reduced_peak_height",
+    "reduced_valley_depth",
+    "peak_material_ratio",
+    "valley_material_ratio",
+)
+
+
+def _check(problems: Problems, *, surface: Any) -> None:
+    if check_planes(problems, surface):
+        check_leading(surface, (*_CORRELATION, *_CORE, "run_time"), problems)
+
+
+@public_result(
+    title="Texture of a surface",
+    references="ISO 25178-2 (2021), Surface texture: areal; terms, definitions and parameters",
+    achieved_error="exact to rounding for the core; a hundredth of a spacing for the lengths",
+    check=_check,
+)
+def texture(surface: xr.DataArray) -> xr.Dataset:
+    """Return the correlation lengths of a surface and the core of its height distribution (ISO 25178-2).
+
+    Parameters
+    ----------
+    surface : DataArray
+        Heights in metres, dims (..., y, x) or (..., x). They are neither levelled nor filtered first: see
+        `level` and `gaussian_filter`. Missing points (NaN) are left out.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims, if there are any (symbols of ISO 25178-2 in brackets):
+
+        - autocorrelation_length (Sal, m): the shortest distance at which the autocorrelation of the heights
+          about their mean has fallen to 0.2
+        - texture_aspect_ratio (Str): that distance over the longest; 1 for an isotropic surface, near 0 for a
+          lay. NaN if the autocorrelation does not fall to 0.2 within half the surface in every direction.
+        - core_height (Sk, m), reduced_peak_height (Spk, m), reduced_valley_depth (Svk, m),
+          peak_material_ratio (Smr1) and valley_material_ratio (Smr2) of the curve of material ratio
+        - run_time
+
+        A parameter that does not exist is NaN and has the reason in its attribute `reason`.
+
+    Raises
+    ------
+    InvalidInput
+        Not a surface in metres on a uniform grid, or infinite heights.
+
+    Notes
+    -----
+    The autocorrelation is the mean product of all pairs of points at a distance, over the mean square. The
+    line of the core is the least-squares line through the 40 % of the curve where its secant is flattest.
+    A fractal surface has no correlation length of its own: there it grows with the extent.
+
+    References
+    ----------
+    ISO 25178-2 (2021), Surface texture: areal, terms, definitions and surface texture parameters.
+
+    Examples
+    --------
+    >>> import numpy as np, fractalcontact as fc
+    >>> x = 2 * np.pi * np.arange(64) / 32
+    >>> heights = 1e-6 * np.add.outer(np.cos(x), np.cos(x))
+    >>> result = fc.surfaces.texture(fc.surfaces.from_array(heights, 1e-5, periodic=True))
+    >>> print(f"{float(result.autocorrelation_length):.2e} m, {float(result.texture_aspect_ratio):.2f}")
+    9.86e-05 m, 0.87
+    """
+    grid = read_grid(surface, core_dims(surface))
+    leading = surface.dims[: surface.ndim - len(grid.shape)]
+    planes = height_planes(surface)
+    rows = [_correlation(plane, grid.spacing, grid.periodic) + _core(plane) for plane in planes]
+    sizes = surface.shape[: len(leading)]
+    data = {
+        name: (leading, np.array([row[k] for row in rows]).reshape(sizes))
+        for k, name in enumerate((*_CORRELATION, *_CORE))
+    }
+    result = xr.Dataset(data, coords=leading_coords(surface, leading, (*data, "run_time")))
+    for name, variable in result.data_vars.items():
+        if bool(np.isnan(variable).any()):
+            variable.attrs["reason"] = _reason(str(name), len(grid.shape))
+    return result
+
+
+def _reason(name: str, axes: int) -> str:
+    if name == "texture_aspect_ratio" and axes == 1:
+        return "a profile has one direction"
+    if name in _CORRELATION:
+        return (
+            f"the autocorrelation does not fall to {DECAY} within half the surface in every direction, or "
+            "all heights are equal"
+        )
+    return f"fewer than {_LEAST} points were observed"
+
+
+def _correlation(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> list[float]:
+    """Return the shortest distance at which the autocorrelation has fallen, and its ratio to the longest."""
+    plane = np.atleast_2d(heights)
+    observed = np.isfinite(plane)
+    if np.count_nonzero(observed) < _LEAST or np.ptp(plane[observed]) == 0.0:
+        return [math.nan, math.nan]
+    values = shifted(plane)[0]
+    values = np.where(observed, values - values[observed].mean(), 0.0)
+    steps = (spacing[-1] if heights.ndim == 1 else spacing[0], spacing[-1])
+    acf, reach = _autocorrelation(values, observed, (False, *periodic)[-2:])
+    angles = np.zeros(1) if heights.ndim == 1 else np.arange(_RAYS) * np.pi / _RAYS
+    lengths = np.array([_decay(acf, reach, steps, float(angle)) for angle in angles])
+    if np.isnan(lengths).all():
+        return [math.nan, math.nan]
+    shortest = float(np.nanmin(lengths))
+    if heights.ndim == 1 or np.isnan(lengths).any():
+        return [shortest, math.nan]
+    return [shortest, shortest / float(lengths.max())]
+
+
+def _autocorrelation(
+    values: Array, observed: Array, periodic: Sequence[bool]
+) -> tuple[Array, tuple[int, int]]:
+    """Return the autocorrelation up to half of each axis, the lag 0 in the middle, and the largest lags."""
+    shape = values.shape
+    reach = tuple(min(n - 1, max(n // 2, 1)) if n > 1 else 0 for n in shape)
+    sizes = [
+        n if wraps else fft.fast_length(n + lag) for n, wraps, lag in zip(shape, periodic, reach, strict=True)
+    ]
+    torus = sizes[0], sizes[1]
+
+    def correlated(plane: Array) -> Array:
+        padded = np.zeros(torus)
+        padded[: shape[0], : shape[1]] = plane
+        modes = fft.rfft2(padded)
+        products = fft.irfft2((modes.real**2 + modes.imag**2).astype(complex), torus)
+        rows, columns = (np.arange(-lag, lag + 1) for lag in reach)
+        return np.asarray(products[np.ix_(rows % torus[0], columns % torus[1])])
+
+    number = np.rint(correlated(observed.astype(float)))
+    products = correlated(values)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(number > 0, products / number, np.nan)
+    return mean / mean[reach[0], reach[1]], (reach[0], reach[1])
+
+
+def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle: float) -> float:
+    """Return the distance along a ray at which the autocorrelation falls to `DECAY`; NaN if it does not."""
+    from scipy.ndimage import map_coordinates
+
+    unit = np.sin(angle) / steps[0], np.cos(angle) / steps[1]  # points per metre
+    limits = [lag / abs(u) for lag, u in zip(reach, unit, strict=True) if abs(u) > 1e-9 * max(map(abs, unit))]
+    longest = min(limits)
+    number = 2 + int(_PER_POINT * longest * max(map(abs, unit)))
+    distance = np.linspace(0.0, longest, number)
+    places = [lag + u * distance for lag, u in zip(reach, unit, strict=True)]
+    coarse = map_coordinates(acf, places, order=1)
+    below = np.flatnonzero(coarse <= DECAY)
+    if not below.size:
+        return math.nan
+    # a cubic through the points near the crossing
+    near = slice(max(int(below[0]) - 2 * _PER_POINT, 0), int(below[0]) + 2 * _PER_POINT)
+    low = [max(int(place[near].min()) - 4, 0) for place in places]
+    high = [int(place[near].max()) + 6 for place in places]
+    part = acf[low[0] : high[0], low[1] : high[1]]
+    fine = map_coordinates(
+        part, [place[near] - first for place, first in zip(places, low, strict=True)], order=3, mode="nearest"
+    )
+    where = distance[near]
+    crossed = np.flatnonzero(fine <= DECAY)
+    if not crossed.size or crossed[0] == 0:
+        return float(where[0]) if crossed.size else float(distance[below[0]])
+    k = int(crossed[0])
+    share = (fine[k - 1] - DECAY) / (fine[k - 1] - fine[k])
+    return float(where[k - 1] + share * (where[k] - where[k - 1]))
+
+
+def _core(heights: Array) -> list[float]:
+    """Return Sk, Spk, Svk, Smr1 and Smr2 of the heights."""
+    observed = heights[np.isfinite(heights)]
+    if observed.size < _LEAST:
+        return [math.nan] * len(_CORE)
+    values, _, scale = shifted(observed)
+    curve = np.sort(values)[::-1]
+    ratio = (np.arange(curve.size) + 0.5) / curve.size
+    width = max(2, round(_CORE_WIDTH * curve.size))
+    drop = curve[: curve.size - width + 1] - curve[width - 1 :]
+    flattest = np.flatnonzero(drop <= drop.min() + 1e-12 * (curve[0] - curve[-1]))
+    start = int(flattest[0])
+    part, at = curve[start : start + width], ratio[start : start + width]
+    middle = at.mean()
+    slope = float(np.sum((at - middle) * part) / np.sum((at - middle) ** 2))
+    upper = float(part.mean() - slope * middle)
+    lower = upper + slope
+    above, below = np.maximum(curve - upper, 0.0), np.maximum(lower - curve, 0.0)
+    # a straight curve crosses its own line by rounding only
+    tolerance = 1e-9 * (curve[0] - curve[-1])
+    peak, valley = (float(np.count_nonzero(part > tolerance)) / curve.size for part in (above, below))
+    heights_of = [
+        2.0 * float(part.mean()) / share if share > 0.0 else 0.0
+        for part, share in ((above, peak), (below, valley))
+    ]
+    return [-slope * scale, heights_of[0] * scale, heights_of[1] * scale, peak, 1.0 - valley]
