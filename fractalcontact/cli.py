@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.errors import FractalContactError, InvalidInput, TooLittleMemory
 from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
@@ -38,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with leaving(_leave):
             code: int = options.action(options)
+    except TooLittleMemory as error:
+        print(error, file=sys.stderr)
+        return FAILED
     except FractalContactError as error:
         print(error, file=sys.stderr)
         return WRONG_INPUT
@@ -70,7 +73,9 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
     run.add_argument("scene", help="a scene file (TOML), or the name of a shipped scene")
     run.add_argument("-o", "--out", help="folder for result.nc and the figures; a stopped run resumes there")
-    run.add_argument("--plan", action="store_true", help="print the stages and their reasons; run nothing")
+    run.add_argument(
+        "--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing"
+    )
     run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
     run.add_argument(
         "--workers",

@@ -34,6 +34,10 @@ class UnreadableFile(InvalidInput):
     """A file is corrupt, of an unknown format, or does not state its units or size."""
 
 
+class TooLittleMemory(InvalidInput, MemoryError):
+    """A call or a study needs more memory than this process may take; nothing was computed."""
+
+
 class MissingExtra(FractalContactError, ImportError):
     """An optional library is needed and is not installed.
 

@@ -25,9 +25,9 @@ import xarray as xr
 
 from fractalcontact.base.content_checksum import DAMAGED, append_checksum, require_checksum
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
+from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.schema import CONVENTIONS, encoded
-from fractalcontact.base.unpacked_size import require_unpacked, unpacked_limit
 from fractalcontact.base.validation import Problems, reading
 
 SAVE = "fractalcontact.save"

@@ -6,8 +6,6 @@ No other module changes the garbage collector or the table of imported modules.
 from __future__ import annotations
 
 import gc
-import math
-import os
 import sys
 from pathlib import Path
 
@@ -45,11 +43,3 @@ def block_dask_import() -> None:
 def collect_garbage_less_often() -> None:
     """Raise the threshold of the garbage collector; only for the command line, which owns its process."""
     gc.set_threshold(GC_THRESHOLD)
-
-
-def physical_memory() -> float:
-    """Return the memory of this machine in bytes; infinity where the system does not report it."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return math.inf

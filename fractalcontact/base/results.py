@@ -21,14 +21,16 @@ import inspect
 import json
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import wraps
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, LoadedWarning
+from fractalcontact.base.errors import InvalidInput, LoadedWarning, TooLittleMemory
+from fractalcontact.base.memory import Estimate, peak_of, plane_in, require_memory
 from fractalcontact.base.missing_numbers import give_reasons
 from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp
@@ -41,6 +43,7 @@ MASKS = ("mask", "masks", "valid")
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
+ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 
 
 class PublicFunction(Protocol[P, R_co]):
@@ -48,6 +51,7 @@ class PublicFunction(Protocol[P, R_co]):
 
     __name__: str
     __signature__: inspect.Signature
+    memory: Estimate  # bytes at the peak
 
     def __call__(self, *arguments: P.args, **options: P.kwargs) -> R_co:
         """Compute the result."""
@@ -64,6 +68,7 @@ def public_result(
     check: Callable[..., None] | None = None,
     error: type[InvalidInput] = InvalidInput,
     in_blocks: bool = False,
+    memory: Estimate = ARRAYS,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
 
@@ -83,6 +88,9 @@ def public_result(
         The exception that lists the problems.
     in_blocks : bool
         The function reads dask arrays block by block, or returns one. Any other warns that it loads them.
+    memory : float or callable
+        Bytes that a call takes at its peak beyond its arguments: for each cell of its largest array, or
+        ``memory(plane, arguments)`` (see `base.memory`). More than may be taken is refused beforehand.
     """
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
@@ -104,16 +112,18 @@ def public_result(
                 if check is not None:
                     given = bound.arguments.items()
                     check(problems, **{key: value for key, value in given if key not in checked_flags})
+            require_memory(name, peak_of(memory, bound.arguments), _size_of(bound.arguments))
             return bound
 
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
-            given, words, notes = with_surface(name, signature, arguments, options)
-            bound = checked(*given, **words)
-            if not in_blocks:
-                announce_loading(name, bound.arguments)
-            result = function(*bound.args, **bound.kwargs)
+            with _memory_errors(name):
+                given, words, notes = with_surface(name, signature, arguments, options)
+                bound = checked(*given, **words)
+                if not in_blocks:
+                    announce_loading(name, bound.arguments)
+                result = function(*bound.args, **bound.kwargs)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {} if completeness is None else {"completeness": completeness}
@@ -133,11 +143,13 @@ def public_result(
             return result
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
-            given, words, _ = with_surface(name, signature, arguments, options)
-            checked(*given, **words)
+            with _memory_errors(name):
+                given, words, _ = with_surface(name, signature, arguments, options)
+                checked(*given, **words)
 
         public = cast("PublicFunction[P, R]", call)
         public.validate = validate  # type: ignore[method-assign]
+        public.memory = memory
         return public
 
     return decorate
@@ -152,6 +164,26 @@ def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:
             f"{name}: the dask arrays of `{argument}` are loaded into memory, {value.nbytes / 1e6:.3g} MB"
         )
         warnings.warn(message, LoadedWarning, stacklevel=4)
+
+
+def _size_of(arguments: Mapping[str, Any]) -> str:
+    """Return the size of a call in words: the shape that it is given, or that of its array."""
+    shape, plane = arguments.get("shape"), plane_in(arguments)
+    if shape is None and plane is not None:
+        shape = plane.shape if plane.planes == 1 else (plane.planes, *plane.shape)
+    return "this call" if shape is None else f"{' x '.join(map(str, np.ravel(shape)))} points"
+
+
+@contextmanager
+def _memory_errors(name: str) -> Iterator[None]:
+    """Turn a MemoryError in the block into an error of the package, in words."""
+    try:
+        yield
+    except TooLittleMemory:
+        raise
+    except MemoryError as error:
+        got = str(error) or "a request that the system refused"
+        raise TooLittleMemory(name, [f"memory: expected enough for this call, got: {got}"]) from error
 
 
 def _set_run_time(dataset: xr.Dataset, seconds: float) -> None:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory, UnreadableFile
 from fractalcontact.base.numbers import float_array as float_array  # converts what `numbers` has passed
 from fractalcontact.base.numbers import is_real, number_of_axes, real_numbers
 
@@ -75,7 +75,7 @@ class Problems:
     def __exit__(
         self, error_type: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if isinstance(value, InvalidInput):
+        if isinstance(value, InvalidInput) and not isinstance(value, TooLittleMemory):
             self._extend(value.problems)
             raise self.error(self.where, self.messages) from value
         if error_type is None and self.messages:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges, read_grid
+from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STEEP, STOP_REASONS, YIELDED
@@ -38,6 +39,8 @@ PUNCH_TOLERANCE = 1e-2  # left an error of the stiffness below 1e-5 on rough sur
 NO_STIFFNESS = (
     "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
 )
+# bytes of a node: solver of a periodic and of a free body, steps before, indentation, gap with last solution
+PERIODIC_BYTES, FREE_BYTES, PATH_BYTES, YIELD_BYTES, RESULT_BYTES = 48.0, 156.0, 32.0, 48.0, 32.0
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -78,7 +81,19 @@ def _check(
     options.check_load(load, grid.nominal_area, problems)
 
 
-@public_result(title="Elastic contact of a rough surface", check=_check)
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the solver on the whole plane beside those of the maps."""
+    loads = [arguments[name] for name in CONTROLS if arguments.get(name) is not None]
+    steps = max(1, int(np.size(loads[0]))) if loads else 1
+    boundary = arguments.get("boundary")
+    periodic = plane.periodic if boundary is None else boundary == "periodic"
+    solver = PERIODIC_BYTES if periodic else FREE_BYTES
+    solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
+    maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
+    return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
+
+
+@public_result(title="Elastic contact of a rough surface", check=_check, memory=_memory)
 def press(
     surface: xr.DataArray,
     *,

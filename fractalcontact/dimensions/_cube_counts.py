@@ -33,6 +33,7 @@ def _check(problems: Problems, *, surface: Any, vertical_scale: Any) -> None:
     references=METHODS["cube_counts"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
+    memory=48.0,
 )
 def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range") -> xr.Dataset:
     """Count the cubes that meet a surface, averaged over all positions of the grid of cubes.

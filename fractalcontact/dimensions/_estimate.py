@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.memory import Plane
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.validation import Problems, word_tuple
@@ -42,6 +44,10 @@ from fractalcontact.dimensions._surface_input import (
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+# bytes of a point at the peak of a method: of maximum likelihood on a torus or a rectangle, and of others
+PERIODIC_BYTES, FREE_BYTES = 97.0, 156.0
+METHOD_BYTES = {"variogram": 325.0, "increments": 16.0, "madogram": 16.0}
 
 _FIELDS = (
     "hurst",
@@ -78,10 +84,19 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: 
     check_scales(problems, scales, surface if is_valid else None)
 
 
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the method that takes most; surfaces are analysed one by one."""
+    methods = arguments.get("methods")
+    default = PERIODIC_BYTES if plane.periodic else FREE_BYTES
+    most = max((METHOD_BYTES.get(name, default) for name in word_tuple(methods)), default=default)
+    return most * math.prod(plane.shape)
+
+
 @public_result(
     title="Hurst exponent and fractal dimension of a surface",
     check=_check,
     in_blocks=True,
+    memory=_memory,
 )
 def estimate(
     surface: xr.DataArray,

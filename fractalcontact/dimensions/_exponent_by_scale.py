@@ -55,6 +55,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
     title="Hurst exponent against scale",
     references="Whittle (1957), J. R. Stat. Soc. B 19",
     check=_check,
+    memory=46.0,
 )
 def scaling(surface: xr.DataArray) -> xr.Dataset:
     """Return the Hurst exponent of every octave of wavelength, and the window that has one exponent.

@@ -37,6 +37,7 @@ def _check(problems: Problems, *, surface: Any, window: Any, tile: Any) -> None:
     "modes",
     check=_check,
     in_blocks=True,
+    memory=36.0,
 )
 def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
     """Return the radially averaged power spectral density of a surface.

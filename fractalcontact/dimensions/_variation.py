@@ -41,6 +41,7 @@ def _check(problems: Problems, *, surface: Any, sizes: Any, windows: Any, mean: 
     references=METHODS["variation"].references,
     achieved_error=EXACT_MEAN,
     check=_check,
+    memory=40.0,
 )
 def variation(
     surface: xr.DataArray, sizes: Any = None, *, windows: str = "segments", mean: str = "arithmetic"

@@ -40,6 +40,7 @@ def _check(problems: Problems, *, surface: Any, max_lag: Any) -> None:
     achieved_error=EXACT_MEAN,
     check=_check,
     in_blocks=True,
+    memory=320.0,
 )
 def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
     """Return the variogram: half the mean square height increment against the lag.

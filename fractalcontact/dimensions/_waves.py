@@ -59,6 +59,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
     achieved_error="at most one surface in 1000 without a wave shows one",
     references="Fisher, Proceedings of the Royal Society A 125 (1929) 54-59",
     check=_check,
+    memory=88.0,
 )
 def waves(surface: xr.DataArray) -> xr.Dataset:
     """Find the single waves of a surface, such as marks of machining, in any direction.

@@ -17,6 +17,7 @@ from fractalcontact.joints._closure import (
     Pressing,
     check_pressing,
     press_sheared,
+    pressing_memory,
     pressing_references,
     warn_steep,
     warn_unconverged,
@@ -71,7 +72,7 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
         problems.require(several and bool(valid.all()) and all(divides), "factors", expected, factors)
 
 
-@public_result(title="contact area of a crack by spacing", check=_check)
+@public_result(title="contact area of a crack by spacing", check=_check, memory=pressing_memory)
 def area_dimension(
     crack: Crack,
     *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ import xarray as xr
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import plain
@@ -48,6 +49,7 @@ UNDETERMINED = (
     "NaN where periodic faces are closed to the mean plane of the delta-surface or beyond: "
     "no force is then determined"
 )
+BLOCK_BYTES = 40.0  # of a cell: the delta-surface, the flat block and what both are made of
 STEPS_SHOWN = 5  # in a warning
 
 
@@ -74,7 +76,18 @@ def _check(
     check_pressing(problems, crack, load, bulk, keep, solver)
 
 
-@public_result(title="closure of a sheared crack", check=_check)
+def pressing_memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of pressing the block at one shear after the other, with the maps of all of them."""
+    pressed = fc.contact.press.memory(plane, arguments)  # type: ignore[operator]
+    shears = max(1, int(np.size(arguments["shear"]))) if "shear" in arguments else 1
+    steps = max(
+        (int(np.size(arguments[name])) for name in LOADS if arguments.get(name) is not None), default=1
+    )
+    maps = shears * steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep")))
+    return float(pressed) + plane.cells * (BLOCK_BYTES + 2.0 * maps)
+
+
+@public_result(title="closure of a sheared crack", check=_check, memory=pressing_memory)
 def closure(
     crack: Crack,
     *,

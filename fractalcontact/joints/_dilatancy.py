@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
+from fractalcontact.base.memory import Plane
 from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.progress import track
@@ -22,6 +23,7 @@ from fractalcontact.joints._closure import (
     check_pressed,
     check_pressing,
     press_sheared,
+    pressing_memory,
     pressing_references,
     warn_steep,
     warn_unconverged,
@@ -35,6 +37,7 @@ Columns = dict[str, Array]
 
 WHERE = "fractalcontact.joints.dilatancy"
 FORCE_ERROR = 1e-7  # relative error of the force that balances a spring
+RIGID_BYTES = 96.0  # of a cell of the block
 MAX_SOLUTIONS = 60  # for one such force
 
 
@@ -75,7 +78,13 @@ def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
         problems.require(unused, name, "nothing without normal_force", value)
 
 
-@public_result(title="dilatancy of a crack", references=PAPER, check=_check)
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of sliding rigid faces, and of pressing them where a force is given."""
+    is_rigid = arguments.get("normal_force") is None
+    return RIGID_BYTES * plane.cells if is_rigid else pressing_memory(plane, arguments)
+
+
+@public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=_memory)
 def dilatancy(
     crack: Crack,
     *,

@@ -32,15 +32,13 @@ from fractalcontact.scenes._inputs import (
 )
 from fractalcontact.scenes._plan import Stage
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import CONTACT_MAPS, PARTIAL_SLIP, public_function
+from fractalcontact.scenes._stages import CONTACT_MAPS, PART_SIZE, PARTIAL_SLIP, public_function
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
 
 Results = Mapping[str, xr.Dataset]
 Part = Callable[[], xr.Dataset]
-
-PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from fractalcontact.base.tables import table
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._inputs import FRICTION_ANGLE, joint_options
+from fractalcontact.scenes._memory import stage_memory
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
@@ -81,11 +82,15 @@ class Plan:
     stages : tuple of Stage
     choices : tuple of Choice
         Methods and tolerances selected for `error` or `budget`.
+    memory : mapping
+        Estimated peak memory of each stage in bytes, libraries and earlier results included; empty where the
+        size of the surface is not known.
     """
 
     scene: str
     stages: tuple[Stage, ...] = field(default=())
     choices: tuple[Choice, ...] = field(default=())
+    memory: Mapping[str, float] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Stage]:
         """Iterate over the stages in order."""
@@ -96,11 +101,13 @@ class Plan:
         return len(self.stages)
 
     def __str__(self) -> str:
-        """Return a table: stage, stages it needs, reason."""
-        rows = [("stage", "needs", "reason")]
+        """Return a table: stage, stages it needs, reason, peak memory."""
+        rows = [("stage", "needs", "reason", "peak memory")]
         for stage in self:
             needs = "all stored results" if stage.name == FIGURES else ", ".join(stage.needs)
-            rows.append((stage.name + ("" if stage.stored else " (not stored)"), needs, stage.reason))
+            name = stage.name + ("" if stage.stored else " (not stored)")
+            peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
+            rows.append((name, needs, stage.reason, peak))
         return "\n".join([table(rows), *(f"selected: {choice}" for choice in self.choices)])
 
 
@@ -117,7 +124,7 @@ def plan(scene: Scene) -> Plan:
     Returns
     -------
     Plan
-        Iterates over its stages; prints as a table.
+        Iterates over its stages; prints as a table, with the memory that each stage takes at its peak.
 
     Examples
     --------
@@ -130,7 +137,8 @@ def plan(scene: Scene) -> Plan:
     with Problems("fractalcontact.scenes.plan") as problems:
         problems.require(isinstance(scene, Scene), "scene", "a Scene, from fractalcontact.scenes.load", scene)
     scene, choices = choose(scene)
-    return Plan(scene.name, stages_of(scene), choices)
+    stages = stages_of(scene)
+    return Plan(scene.name, stages, choices, stage_memory(scene, stages))
 
 
 def stages_of(scene: Scene) -> tuple[Stage, ...]:

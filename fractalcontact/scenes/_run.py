@@ -25,6 +25,8 @@ from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import REPORT, report
+from fractalcontact.scenes._memory import check_memory
+from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
@@ -90,6 +92,8 @@ def run(
     _check_workers(workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
+        if workers > 1:
+            check_memory(scene, stages_of(scene), workers)
         return _run(scene, out, progress, workers_of(processes if client is None else client), start)
 
 

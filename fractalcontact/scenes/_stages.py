@@ -16,6 +16,7 @@ CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
 PRESS, PARTIAL_SLIP = "press", "partial_slip"
 FIGURES = "figures"
+PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 
 # stages of a joint with one path of load, and with one direction
 ONE_LOAD = ("closure", "elimination", "area_dimension", PARTIAL_SLIP)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
@@ -31,6 +31,7 @@ from fractalcontact.scenes._inputs import (
     slip_options,
     spacing_of,
 )
+from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._parts import map_reader
 from fractalcontact.scenes._plan import Stage, stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
@@ -78,6 +79,8 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     ------
     InvalidInput
         Lists all problems of the tables, the surfaces, the block, the material and the loads together.
+    TooLittleMemory
+        A stage needs more memory than this process may take.
 
     Examples
     --------
@@ -97,6 +100,7 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
             scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
         _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
+    check_memory(scene, stages_of(scene))
     warn(implausible_input(scene, surfaces["surface"]))
     return scene
 
@@ -109,6 +113,8 @@ def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
     """
     try:
         yield
+    except TooLittleMemory:
+        pass  # `check_memory` adds what the study holds beside the call
     except InvalidInput as error:
         for line in error.problems:
             argument = line.partition(":")[0].partition(".")[0]

@@ -46,6 +46,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
     references=NAYAK,
     achieved_error="exact to rounding, for the points as they are",
     check=_check,
+    memory=116.0,
 )
 def describe(surface: xr.DataArray) -> xr.Dataset:
     """Return statistics of the heights, slopes and curvature of a surface.

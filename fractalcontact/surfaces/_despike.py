@@ -37,6 +37,7 @@ def _check(problems: Problems, *, surface: Any, threshold: Any, window: Any) -> 
     references=ROUSSEEUW,
     achieved_error="exact: the heights that remain are unchanged",
     check=_check,
+    memory=34.0,
 )
 def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -> xr.DataArray:
     """Remove isolated outliers from a scan.

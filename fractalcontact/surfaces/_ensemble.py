@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import rng as streams
+from fractalcontact.base.memory import Estimate, Plane
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._grid_input import surface_array
+from fractalcontact.surfaces._grid_input import axis_sizes, surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -20,6 +22,20 @@ def check_ensemble(problems: Problems, members: Any, rng: Any) -> None:
     problems.integer("members", members, at_least=1, optional=True)
     with problems.collect():
         streams.generator(rng)
+
+
+def ensemble_memory(arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the members of an ensemble: twice their heights while they are stacked."""
+    return 16.0 * math.prod(axis_sizes(arguments["shape"])) * int(arguments["members"] or 0)
+
+
+def drawing_memory(work: float) -> Estimate:
+    """Return the estimate of a generator that takes `work` bytes for each point of a member."""
+
+    def memory(_: Plane, arguments: Mapping[str, Any]) -> float:
+        return work * math.prod(axis_sizes(arguments["shape"])) + ensemble_memory(arguments)
+
+    return memory
 
 
 def draw_ensemble(

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.process import physical_memory
+from fractalcontact.base.memory import Plane
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._circulant import draw, embed, torus_shape
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
+from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble, ensemble_memory
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
 STEIN = (
@@ -34,16 +34,23 @@ def _check(
     members: Any,
     rng: Any,
 ) -> None:
-    valid_plane = check_plane(problems, shape, spacing, members=members)
-    valid_hurst = problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
+    check_plane(problems, shape, spacing, members=members)
+    problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
     check_length(problems, "rms_increment", rms_increment)
     check_length(problems, "lag", lag, optional=True)
     check_ensemble(problems, members, rng)
-    if valid_plane and valid_hurst:
-        _check_memory(problems, *_plane(shape, spacing), float(hurst))
 
 
-@public_result(title="Fractional Brownian surface", references=STEIN, check=_check)
+def _memory(_: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the covariance and its transform, or of the modes, rows and heights."""
+    (ny, nx), steps = _plane(arguments["shape"], arguments["spacing"])
+    torus_y, torus_x = torus_shape((ny, nx), steps, float(arguments["hurst"]))
+    torus = float(torus_y) * torus_x
+    one = max(4.0 * torus, 2.0 * torus + 8.0 * ny * (torus_x + nx))
+    return one + ensemble_memory(arguments)
+
+
+@public_result(title="Fractional Brownian surface", references=STEIN, check=_check, memory=_memory)
 def fbm(
     shape: int | Sequence[int],
     spacing: float | Sequence[float],
@@ -134,15 +141,3 @@ def _plane(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, floa
     steps = axis_spacing(spacing, len(sizes))
     (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]
     return (ny, nx), (dy, dx)
-
-
-def _check_memory(
-    problems: Problems, shape: tuple[int, int], spacing: tuple[float, float], hurst: float
-) -> None:
-    """Note a problem where the torus does not fit into the memory of this machine."""
-    memory = physical_memory()
-    torus = torus_shape(shape, spacing, hurst)
-    needed = 8.0 * (0.5 * torus[0] * torus[1] + shape[0] * torus[1] + shape[0] * shape[1])
-    if needed > memory:
-        size = f"{torus[0]} x {torus[1]} points, {needed / 2**30:.3g} GiB"
-        problems.add("shape / spacing", f"a torus that fits into {memory / 2**30:.3g} GiB of memory", size)

@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 
 from fractalcontact.base.errors import UnreadableFile
-from fractalcontact.base.unpacked_size import require_unpacked, unpacked_limit
+from fractalcontact.base.memory import require_unpacked, unpacked_limit
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"

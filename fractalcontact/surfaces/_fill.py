@@ -38,6 +38,7 @@ def _check(problems: Problems, *, surface: Any, at_most: Any) -> None:
     references=BRIGGS,
     achieved_error="unknown: nothing was measured at the filled points",
     check=_check,
+    memory=104.0,
 )
 def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # noqa: ARG001 (used by _check)
     """Fill small gaps (NaN) with the smoothest surface through the points around them.

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
-from fractalcontact.base.process import physical_memory
 from fractalcontact.base.validation import LARGEST_INTEGER, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -58,16 +58,14 @@ def check_plane(
     if valid_shape:
         is_count = is_real(members) and 0 < members <= LARGEST_INTEGER
         count = members if is_count else 1  # `check_ensemble` tells any other
-        valid_shape = check_memory(problems, "shape", (count, *axis_sizes(shape)))
+        check_memory(problems.where, (count, *axis_sizes(shape)))
     return check_spacing(problems, spacing, axes) and valid_shape
 
 
-def check_memory(problems: Problems, argument: str, sizes: Sequence[int]) -> bool:
-    """Check that heights of these sizes, and the work arrays of the same size, fit into memory."""
-    memory, needed = physical_memory(), COPIES * 8.0 * math.prod(float(size) for size in sizes)
-    expected = f"an array that fits into {memory / 2**30:.3g} GiB of memory"
-    got = f"{' x '.join(f'{size:g}' for size in sizes if size != 1)} points, {needed / 2**30:.3g} GiB"
-    return problems.require(needed <= memory, argument, expected, got)
+def check_memory(where: str, sizes: Sequence[int]) -> None:
+    """Raise `TooLittleMemory` unless heights of these sizes, and a work array like them, may be taken."""
+    shape = " x ".join(f"{size:g}" for size in sizes if size != 1)
+    require_memory(where, COPIES * 8.0 * math.prod(float(size) for size in sizes), f"{shape} points")
 
 
 def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ def _check(problems: Problems, *, surface: Any, order: Any) -> None:
     problems.integer("order", order, at_least=0, at_most=2)
 
 
-@public_result(title="Levelled surface", achieved_error="exact to rounding", check=_check)
+@public_result(title="Levelled surface", achieved_error="exact to rounding", check=_check, memory=34.0)
 def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
     """Remove the mean, the mean plane or the mean quadric.
 

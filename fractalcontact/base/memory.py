@@ -1,0 +1,197 @@
+"""How many bytes this process may take, and what a call of a public function needs.
+
+The least of these counts: the limits of the process (`ulimit -v`, `ulimit -d`), those of its control groups
+(version 1 or 2: a container, a job of a cluster) and the free memory of the machine. Pages of files that the
+system keeps in memory count as free, for they are given up at need.
+
+A public function declares its peak (`public_result(memory=...)`) in bytes for each cell of its largest array,
+or as a function of the grid and the arguments. The numbers were measured as the growth of the resident
+memory of a process during a second call (tests/resources/test_memory.py repeats that).
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fractalcontact.base.errors import TooLittleMemory, UnreadableFile
+
+NEGLIGIBLE = 1 << 25  # bytes that a call takes without a look at the limits
+SMALL_FILE = 1 << 28  # bytes that any file may unpack to
+LIBRARIES = 5e8  # of the address space: the compiler and the threads, where they are not loaded yet
+PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
+
+
+class Free(NamedTuple):
+    """Bytes that may still be taken, and what sets that limit."""
+
+    size: float
+    limit: str
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The grid on which a call works: points along (y, x), whether both wrap around, number of planes."""
+
+    shape: tuple[int, int]
+    periodic: bool = False
+    planes: int = 1
+
+    @property
+    def cells(self) -> float:
+        """Number of cells of all planes."""
+        return float(math.prod(self.shape)) * self.planes
+
+
+# bytes for each cell, or a function of the grid and the arguments that returns bytes
+Estimate = float | Callable[[Plane, Mapping[str, Any]], float]
+
+
+def free_memory(root: Path = Path("/")) -> Free:
+    """Return how much memory this process may still take; `root` is that of the file system."""
+    limits = [_free_of_machine(root), *_free_of_process(root), *_free_of_groups(root)]
+    return min(limits, key=lambda free: free.size)
+
+
+def _free_of_machine(root: Path) -> Free:
+    """Return the free memory of the machine, all of it where the system does not say how much is free."""
+    lines = _numbers(root / "proc/meminfo")
+    if "MemAvailable" in lines:
+        return Free(1024.0 * (lines["MemAvailable"] + lines.get("SwapFree", 0)), "free memory of the machine")
+    try:
+        size = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        size = math.inf
+    return Free(size, "memory of the machine")
+
+
+def _free_of_process(root: Path) -> Iterator[Free]:
+    """Yield what the limits of the process leave (Linux)."""
+    status = _numbers(root / "proc/self/status")
+    if not status:
+        return
+    import resource
+
+    for limit, used, option in (("RLIMIT_AS", "VmSize", "-v"), ("RLIMIT_DATA", "VmData", "-d")):
+        most = resource.getrlimit(getattr(resource, limit))[0]
+        if most != resource.RLIM_INFINITY and used in status:
+            reserve = 0.0 if "numba" in sys.modules else LIBRARIES
+            left = max(0.0, most - 1024.0 * status[used] - reserve)
+            yield Free(left, f"limit of the process, ulimit {option} {most >> 10}")
+
+
+def _free_of_groups(root: Path) -> Iterator[Free]:
+    """Yield what the control groups of the process and those above them leave."""
+    mount = root / "sys/fs/cgroup"
+    for line in _lines(root / "proc/self/cgroup"):
+        folders: tuple[Path, ...]
+        controllers, _, path = line.partition(":")[2].partition(":")
+        if controllers == "":
+            folders, names = (mount, mount / "unified"), ("memory.max", "memory.current", "")
+        elif "memory" in controllers.split(","):
+            folders, names = (mount / "memory",), ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_")
+        else:
+            continue
+        for folder in folders:
+            group = folder / path.lstrip("/")
+            for place in (group, *group.parents):
+                if not place.is_relative_to(folder):
+                    break
+                free = _free_of_group(place, *names)
+                if free is not None:
+                    yield free
+
+
+def _free_of_group(folder: Path, limit: str, used: str, prefix: str) -> Free | None:
+    """Return what a control group leaves; None where it sets no limit."""
+    words = [" ".join(_lines(folder / name)).strip() for name in (limit, used)]
+    if not all(word.isdecimal() for word in words):
+        return None
+    most, taken = (float(word) for word in words)
+    pages = _numbers(folder / "memory.stat")
+    files = sum(pages.get(f"{prefix}{kind}_file", 0) for kind in ("active", "inactive"))
+    return Free(max(0.0, most - max(0.0, taken - files)), "limit of the control group (container or job)")
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return []
+
+
+def _numbers(path: Path) -> dict[str, int]:
+    """Return the whole numbers of a file of lines such as `VmSize:  1024 kB` by their names."""
+    pairs = (line.replace(":", " ").split()[:2] for line in _lines(path))
+    return {pair[0]: int(pair[1]) for pair in pairs if len(pair) == 2 and pair[1].isdecimal()}
+
+
+def in_words(size: float) -> str:
+    """Return a number of bytes with three digits."""
+    return f"{size / 2**20:.3g} MiB" if size < 2**30 else f"{size / 2**30:.3g} GiB"
+
+
+def require_memory(where: str, needed: float, what: str) -> None:
+    """Raise `TooLittleMemory` unless `needed` bytes may be taken."""
+    if needed <= NEGLIGIBLE:
+        return
+    free = free_memory()
+    if not needed <= free.size:
+        expected = f"at most {in_words(free.size)} ({free.limit})"
+        raise TooLittleMemory(where, [f"memory: expected {expected}, got {what}: about {in_words(needed)}"])
+
+
+def peak_of(estimate: Estimate, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes that a call takes at its peak beyond its arguments; these have passed their check."""
+    return bytes_on(estimate, plane_in(arguments) or Plane((0, 0)), arguments)
+
+
+def plane_in(arguments: Mapping[str, Any]) -> Plane | None:
+    """Return the grid of the array that a call is given; None without one in memory."""
+    return next((plane_of(arguments[name]) for name in PLANES if name in arguments), None)
+
+
+def bytes_on(estimate: Estimate, plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of an estimate on a grid; planes are worked on one by one, and 8 bytes a cell kept."""
+    if callable(estimate):
+        return float(estimate(plane, arguments))
+    return estimate * math.prod(plane.shape) + 8.0 * (plane.planes - 1) * math.prod(plane.shape)
+
+
+def map_bytes(name: str) -> float:
+    """Return the bytes of a cell of a map with a name of the schema."""
+    return {"state": 1.0, "slip_state": 1.0, "label": 4.0}.get(name, 8.0)
+
+
+def plane_of(value: Any) -> Plane | None:
+    """Return the grid of an array in memory, of a labelled one or of a crack; None for anything else."""
+    layout = getattr(value, "layout", None)
+    if layout is not None:
+        return Plane(tuple(layout.cells), all(layout.periodic))
+    shape = getattr(value, "shape", None)
+    if not isinstance(shape, tuple) or not shape or getattr(value, "chunks", None) is not None:
+        return None
+    coords = getattr(value, "coords", None)
+    periodic = coords is not None and all(
+        dim in coords and "period" in coords.variables[dim].attrs for dim in ("y", "x")
+    )
+    sizes = (1, *shape)[-2:]
+    return Plane((int(sizes[0]), int(sizes[1])), periodic, math.prod(shape[:-2]))
+
+
+def unpacked_limit(size: int, ratio: int) -> int:
+    """Return the number of bytes that a file of this size may unpack to."""
+    return max(SMALL_FILE, ratio * size)
+
+
+def require_unpacked(where: str, name: str, unpacked: int, limit: int) -> None:
+    """Raise `UnreadableFile` if the bytes that a file unpacks to exceed its limit, or what is free."""
+    if unpacked > limit:
+        expected = f"at most {limit / 2**20:.0f} MiB when unpacked, for its size"
+        raise UnreadableFile(where, [f"path: {name!r}: expected {expected}, got {unpacked / 2**20:.0f} MiB"])
+    require_memory(where, unpacked, f"{name!r} when unpacked")

@@ -1,0 +1,126 @@
+"""Memory of a study: the peak of each of its stages, known before any of them runs.
+
+At its peak a stage holds the libraries loaded so far, the surfaces, the maps that earlier stages keep, and
+what the call of its public function takes (see `base.memory`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memory
+from fractalcontact.scenes._autotune import PERIODIC
+from fractalcontact.scenes._inputs import (
+    contact_options,
+    crack_options,
+    generator_options,
+    joint_options,
+    slip_options,
+    surface_grid,
+)
+from fractalcontact.scenes._scene import LOADS, Scene
+from fractalcontact.scenes._stages import FIGURES, PART_SIZE, PARTIAL_SLIP, public_function
+
+if TYPE_CHECKING:
+    from fractalcontact.scenes._plan import Stage
+
+# bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
+STARTED = 1.2e8
+COMPILER = 6.0e7  # with the first of these subpackages; each adds its kernels
+KERNELS = {"dimensions": 0.0, "contact": 4.0e7, "joints": 4.0e7, "domains": 2.0e7}
+DRAWING = 1.1e8
+READ = 24.0  # bytes for each point of a file while it is read
+
+
+def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
+    """Return the peak memory of each stage in bytes; nothing where the surface cannot be read."""
+    try:
+        (ny, nx), spacing = surface_grid(scene)
+    except InvalidInput:
+        return {}
+    surface = Plane((ny, nx), scene.surface.generate in PERIODIC)
+    edges = crack_options(scene).get("block")
+    cells = np.rint(np.broadcast_to(edges, 2) / np.asarray(spacing)) if edges is not None else (ny, nx)
+    block = Plane((int(cells[0]), int(cells[1])))
+    held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
+    loaded: set[str] = set()
+    peaks = {}
+    for stage in stages:
+        loaded.add("contact" if stage.name == PARTIAL_SLIP else stage.name.partition("/")[0])
+        libraries = _libraries(loaded)
+        if stage.name == FIGURES:
+            peaks[stage.name] = libraries + held + 24.0 * surface.cells
+            continue
+        on_surface = stage.row.takes_surface or not stage.name.startswith("joints/")
+        on_surface = on_surface and not (stage.reads_map and not scene.is_pressed)
+        plane = surface if on_surface else block
+        if stage.name == "surfaces":
+            peaks[stage.name] = libraries + max(held, _surface_memory(scene, surface))
+            continue
+        options = _options(scene, stage)
+        steps, shears = _count(options, LOADS), _count(options, ("shear",))
+        section = steps if "hardness" in options else min(steps, max(1, int(PART_SIZE // plane.cells)))
+        planes = section if stage.reads_part else steps * shears if stage.reads_map else 1
+        call = _with_steps(options, section) | {"keep": stage.keep}
+        estimate = public_function(stage.row.function).memory  # type: ignore[attr-defined]
+        working = bytes_on(estimate, Plane(plane.shape, plane.periodic, planes), call)
+        maps = sum(map(map_bytes, stage.keep)) * plane.cells * steps * shears
+        peaks[stage.name] = libraries + held + max(working, 2.0 * maps)
+        held += maps
+    return peaks
+
+
+def check_memory(scene: Scene, stages: Sequence[Stage], workers: int = 0) -> None:
+    """Raise `TooLittleMemory` unless the stage that needs most fits, in each of several processes."""
+    peaks = stage_memory(scene, stages)
+    if not peaks:
+        return
+    name = max(peaks, key=lambda stage: peaks[stage])
+    processes = max(1, workers)
+    needed = peaks[name] * processes - STARTED  # that this process has taken
+    shared = f" in {processes} processes" if processes > 1 else ""
+    require_memory("fractalcontact.scenes.run", needed, f"the stage {name}{shared}")
+
+
+def _libraries(loaded: set[str]) -> float:
+    """Return the bytes of the libraries and kernels of these subpackages."""
+    names = loaded & set(KERNELS) - ({"contact"} if "joints" in loaded else set())  # joints use the same
+    compiled = COMPILER + sum(KERNELS[name] for name in names) if names else 0.0
+    return STARTED + compiled + (DRAWING if FIGURES in loaded else 0.0)
+
+
+def _surface_memory(scene: Scene, plane: Plane) -> float:
+    """Return the bytes of making or reading the surface."""
+    table = scene.surface
+    if table.generate is None:
+        return READ * plane.cells
+    function = public_function(f"surfaces.{table.generate}")
+    arguments = {"members": None} | generator_options(table)
+    return bytes_on(function.memory, plane, arguments)  # type: ignore[attr-defined]
+
+
+def _options(scene: Scene, stage: Stage) -> dict[str, Any]:
+    """Return the arguments that the scene gives to the call of a stage."""
+    if stage.name == "contact":
+        return contact_options(scene)
+    if stage.name == PARTIAL_SLIP:
+        return slip_options(scene)
+    if stage.name.startswith("joints/") and stage.name != "joints/faces":
+        return joint_options(scene, stage.name.partition("/")[2])
+    return scene.stage_options(stage.row)
+
+
+def _count(options: dict[str, Any], names: Sequence[str]) -> int:
+    """Return the number of values of the first of these arguments that is given; 1 without any."""
+    given = next((options[name] for name in names if options.get(name) is not None), None)
+    return max(1, int(np.size(given))) if given is not None else 1
+
+
+def _with_steps(options: dict[str, Any], steps: int) -> dict[str, Any]:
+    """Return the arguments with one section of the load path, at one shear: those of a part."""
+    cut = {name: options[name][:steps] for name in LOADS if isinstance(options.get(name), list)}
+    return options | cut | ({"shear": [0.0]} if "shear" in options else {})
