@@ -30,7 +30,7 @@ from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import PARTIAL_SLIP
 
 if TYPE_CHECKING:
-    from fractalcontact.scenes._plan import Stage
+    from fractalcontact.scenes._stages import Stage
 
 FOLDER = ".stages"
 _HEADER = "header"

@@ -7,7 +7,7 @@ what the call of its public function takes (see `base.memory`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,16 +23,13 @@ from fractalcontact.scenes._inputs import (
     surface_grid,
 )
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stages import FIGURES, PART_SIZE, PARTIAL_SLIP, public_function
-
-if TYPE_CHECKING:
-    from fractalcontact.scenes._plan import Stage
+from fractalcontact.scenes._stages import FIGURES, PART_SIZE, PARTIAL_SLIP, Stage, public_function
 
 # bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
 STARTED = 1.2e8
 COMPILER = 6.0e7  # with the first of these subpackages; each adds its kernels
-KERNELS = {"dimensions": 0.0, "contact": 4.0e7, "joints": 4.0e7, "domains": 2.0e7}
-DRAWING = 1.1e8
+KERNELS = {"dimensions": 5.0e7, "contact": 6.0e7, "joints": 6.0e7, "domains": 2.0e7}
+DRAWING = 9.0e7
 READ = 24.0  # bytes for each point of a file while it is read
 
 

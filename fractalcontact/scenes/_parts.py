@@ -30,9 +30,14 @@ from fractalcontact.scenes._inputs import (
     read_surface,
     slip_options,
 )
-from fractalcontact.scenes._plan import Stage
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stages import CONTACT_MAPS, PART_SIZE, PARTIAL_SLIP, public_function
+from fractalcontact.scenes._stages import (
+    CONTACT_MAPS,
+    PART_SIZE,
+    PARTIAL_SLIP,
+    Stage,
+    public_function,
+)
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack

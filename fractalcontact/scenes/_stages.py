@@ -196,6 +196,49 @@ WANTED: Mapping[str, tuple[str, ...]] = {
 }
 
 
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a plan.
+
+    Attributes
+    ----------
+    name : str
+        Group of its result, "joints/closure" for example.
+    needs : tuple of str
+        Stages that run before it.
+    reason : str
+        Why the plan has it.
+    keep : tuple of str
+        Maps that it has to return.
+    stored : bool
+        False where the result file does not contain it.
+    whole_path : bool
+        Whether it reads the maps of all steps at once.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    reason: str
+    keep: tuple[str, ...] = ()
+    stored: bool = True
+    whole_path: bool = False
+
+    @property
+    def row(self) -> StageType:
+        """Its row in the table of stages."""
+        return STAGES[self.name]
+
+    @property
+    def reads_map(self) -> bool:
+        """Whether it reads a map of the stage it needs."""
+        return self.name != FIGURES and bool(self.row.reads)
+
+    @property
+    def reads_part(self) -> bool:
+        """Whether it reads that map plane by plane, so that the map does not have to be kept."""
+        return self.reads_map and not self.whole_path
+
+
 def public_function(name: str) -> Callable[..., Any]:
     """Return a public function by the name under which users call it, "contact.press" for example."""
     subpackage, _, function = name.partition(".")

@@ -19,9 +19,9 @@ from fractalcontact.scenes._parts import (
     stage_work,
     without,
 )
-from fractalcontact.scenes._plan import Stage, stages_of, stored_maps
+from fractalcontact.scenes._plan import stages_of, stored_maps
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._stages import FIGURES
+from fractalcontact.scenes._stages import FIGURES, Stage
 
 
 @dataclass(frozen=True, repr=False)

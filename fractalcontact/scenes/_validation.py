@@ -33,7 +33,7 @@ from fractalcontact.scenes._inputs import (
 )
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._parts import map_reader
-from fractalcontact.scenes._plan import Stage, stages_of
+from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
@@ -45,6 +45,7 @@ from fractalcontact.scenes._stages import (
     PRESS,
     STAGES,
     WANTED,
+    Stage,
     arguments_of,
     public_function,
 )

@@ -22,6 +22,7 @@ def subclasses(base):
 
 ARGUMENTS = {  # the others take a message
     InvalidInput: ("somewhere", ["young: expected a number > 0, got -3", "poisson: missing"]),
+    errors.TooLittleMemory: ("somewhere", ["memory: expected at most 1 GiB"]),
     UnreadableFile: ("faces.xyz", ["no heights"]),
     MissingExtra: ("a study on several workers", "dask.distributed", "dask"),
 }
