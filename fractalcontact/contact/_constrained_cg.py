@@ -91,6 +91,7 @@ ADMIT_RATIO = 0.4  # error outside over error inside from which nodes are admitt
 FEW = 0.003  # share of the free set that is always admitted
 SLIGHT_CHANGE = 0.001  # share of the free set that may change without loss of the conjugacy
 MAX_ITERATIONS = 2000
+MAX_TRANSFORMS = 1500  # pairs of one run: ten times those of hard problems, a minute at n = 512
 PATIENCE = 40  # iterations without progress
 SMALLEST_FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 MAX_HALVINGS = 20
@@ -214,7 +215,7 @@ class ConstrainedCG:
         """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement."""
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
-        while iteration <= MAX_ITERATIONS:
+        while iteration <= MAX_ITERATIONS and self.transforms() <= MAX_TRANSFORMS:
             evaluation = self.evaluate()  # (1)
             if self.overshot(evaluation, progress):
                 self.backtrack()
@@ -243,18 +244,21 @@ class ConstrainedCG:
             self.update_displacement()
             evaluation = self.evaluate()
             residual = self.kkt_residual(evaluation)[2]
-        transforms = self.operator.transforms + self.preconditioner.transforms - self.transforms_before
         return Solution(
             self.p,
             self.u,
             evaluation.closure,
             evaluation.force,
             iteration,
-            transforms,
+            self.transforms(),
             residual,
             reason,
             evaluation.work,
         )
+
+    def transforms(self) -> int:
+        """Return the pairs of transforms of this run so far."""
+        return self.operator.transforms + self.preconditioner.transforms - self.transforms_before
 
     # start
 

@@ -90,7 +90,10 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     solver = PERIODIC_BYTES if periodic else FREE_BYTES
     solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
     maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
-    return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
+    at_once = min(plane.planes, thread_count()) * math.prod(plane.shape)
+    return at_once * max(solver, RESULT_BYTES) + 2.0 * maps * plane.cells if plane.planes > 1 else (
+        plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
+    )
 
 
 @public_result(title="Elastic contact of a rough surface", check=_check, memory=_memory)
@@ -420,9 +423,11 @@ def _warn(result: xr.Dataset) -> None:
     failed = np.argwhere(~converged.values)
     if len(failed):
         words = list(STOP_REASONS)
-        why, residual = (result.variables[name].values for name in ("stop_reason", "residual"))
+        names = ("stop_reason", "residual", "transforms")
+        why, residual, work = (result.variables[name].values for name in names)
         reasons = ", ".join(
-            f"{_place(converged.dims, at)}: {words[why[tuple(at)]]} (residual {residual[tuple(at)]:.2g})"
+            f"{_place(converged.dims, at)}: {words[why[tuple(at)]]} after {work[tuple(at)]} pairs of "
+            f"transforms (residual {residual[tuple(at)]:.2g})"
             for at in failed[:5]
         )
         more = f" and {len(failed) - 5} more" if len(failed) > 5 else ""

@@ -37,6 +37,7 @@ FIRST_NODES = 256  # candidates of a first step under force control
 MAX_WINDOW_SHARE = 0.75  # of the extent; a larger window is not worth having
 CANDIDATE_TOLERANCE = 1e-2  # residual at which the closure is accurate enough to verify the candidates
 ROUNDING_SHARE = 1e-13  # of the greatest pressure: less is rounding
+OVERLAP_KEPT = 1e3  # overlap of yielded nodes over the greatest displacement; more changes no other node
 LEAST_CLOSURE = 1e-100  # scaled: above the gap of the nodes where a surface is flat
 CLOSURE_MARGIN = 1.1  # candidates for this much more than the expected closure
 
@@ -71,6 +72,8 @@ class WindowSolver:
             solution = self.solve_in_window(control, WHOLE_PLANE, self.extrapolated_pressure(control))
         else:
             solution = self.solve_on_nodes(control) or self.solve_on_window(control)
+        if solution.reason in ("rounding", "stagnated"):
+            solution = self.solve_from_the_closure(control, solution)
         solution = self.remove_rounding_pressure(solution)
         past = PastStep(control.value, solution.closure, solution.pressure)
         self.past_steps = [*self.past_steps[-1:], past]
@@ -81,6 +84,29 @@ class WindowSolver:
         self.problem = replace(self.problem, gap=gap)
         self._sorted_gap, self._window = None, None
         self._systems = {}
+
+    def solve_from_the_closure(self, control: Control, rough: Solution) -> Solution:
+        """Go on with gaps that count from the closure, which have more digits; return the better solution.
+
+        A spike that yields, or one far above a plane, is higher than the bodies deform by up to ten orders of
+        magnitude, and the gaps of the other nodes, counted from its top, lose as many digits. The overlap of
+        nodes that stay yielded does not matter, and would take the digits of the objective: it is cut off.
+        """
+        reach = OVERLAP_KEPT * float(np.abs(rough.displacement).max())
+        yielded = rough.pressure >= self.problem.p_max
+        gap = self.problem.gap - rough.closure
+        is_cut = yielded & (gap < -reach)
+        gap[is_cut] = -reach
+        system = ContactSystem.on_plane(
+            replace(self.problem, gap=gap), np.float64, self.problem.local_compliance
+        )
+        shifted = control if control.closure is None else Control(closure=control.closure - rough.closure)
+        fine = ConstrainedCG(system, shifted, rough.pressure).solve(self.tolerance)
+        self.add_work(fine)
+        stays = (fine.pressure[is_cut] >= self.problem.p_max).all()
+        if not (stays and fine.residual < rough.residual):
+            return rough
+        return replace(fine, closure=fine.closure + rough.closure)
 
     def remove_rounding_pressure(self, solution: Solution) -> Solution:
         """Unload the open nodes that bear no more than rounding, which an extrapolation may have left."""

@@ -45,8 +45,9 @@ from fractalcontact.dimensions._surface_input import (
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-# bytes of a point at the peak of a method: of maximum likelihood on a torus or a rectangle, and of others
-PERIODIC_BYTES, FREE_BYTES = 97.0, 156.0
+# bytes of a point at the peak of a method: of maximum likelihood on a torus, on a rectangle and, beyond a
+# million points, by blocks of modes (`_likelihood`); and of others
+PERIODIC_BYTES, FREE_BYTES, BLOCK_BYTES = 97.0, 156.0, 61.0
 METHOD_BYTES = {"variogram": 325.0, "increments": 16.0, "madogram": 16.0}
 
 _FIELDS = (
@@ -87,9 +88,10 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the method that takes most; surfaces are analysed one by one."""
     methods = arguments.get("methods")
-    default = PERIODIC_BYTES if plane.periodic else FREE_BYTES
+    points = math.prod(plane.shape)
+    default = BLOCK_BYTES if points > 1 << 20 else PERIODIC_BYTES if plane.periodic else FREE_BYTES
     most = max((METHOD_BYTES.get(name, default) for name in word_tuple(methods)), default=default)
-    return most * math.prod(plane.shape)
+    return most * points
 
 
 @public_result(
