@@ -57,7 +57,10 @@ PRESSURE_AS_HEIGHT = re.compile(r"recommended order .* nominal_pressure \(Z\), y
 def compliance():
     """Return a function that lists the findings of the CF checker for a flat file."""
     import warnings
+    from importlib.util import find_spec
 
+    if find_spec("compliance_checker") is None:
+        pytest.skip("could not import 'compliance_checker': the files are not checked against CF")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from compliance_checker.runner import CheckSuite

@@ -90,10 +90,10 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     solver = PERIODIC_BYTES if periodic else FREE_BYTES
     solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
     maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
-    at_once = min(plane.planes, thread_count()) * math.prod(plane.shape)
-    return at_once * max(solver, RESULT_BYTES) + 2.0 * maps * plane.cells if plane.planes > 1 else (
-        plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
-    )
+    if plane.planes == 1:
+        return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
+    at_once = min(plane.planes, thread_count()) * plane.cells / plane.planes
+    return at_once * solver + 2.0 * maps * plane.cells
 
 
 @public_result(title="Elastic contact of a rough surface", check=_check, memory=_memory)
