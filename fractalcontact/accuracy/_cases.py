@@ -303,6 +303,16 @@ _CALLS = (
         {FRACTION: (0.9998, 1.0), "contact.press.carried": 1.0},
     ),
     _call(
+        "spikes that yield on a plane",
+        "far higher than the plane is pressed in, hardness twice the pressure: the plane shares the rest",
+        inputs.yielded_spikes,
+        {
+            "contact.press.converged": 1.0,
+            "contact.press.yielded": 2.0,
+            "contact.press.plane_over_rest": 1.0,
+        },
+    ),
+    _call(
         "a very long path",
         "2000 steps between two loads: no drift, no more memory than the numbers kept",
         inputs.long_path,

@@ -205,6 +205,27 @@ def barely_hard_enough() -> xr.Dataset:
     return _numbers(contact_fraction=pressed["contact_fraction"].item(), carried=carried)
 
 
+def yielded_spikes() -> xr.Dataset:
+    """Return the nodes that yield under two spikes, and the force of the plane over what the spikes leave."""
+    heights = np.zeros((40, 40))
+    heights[5, 7] = heights[30, 22] = 1e-3
+    surface = surfaces.from_array(heights, 1e-4, periodic=True)
+    pressure = 1.0
+    pressed = contact.press(
+        surface,
+        contact_modulus=1e9,
+        nominal_pressure=pressure,
+        hardness=2.0 * pressure,
+        keep=("pressure", "state"),
+    )
+    plane = float(pressed["pressure"].values[0][heights == 0].sum())
+    return _numbers(
+        converged=float(pressed["converged"][0]),
+        yielded=float((pressed["state"] == 2).sum()),
+        plane_over_rest=plane / (pressure * (heights.size - 4.0)),
+    )
+
+
 def long_path() -> xr.Dataset:
     """Return how far closures drift over 2000 steps between two loads, and the bytes kept for each step."""
     path = np.tile([1e4, 1e5], 1000)
