@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
@@ -32,6 +33,8 @@ from fractalcontact.contact._superposition import (
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+# bytes of a node at the peak, of a periodic and of a free body: by superposition, and with both directions
+NORMAL_BYTES, FULL_BYTES = (126.0, 248.0), (176.0, 320.0)
 METHODS = ("superposition", "full")
 BELOW_SLIDING = 1e-6  # relative distance from sliding, where the full displacement grows without bound
 GREATEST_FRICTION = 1e3
@@ -96,10 +99,20 @@ def check_sliding(problems: Problems, path: Array, friction: float, normal_force
     return problems.require(abs(greatest) <= limit, "tangential_force", expected, greatest)
 
 
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the normal and the tangential solution, and of the maps."""
+    boundary = arguments.get("boundary")
+    periodic = plane.periodic if boundary is None else boundary == "periodic"
+    solver = (FULL_BYTES if arguments.get("method") == "full" else NORMAL_BYTES)[0 if periodic else 1]
+    maps = sum(map(map_bytes, word_tuple(arguments.get("keep"))))
+    return plane.cells * (solver + 2.0 * maps * float_array(arguments["tangential_force"]).size)
+
+
 @public_result(
     title="Partial slip of a rough contact",
     references="Ciavarella (1998), J. Appl. Mech. 65:998; Jaeger (1998), J. Appl. Mech. 65:1019",
     check=_check,
+    memory=_memory,
 )
 def partial_slip(
     surface: xr.DataArray,
