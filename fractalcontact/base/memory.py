@@ -146,13 +146,25 @@ def require_memory(where: str, needed: float, what: str) -> None:
         raise TooLittleMemory(where, [f"memory: expected {expected}, got {what}: about {in_words(needed)}"])
 
 
-def peak_of(estimate: Estimate, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes that a call takes at its peak beyond its arguments; these have passed their check."""
-    return bytes_on(estimate, plane_in(arguments) or Plane((0, 0)), arguments)
+def peak_of(estimate: Estimate, arguments: Mapping[str, Any], *, in_blocks: bool = False) -> float:
+    """Return the bytes that a call takes at its peak beyond its arguments; these have passed their check.
+
+    A dask array that is read in blocks does not count.
+    """
+    plane = None if in_blocks and loaded_bytes(arguments) else plane_in(arguments)
+    return bytes_on(estimate, plane or Plane((0, 0)), arguments)
+
+
+def loaded_bytes(arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the dask arrays among the arguments, once they are loaded."""
+    given = (arguments[name] for name in PLANES if name in arguments)
+    return sum(
+        8.0 * math.prod(getattr(value, "shape", ())) for value in given if getattr(value, "chunks", None)
+    )
 
 
 def plane_in(arguments: Mapping[str, Any]) -> Plane | None:
-    """Return the grid of the array that a call is given; None without one in memory."""
+    """Return the grid of the array that a call is given; None without one."""
     return next((plane_of(arguments[name]) for name in PLANES if name in arguments), None)
 
 
@@ -169,12 +181,12 @@ def map_bytes(name: str) -> float:
 
 
 def plane_of(value: Any) -> Plane | None:
-    """Return the grid of an array in memory, of a labelled one or of a crack; None for anything else."""
+    """Return the grid of an array, of a labelled one or of a crack; None for anything else."""
     layout = getattr(value, "layout", None)
     if layout is not None:
         return Plane(tuple(layout.cells), all(layout.periodic))
     shape = getattr(value, "shape", None)
-    if not isinstance(shape, tuple) or not shape or getattr(value, "chunks", None) is not None:
+    if not isinstance(shape, tuple) or not shape:
         return None
     coords = getattr(value, "coords", None)
     periodic = coords is not None and all(

@@ -30,7 +30,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, LoadedWarning, TooLittleMemory
-from fractalcontact.base.memory import Estimate, peak_of, plane_in, require_memory
+from fractalcontact.base.memory import Estimate, loaded_bytes, peak_of, plane_in, require_memory
 from fractalcontact.base.missing_numbers import give_reasons
 from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp
@@ -107,12 +107,15 @@ def public_result(
                 raise TypeError(f"{name}: {cause}{hint}") from None
             bound.apply_defaults()
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
+            if not in_blocks:
+                require_memory(name, loaded_bytes(bound.arguments), _size_of(bound.arguments))
             with Problems(name, error) as problems:
                 checked_flags = check_flags(problems, signature, bound.arguments) - own_flags
                 if check is not None:
                     given = bound.arguments.items()
                     check(problems, **{key: value for key, value in given if key not in checked_flags})
-            require_memory(name, peak_of(memory, bound.arguments), _size_of(bound.arguments))
+            needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
+            require_memory(name, needed, _size_of(bound.arguments))
             return bound
 
         @wraps(function)

@@ -173,6 +173,8 @@ def test_scene_beyond_the_limit_is_refused_in_one_line_and_writes_nothing(tmp_pa
 
 def test_lazy_surface_needs_no_memory_for_the_whole_of_it():
     dask = pytest.importorskip("dask.array")
-    lazy = xr.DataArray(dask.zeros((10**6, 10**6), chunks=1000), dims=("y", "x"))
+    lazy = xr.DataArray(dask.zeros((10**6, 10**6), chunks=100_000), dims=("y", "x"))
     assert fc.surfaces.from_array(lazy.data, 1e-4).shape == (10**6, 10**6)
     assert np.prod(lazy.shape) * 8 > free_memory().size
+    with pytest.raises(TooLittleMemory, match="1000000 x 1000000 points"):  # which loads its surface
+        fc.surfaces.level(fc.surfaces.from_array(lazy.data, 1e-4))

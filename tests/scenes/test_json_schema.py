@@ -5,12 +5,13 @@ import json
 import tomllib
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.cli import main
+
+jsonschema = pytest.importorskip("jsonschema")
 
 DATASETS = Path(__file__).resolve().parents[2] / "datasets"
 SHIPPED = sorted(path.stem for path in DATASETS.glob("*.toml"))
