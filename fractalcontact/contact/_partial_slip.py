@@ -105,7 +105,7 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     periodic = plane.periodic if boundary is None else boundary == "periodic"
     solver = (FULL_BYTES if arguments.get("method") == "full" else NORMAL_BYTES)[0 if periodic else 1]
     maps = sum(map(map_bytes, word_tuple(arguments.get("keep"))))
-    return plane.cells * (solver + 2.0 * maps * float_array(arguments["tangential_force"]).size)
+    return plane.cells * (solver + 2.0 * maps * np.size(arguments.get("tangential_force", 0.0)))
 
 
 @public_result(

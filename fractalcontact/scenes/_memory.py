@@ -23,7 +23,14 @@ from fractalcontact.scenes._inputs import (
     surface_grid,
 )
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stages import FIGURES, PART_SIZE, PARTIAL_SLIP, Stage, public_function
+from fractalcontact.scenes._stages import (
+    FIGURES,
+    PART_SIZE,
+    PARTIAL_SLIP,
+    Stage,
+    arguments_of,
+    public_function,
+)
 
 # bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
 STARTED = 1.2e8
@@ -34,12 +41,15 @@ READ = 24.0  # bytes for each point of a file while it is read
 
 
 def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
-    """Return the peak memory of each stage in bytes; nothing where the surface cannot be read."""
+    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
+    generator = scene.surface.generate
+    if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
+        return {}
     try:
         (ny, nx), spacing = surface_grid(scene)
     except InvalidInput:
         return {}
-    surface = Plane((ny, nx), scene.surface.generate in PERIODIC)
+    surface = Plane((ny, nx), generator in PERIODIC)
     edges = crack_options(scene).get("block")
     cells = np.rint(np.broadcast_to(edges, 2) / np.asarray(spacing)) if edges is not None else (ny, nx)
     block = Plane((int(cells[0]), int(cells[1])))

@@ -75,6 +75,8 @@ def run(
     ------
     InvalidInput
         Lists all problems of the scene, its surfaces and the folder, before anything is computed.
+    TooLittleMemory
+        A stage needs more memory than this process may take; `plan` states how much.
     Stopped
         A `KeyboardInterrupt`: with `out`, SIGINT or SIGTERM finishes the current part. Finished results are
         written to `partial.nc`, and the same call resumes. A second signal, half a second later or more,
@@ -92,8 +94,7 @@ def run(
     _check_workers(workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
-        if workers > 1:
-            check_memory(scene, stages_of(scene), workers)
+        check_memory(scene, stages_of(scene), workers)
         return _run(scene, out, progress, workers_of(processes if client is None else client), start)
 
 

@@ -31,7 +31,6 @@ from fractalcontact.scenes._inputs import (
     slip_options,
     spacing_of,
 )
-from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._parts import map_reader
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
@@ -80,8 +79,6 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     ------
     InvalidInput
         Lists all problems of the tables, the surfaces, the block, the material and the loads together.
-    TooLittleMemory
-        A stage needs more memory than this process may take.
 
     Examples
     --------
@@ -101,7 +98,6 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
             scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
         _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
-    check_memory(scene, stages_of(scene))
     warn(implausible_input(scene, surfaces["surface"]))
     return scene
 
@@ -115,7 +111,7 @@ def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
     try:
         yield
     except TooLittleMemory:
-        pass  # `check_memory` adds what the study holds beside the call
+        pass  # the plan states it, and `run` refuses it with what the study holds beside the call
     except InvalidInput as error:
         for line in error.problems:
             argument = line.partition(":")[0].partition(".")[0]
