@@ -31,6 +31,7 @@ REASONS = {
     **dict.fromkeys(("hurst", "standard_error"), _FLAT),
     **dict.fromkeys(("covering_area", "cube_count", "roughness", "madogram", "variogram"), _HEIGHTS),
     **dict.fromkeys(("second_variogram", "variation"), _HEIGHTS),
+    **dict.fromkeys(("fluctuation", "divider_length", "higuchi_length"), _HEIGHTS),
     **dict.fromkeys(("box_length", "radius_length"), _LENGTH),
     **dict.fromkeys(("area", "perimeter", "x_min", "x_max", "y_min", "y_max"), _AREA),
     **dict.fromkeys(("total_perimeter", "largest_island", "mean_island_area"), _AREA),

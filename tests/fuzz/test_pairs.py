@@ -16,7 +16,7 @@ from fractalcontact.base.errors import InvalidInput
 
 WRONG = ("object", "minus infinity", "word", "list of dicts")
 WRONG_IN_SCENES = (-1, "wrong word", [], {"a": 1})
-SHARE = 4  # of the pairs of a scene one in so many
+SHARE = 16  # of the pairs of a scene one in so many
 
 
 def problems_of(call):
