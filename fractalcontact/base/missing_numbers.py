@@ -33,8 +33,9 @@ REASONS = {
     **dict.fromkeys(("second_variogram", "variation"), _HEIGHTS),
     **dict.fromkeys(("fluctuation", "divider_length", "higuchi_length"), _HEIGHTS),
     **dict.fromkeys(("box_length", "radius_length"), _LENGTH),
-    **dict.fromkeys(("area", "perimeter", "x_min", "x_max", "y_min", "y_max"), _AREA),
+    **dict.fromkeys(("area", "length", "perimeter", "x_min", "x_max", "y_min", "y_max"), _AREA),
     **dict.fromkeys(("total_perimeter", "largest_island", "mean_island_area"), _AREA),
+    **dict.fromkeys(("largest_length", "mean_island_length"), _AREA),
     **dict.fromkeys(("null_dimension", "null_spread", "mean_mass", "null_mass"), _EMPTY),
     **dict.fromkeys(("minkowski_null_dimension", "correlation_null_dimension"), _EMPTY),
     **dict.fromkeys(

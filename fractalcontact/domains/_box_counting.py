@@ -20,7 +20,7 @@ from fractalcontact.domains._mask_input import (
     build_dataset,
     check_box_sizes,
     check_mask,
-    plane_shape,
+    mask_sides,
     read_box_sizes,
     read_planes,
 )
@@ -63,8 +63,8 @@ def _check_boxes(
     problems: Problems, mask: Any, argument: str, sizes: Any, cover: Any, periodic: Any, valid: Any
 ) -> None:
     problems.choice("cover", cover, COVERS)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-    shape = plane_shape(mask)
+    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
+    shape = mask_sides(mask)
     check_box_sizes(problems, argument, sizes, _longest_box(shape, cover))
 
 
@@ -86,7 +86,7 @@ def box_dimension(
 
     Parameters
     ----------
-    mask : DataArray, dims (..., y, x)
+    mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     scales : sequence of int, optional
         Edges of the boxes in cells, for a least-squares slope of ln N over ln s. By default the sizes are
@@ -99,7 +99,7 @@ def box_dimension(
         grid that starts at the first cell. The default fit combines the first two.
     periodic : bool, optional
         Whether boxes wrap around the edges; by default along periodic axes. True needs periodic axes.
-    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+    valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells; counts are divided by the share of the boxes' area that was observed.
 
     Returns
@@ -118,9 +118,9 @@ def box_dimension(
 
     Notes
     -----
-    0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask; NaN for an empty one, with
-    the reason in `comment`. Over the full range of scales the counts of any set measure little but its
-    coverage: compare with the null. Fit and interval: see the documentation,
+    0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask (1 of a profile); NaN for an
+    empty one, with the reason in `comment`. Over the full range of scales the counts of any set measure
+    little but its coverage: compare with the null. Fit and interval: see the documentation,
     "Theory: contact domains".
 
     Examples
@@ -175,7 +175,7 @@ def box_counts(
     [64, 16, 4]
     """
     planes = read_planes(mask, valid=valid, periodic=periodic)
-    every = np.arange(1, max(1, min(planes.grid.shape) // 2) + 1)
+    every = np.arange(1, max(1, min(planes.sides) // 2) + 1)
     box_sizes = read_box_sizes(sizes, every)
     curve = cover_curve(planes, box_sizes, cover)
     variables = {
@@ -188,7 +188,7 @@ def box_counts(
 
 def analyse(planes: Planes, *, scales: Any = None, cover: str = "minimum") -> xr.Dataset:
     """Return the result of `box_dimension` for planes, without labels."""
-    shape = planes.grid.shape
+    shape = planes.sides
     default = longer_sizes(shape)
     sizes = read_box_sizes(scales, default[default <= _longest_box(shape, cover)])
     by_regression = scales is not None
@@ -245,12 +245,12 @@ def _fit(planes: Planes, sizes: Array, curve: Curve, cover: str, *, by_regressio
         steady = curve
     else:
         other = curve
-        if cover != "aligned" and 2 * sizes.max() <= min(planes.grid.shape):
+        if cover != "aligned" and 2 * sizes.max() <= min(planes.sides):
             other = cover_curve(planes, sizes, "mean" if cover == "minimum" else "minimum")
         steady, mean = (other, curve) if cover == "mean" else (curve, other)
         pairs, windows = [], []
         for cells, area, mean_area in zip(planes.cells, steady.area, mean.area, strict=True):
-            window = steadiest_window(sizes, area, _longest_edge(cells) / 4.0, planes.grid.shape)
+            window = steadiest_window(sizes, area, _longest_edge(cells) / 4.0, planes.sides)
             windows.append(window)
             if cover == "aligned":
                 fit = fit_steady_ratio(sizes[window], area[window])
@@ -303,7 +303,7 @@ def _null(planes: Planes, sizes: Array, windows: list[slice], *, by_regression: 
 
     The null is fitted in the window of its plane.
     """
-    shorter = min(planes.grid.shape)
+    shorter = min(planes.sides)
     small = np.array([size for size in _random_null.TESTED_SIZES if 2 * size <= shorter], np.int64)
     contents = _random_null.box_contents(planes, np.union1d(sizes, small))
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
@@ -311,16 +311,17 @@ def _null(planes: Planes, sizes: Array, windows: list[slice], *, by_regression: 
     for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
         by_size = contents[min(plane, len(contents) - 1)]
         boxes = [by_size[size] for size in sizes.tolist()]
-        null = _random_null.expected_counts(cells, observed, sizes, boxes)
+        null = _random_null.expected_counts(cells, observed, sizes**planes.rank, boxes)
         used, part = sizes[windows[plane]], null[windows[plane]]
         fit = fit_regression(used, part) if by_regression else fit_steady_ratio(used, part * used**2)
         has_value = np.isfinite(fit.dimension)
         deviation = np.nan
         if has_value:
-            deviation = _null_deviation(cells, observed, used, boxes[windows[plane]], part, fit)
+            rank = planes.rank
+            deviation = _null_deviation(cells, observed, used, boxes[windows[plane]], part, fit, rank)
         small_boxes = [by_size[size] for size in small.tolist()]
         differs = has_value and _random_null.differs_from_null(
-            cells, observed, small, mean[plane], small_boxes
+            cells, observed, small**planes.rank, mean[plane], small_boxes
         )
         counts.append(null)
         rows.append((fit.dimension, deviation, differs))
@@ -340,13 +341,14 @@ def _null_deviation(
     boxes: list[_random_null.BoxContents],
     null: Array,
     fit: Fit,
+    rank: int,
 ) -> float:
     """Return the standard deviation of the null's dimension; of many sizes a few dozen stand for all."""
     if sizes.size > MANY_SIZES:
         places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], SOME_SIZES)))
         sizes, null, boxes = sizes[places], null[places], [boxes[place] for place in places]
         fit = fit_regression(sizes, null)
-    return _random_null.fit_deviation(cells, observed, sizes, boxes, null, fit.weights)
+    return _random_null.fit_deviation(cells, observed, sizes**rank, boxes, null, fit.weights)
 
 
 def _notes(fits: list[WindowFit], sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:

@@ -2,13 +2,13 @@
 
 Two numbers are kept for every size. The count is of whole boxes. The measure, which the fit uses, counts a
 box cut by the edge of the mask by its part inside, where the set continues in the next box; a set that fills
-the mask then has n/s boxes along each axis and not the next integer.
+the mask then has n/s boxes along each axis and not the next integer. The boxes of a profile stand in a row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Curve:
 
     sizes: Array
     count: Array
-    area: Array  # of the boxes that meet the set, in cells
+    area: Array  # of the boxes that meet the set, in cells; of a profile, of the squares that stand on it
 
     @property
     def measure(self) -> Array:
@@ -38,15 +38,65 @@ def cover_curve(planes: Planes, sizes: Array, cover: str) -> Curve:
     The measure is divided by the share of the boxes' area that was observed, where the boxes are those that
     hold an observed cell; a set that fills what was observed then has the dimension 2.
     """
+    by_name: dict[str, Callable[[Planes, Array], Curve]]
     by_name = {"minimum": _minimum_cover, "mean": _mean_cover, "aligned": _aligned_cover}
+    if planes.rank == 1 and cover != "aligned":
+        by_name[cover] = _fewest_in_row if cover == "minimum" else _mean_in_row
     curve = by_name[cover](planes, sizes)
     if planes.valid is None:
         return curve
-    everything = Planes(planes.valid, None, planes.grid)
-    seen = by_name[cover](everything, sizes).area
+    everything = replace(planes, cells=planes.valid, valid=None)
+    seen = by_name[cover](everything, sizes).area / sizes.astype(float) ** (2 - planes.rank)
     return Curve(
         sizes, curve.count, curve.area * everything.occupied[:, None] / np.where(seen > 0, seen, np.nan)
     )
+
+
+def _fewest_in_row(planes: Planes, sizes: Array) -> Curve:
+    """Fewest boxes over all offsets, of profiles."""
+    (wraps,) = planes.periodic
+    pairs = [[_row_by_offset(row, size, wraps=wraps) for size in sizes.tolist()] for (row,) in planes.cells]
+    count, length = (
+        np.array([[pair[k].min() for pair in row] for row in pairs], np.int64).reshape(-1, sizes.size)
+        for k in (0, 1)
+    )
+    return Curve(sizes, count, length * sizes.astype(float))
+
+
+def _row_by_offset(row: Array, size: int, *, wraps: bool) -> tuple[Array, Array]:
+    """Return the boxes that meet the set in a row of cells, and their length in cells, for every offset."""
+    start, stop, before, after, offset = _bands(row.size, size, wraps).T
+    ahead = np.pad(row, (0, 2 * size if wraps else 0), mode="wrap")
+    total = np.insert(np.cumsum(ahead, dtype=np.int64), 0, 0)
+    here = total[stop] - total[start]
+    goes_on = total[after] - total[before] > here  # in the next box; only a cut band has neighbours
+    length = np.where(goes_on, stop - start, size)
+    is_met = here > 0
+    count, lengths = (np.bincount(offset, each, size) for each in (is_met, is_met * length))
+    return count.astype(np.int64), lengths.astype(np.int64)
+
+
+def _mean_in_row(planes: Planes, sizes: Array) -> Curve:
+    """Number of boxes averaged over all offsets, of profiles; see `_positions_that_meet`.
+
+    A box of s cells misses the set at g - s + 1 positions within a gap of g cells.
+    """
+    n, (wraps,) = planes.grid.shape[1], planes.periodic
+    every, folded = np.zeros((2, planes.count, sizes.size))
+    for k, (row,) in enumerate(planes.cells):
+        places = np.flatnonzero(row)
+        if places.size == 0:
+            continue
+        low, high = places[0], n - 1 - places[-1]
+        ends = [low + high] if wraps else [low, high]
+        gaps = np.bincount(np.append(np.diff(places) - 1, ends), minlength=int(sizes.max()) + 1)
+        missed = gaps[::-1].cumsum().cumsum()[::-1]
+        met = (n if wraps else n - sizes + 1) - missed[sizes]
+        hanging = [
+            0 * sizes if wraps else np.maximum(sizes - 1 - gap, 0) for gap in (low, high, min(low, high))
+        ]
+        every[k], folded[k] = met + hanging[0] + hanging[1], met + hanging[2]
+    return Curve(sizes, every / sizes, folded * sizes)
 
 
 def _minimum_cover(planes: Planes, sizes: Array) -> Curve:

@@ -25,6 +25,7 @@ MANY_ISLANDS = 2**22  # of a plane, above which only their cells are measured by
 INT64_MAX = np.iinfo(np.int64).max
 
 PLAIN_COLUMNS = ("cells", "area")
+PROFILE_COLUMNS = ("cells", "length", "centroid_x", "x_min", "x_max")
 COLUMNS = (*PLAIN_COLUMNS, "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
 
 
@@ -113,10 +114,12 @@ class Components:
         return bool(np.intersect1d(first, last).size)
 
 
-def check_connected(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
-    """Check a mask and the neighbours by which its cells are connected."""
+def check_connected(
+    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, profiles: bool = False
+) -> None:
+    """Check a mask, also of a profile where those are allowed, and the neighbours of its cells."""
     problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-    check_mask(problems, mask, valid=valid, periodic=periodic)
+    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=profiles)
 
 
 def label_planes(
@@ -213,8 +216,9 @@ def component_table(
     table: dict[str, Array] = {}
     if "cells" in columns:
         table["cells"] = size.astype(np.int64)
-    if "area" in columns:
-        table["area"] = size * grid.cell_area
+    for name in ("area", "length"):  # that of a cell of a profile is its length
+        if name in columns:
+            table[name] = size * grid.cell_area
     if components.details is None:
         return table
     dy, dx = grid.spacing

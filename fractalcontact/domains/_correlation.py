@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from fractalcontact.domains._mask_input import (
     build_dataset,
     check_box_sizes,
     check_mask,
-    plane_shape,
+    mask_sides,
     read_box_sizes,
     read_planes,
 )
@@ -31,8 +32,8 @@ SOURCE = (
 
 
 def _check(problems: Problems, *, mask: Any, scales: Any, periodic: Any, valid: Any) -> None:
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-    shape = plane_shape(mask)
+    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
+    shape = mask_sides(mask)
     check_box_sizes(problems, "scales", scales, min(shape))
 
 
@@ -46,20 +47,21 @@ def correlation_dimension(
 ) -> xr.Dataset:
     """Correlation dimension of a set of cells, from the pairs of cells at every distance.
 
-    The mean number of cells of the set in a square of edge s about one of them grows as s^D. Pairs are
+    The mean number of cells of the set in a square (of a profile, an interval) of edge s about one of them
+    grows as s^D. Pairs are
     counted by a Fourier transform. Each distance is corrected for the pairs that the edges of the plane and
     unobserved cells leave out.
 
     Parameters
     ----------
-    mask : DataArray, dims (..., y, x)
+    mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     scales : sequence of int, optional
         Edges of the squares in cells; by default the default sizes of `box_dimension`. A cell on the outline
         of a square of an even number of cells counts by its part inside.
     periodic : bool, optional
         Whether pairs wrap around the edges; by default along periodic axes. True needs periodic axes.
-    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+    valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells; only pairs of them count.
 
     Returns
@@ -77,9 +79,9 @@ def correlation_dimension(
 
     Notes
     -----
-    0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask; NaN for an empty one, with
-    the reason in `comment`. D_2 of `generalised_dimensions` is the same quantity from boxes on one grid.
-    Validation on sets of known dimension: see the documentation, "Theory: contact domains".
+    0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask (1 of a profile); NaN for an
+    empty one, with the reason in `comment`. D_2 of `generalised_dimensions` is the same quantity from boxes
+    on one grid. Validation on sets of known dimension: see the documentation, "Theory: contact domains".
 
     Examples
     --------
@@ -93,13 +95,11 @@ def correlation_dimension(
 
 def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:
     """Return the result of `correlation_dimension` for planes, without labels."""
-    sizes = read_box_sizes(scales, default_sizes(planes.grid.shape))
+    sizes = read_box_sizes(scales, default_sizes(planes.sides))
     # one plane at a time: the transform uses the threads
-    mass = np.array(
-        [mean_mass(cells, planes.valid_of(k), planes.grid, sizes) for k, cells in enumerate(planes.cells)]
-    )
+    mass = np.array([mean_mass(planes, k, sizes) for k in range(planes.count)])
     numbers = zip(planes.occupied, planes.observed, strict=True)
-    null = np.array([null_mass(cells, observed, sizes) for cells, observed in numbers])
+    null = np.array([null_mass(cells, observed, sizes**planes.rank) for cells, observed in numbers])
     dimension, half_width = fit_power_law(sizes, mass, 1.0)
     variables = {
         **dimension_variables(planes, "correlation_dimension", dimension, half_width, sizes),
@@ -115,42 +115,46 @@ def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:
     return build_dataset(planes, variables, coords, notes=notes)
 
 
-def mean_mass(cells: Array, valid: Array | None, grid: Grid, sizes: Array) -> Array:
+def mean_mass(planes: Planes, plane: int, sizes: Array) -> Array:
     """Return the mean number of cells of the set in the square of each size about one of them; (sizes,).
 
     Pairs of cells are counted by their distance along y and x. The number at each distance is corrected for
     the pairs that edges or unobserved cells leave out: pairs of the set over pairs observed (Ohser 1983). A
-    pair on the outline of a square of an even number of cells counts half. NaN for an empty plane.
+    pair on the outline of a square of an even number of cells counts half. NaN for an empty plane. Pairs of
+    a profile have no distance along y.
     """
+    cells, valid = planes.cells[plane], planes.valid_of(plane)
     mass = int(np.count_nonzero(cells))
     if mass == 0:
         return np.full(sizes.size, np.nan)
     reach = int(sizes.max()) // 2
+    reaches = (reach if planes.rank == 2 else 0, reach)
     observed = np.ones_like(cells) if valid is None else valid
-    pairs, observed_pairs = (_count_pairs(plane, grid, reach) for plane in (cells, observed))
+    pairs, observed_pairs = (_count_pairs(each, planes.grid, reaches) for each in (cells, observed))
     share = np.where(observed_pairs > 0, pairs / np.maximum(observed_pairs, 1.0), 0.0)
     share = share * (np.count_nonzero(observed) / mass)
-    lags = np.abs(np.arange(-reach, reach + 1))
-    weight = np.clip((sizes[:, None] + 1) / 2.0 - lags, 0.0, 1.0)
-    return np.asarray(np.einsum("si,ij,sj->s", weight, share, weight))
+    along_y, along_x = (
+        np.clip((sizes[:, None] + 1) / 2.0 - np.abs(np.arange(-r, r + 1)), 0.0, 1.0) for r in reaches
+    )
+    return np.asarray(np.einsum("si,ij,sj->s", along_y, share, along_x))
 
 
-def _count_pairs(plane: Array, grid: Grid, reach: int) -> Array:
-    """Count pairs of cells up to `reach` apart along y and x, (2 reach + 1, 2 reach + 1)."""
+def _count_pairs(plane: Array, grid: Grid, reaches: Sequence[int]) -> Array:
+    """Count pairs of cells up to `reaches` apart along y and x; 2 reach + 1 distances along each."""
     shape = [
         n if wraps else fft.fast_length(n + reach)
-        for n, wraps in zip(plane.shape, grid.periodic, strict=True)
+        for n, reach, wraps in zip(plane.shape, reaches, grid.periodic, strict=True)
     ]
     padded = np.zeros(shape)
     padded[: plane.shape[0], : plane.shape[1]] = plane
     modes = fft.rfft2(padded)
     pairs = np.rint(fft.irfft2(modes * modes.conj(), (shape[0], shape[1]), overwrite=True))
-    lags = np.arange(-reach, reach + 1)
-    return np.asarray(pairs[np.ix_(lags % shape[0], lags % shape[1])])
+    lags = [np.arange(-reach, reach + 1) % n for reach, n in zip(reaches, shape, strict=True)]
+    return np.asarray(pairs[np.ix_(*lags)])
 
 
-def null_mass(cells: float, observed: float, sizes: Array) -> Array:
-    """Return the mean mass about a cell of the random null; see `mean_mass`."""
+def null_mass(cells: float, observed: float, areas: Array) -> Array:
+    """Return the mean mass of the random null in squares of these areas about a cell; see `mean_mass`."""
     if cells < 1:
-        return np.full(sizes.size, np.nan)
-    return np.asarray(1.0 + (sizes.astype(float) ** 2 - 1.0) * (cells - 1.0) / max(observed - 1.0, 1.0))
+        return np.full(areas.size, np.nan)
+    return np.asarray(1.0 + (areas.astype(float) - 1.0) * (cells - 1.0) / max(observed - 1.0, 1.0))

@@ -11,6 +11,7 @@ import xarray as xr
 from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
 from fractalcontact.domains import (
     _boundary,
     _box_counting,
@@ -31,6 +32,7 @@ ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
     "lacunarity": _lacunarity.analyse,
 }
 MEASURES = ("islands", "percolation", *ANALYSES)
+MEASURES_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension", "lacunarity")
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time")
 LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 
@@ -52,7 +54,13 @@ def sources(measures: Sequence[str]) -> str:
     return joined_references(*(_SOURCES[name] for name in measures if name in _SOURCES))
 
 
-@public_result(title="Description of a set", references=sources(MEASURES), check=check_connected)
+def _check(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
+    check_connected(
+        problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid, profiles=True
+    )
+
+
+@public_result(title="Description of a set", references=sources(MEASURES), check=_check)
 def describe(
     mask: xr.DataArray,
     *,
@@ -64,13 +72,13 @@ def describe(
 
     Parameters
     ----------
-    mask : DataArray, dims (..., y, x)
+    mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     connectivity : {1, 2}
         1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
     periodic : bool, optional
         Whether the set continues across the edges; by default along periodic axes. True needs periodic axes.
-    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+    valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells.
 
     Returns
@@ -83,7 +91,8 @@ def describe(
         `correlation_dimension`, `boundary_dimension`; each dimension with its interval (`_low`, `_high`);
         `minkowski_null_dimension`, `correlation_null_dimension` of the random null; `boundary_sides`;
         `lacunarity` and `null_lacunarity` at the `box_size` of 8 cells, or of the shorter side if that is
-        less; `lacunarity_slope`, `lacunarity_area` and those of the null (see `lacunarity`).
+        less; `lacunarity_slope`, `lacunarity_area` and those of the null (see `lacunarity`). Of a profile,
+        what is defined on a line: islands by length, box and correlation dimension, lacunarity.
 
     Raises
     ------
@@ -100,15 +109,17 @@ def describe(
     """
     planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
-    measurements = measure_planes(planes, MEASURES, components, connectivity)
-    size = min(LACUNARITY_BOX, *planes.grid.shape)
+    wanted = MEASURES if planes.rank == 2 else MEASURES_OF_PROFILES
+    measurements = measure_planes(planes, wanted, components, connectivity)
+    size = min(LACUNARITY_BOX, *planes.sides)
     at_size = _lacunarity.analyse(planes, [size]).isel(box_size=0)
     variables: dict[str, Any] = {
         **measurements.scalars(),
-        "percolates": measurements.variables["percolates"],
+        **{name: measurements.variables[name] for name in ("percolates",) if planes.rank == 2},
         **{name: (planes.dims, at_size[name].values) for name in ("lacunarity", "null_lacunarity")},
     }
-    coords = {"axis": measurements.coords["axis"], "box_size": ((), np.int64(size))}
+    coords = {name: values for name, values in measurements.coords.items() if name == "axis"}
+    coords["box_size"] = ((), np.int64(size))
     notes = {name: note for name, note in measurements.notes.items() if name in variables}
     return build_dataset(planes, variables, coords, notes=notes)
 
@@ -135,9 +146,11 @@ def measure_planes(
     """Measure what is wanted out of `MEASURES`; `components` are needed for islands and percolation."""
     result = Measurements(planes)
     if "islands" in wanted:
-        spacing = planes.grid.spacing if planes.grid.has_coordinates else (np.nan, np.nan)
-        perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
-        values = {"total_perimeter": perimeter, **_islands.island_scalars(components, planes, connectivity)}
+        values = _islands.island_scalars(components, planes, connectivity)
+        if planes.rank == 2:
+            spacing = planes.grid.spacing if planes.grid.has_coordinates else (np.nan, np.nan)
+            perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
+            values = {"total_perimeter": perimeter, **values}
         result.variables.update({name: planes.variable(array) for name, array in values.items()})
     if "percolation" in wanted:
         values = _percolation.crossings(components, planes)

@@ -13,13 +13,14 @@ from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains._connected_components import (
     COLUMNS,
     PLAIN_COLUMNS,
+    PROFILE_COLUMNS,
     Components,
     check_connected,
     component_table,
     euler_number,
     label_planes,
 )
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, mask_sides, read_planes
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
@@ -29,8 +30,10 @@ def _check(
 ) -> None:
     problems.choices("keep", keep, ("label",))
     if table is not None:
-        problems.choices("table", table, COLUMNS)
-    check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
+        problems.choices("table", table, PROFILE_COLUMNS if len(mask_sides(mask)) == 1 else COLUMNS)
+    check_connected(
+        problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid, profiles=True
+    )
 
 
 @public_result(title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check)
@@ -47,13 +50,13 @@ def islands(
 
     Parameters
     ----------
-    mask : DataArray, dims (..., y, x)
+    mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     connectivity : {1, 2}
         1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
     periodic : bool, optional
         Whether islands continue across the edges; by default along periodic axes. True needs periodic axes.
-    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+    valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells; the others are in no island.
     keep : sequence of str
         Maps to keep: ("label",) or (). Without the map a plane is labelled band by band, in little memory.
@@ -78,8 +81,10 @@ def islands(
 
     Notes
     -----
-    Lengths are NaN for a mask without coordinates, and so is the centroid, along a periodic axis, of an
-    island that wraps around it. The largest and the mean area of an empty plane are NaN too.
+    A profile has the variables `largest_length` and `mean_island_length` (m) and the columns `cells`,
+    `length` (m), `centroid_x`, `x_min` and `x_max`. Lengths are NaN for a mask without coordinates, and so is
+    the centroid, along a periodic axis, of an island that wraps around it. The largest and the mean area of
+    an empty plane are NaN too.
 
     Examples
     --------
@@ -91,17 +96,18 @@ def islands(
     1
     """
     maps = word_tuple(keep)
-    columns = COLUMNS if table is None else word_tuple(table)
     planes = read_planes(mask, valid=valid, periodic=periodic)
-    detailed = None if table is None else bool(set(columns) - set(PLAIN_COLUMNS))
+    every, plain = (COLUMNS, PLAIN_COLUMNS) if planes.rank == 2 else (PROFILE_COLUMNS, PROFILE_COLUMNS[:2])
+    columns = every if table is None else word_tuple(table)
+    detailed = None if table is None else bool(set(columns) - set(plain))
     components = label_planes(planes, connectivity, keep="label" in maps, detailed=detailed)
     too_many = table is None and any(plane.details is None for plane in components)
-    columns = PLAIN_COLUMNS if too_many else columns
+    columns = plain if too_many else columns
     counts = [plane.count if columns else 0 for plane in components]
     scalars = island_scalars(components, planes, connectivity)
     variables = {
         **{name: planes.variable(values) for name, values in scalars.items()},
-        **{name: planes.variable(np.array([plane.map for plane in components]), "y", "x") for name in maps},
+        **{name: _maps(components, planes) for name in maps},
         **{name: ("island", values) for name, values in _table(components, planes, columns).items()},
     }
     coords: dict[str, Any] = {}
@@ -112,18 +118,26 @@ def islands(
     return build_dataset(planes, variables, coords, on_plane="label" in maps, notes=notes, rows=rows)
 
 
+def _maps(components: Sequence[Components], planes: Planes) -> tuple[tuple[str, ...], Array]:
+    """Return the maps of the islands with their dims."""
+    maps = np.array([plane.map for plane in components])
+    return planes.variable(maps, "y", "x") if planes.rank == 2 else planes.variable(maps[:, 0], "x")
+
+
 def island_scalars(components: Sequence[Components], planes: Planes, connectivity: int) -> dict[str, Array]:
-    """Return the numbers of every plane: islands, their sizes, the Euler number."""
+    """Return the numbers of every plane: islands, their sizes, and of planes the Euler number."""
     sizes = [plane.sizes for plane in components]
-    euler = [euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
     area = planes.grid.cell_area if planes.grid.has_coordinates else np.nan
     largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
     mean = np.array([cells.mean() if cells.size else np.nan for cells in sizes])
-    return {
-        "n_islands": np.array([cells.size for cells in sizes], np.int64),
-        "largest_cells": largest,
-        "largest_island": np.where(largest > 0, largest * area, np.nan),
-        "mean_island_area": mean * area,
+    scalars = {"n_islands": np.array([cells.size for cells in sizes], np.int64), "largest_cells": largest}
+    largest_area, mean_area = np.where(largest > 0, largest * area, np.nan), mean * area
+    if planes.rank == 1:
+        return scalars | {"largest_length": largest_area, "mean_island_length": mean_area}
+    euler = [euler_number(cells, connectivity, planes.grid.periodic) for cells in planes.cells]
+    return scalars | {
+        "largest_island": largest_area,
+        "mean_island_area": mean_area,
         "euler_number": np.array(euler, np.int64),
     }
 
@@ -133,7 +147,7 @@ def _table(components: Sequence[Components], planes: Planes, columns: Sequence[s
     if not columns:
         return {}
     axes = planes.plane_coords
-    origin = [float(axes[dim].values[0]) if axes else 0.0 for dim in ("y", "x")]
+    origin = [float(axes[dim].values[0]) if dim in axes else 0.0 for dim in ("y", "x")]
     tables = [component_table(plane, planes.grid, origin, columns) for plane in components]
     joined = {name: _chain([table.pop(name) for table in tables]) for name in columns}
     if planes.grid.has_coordinates:
@@ -155,7 +169,10 @@ def _notes(planes: Planes, *, too_many: bool) -> dict[str, dict[str, str]]:
     if np.any(planes.occupied == 0):
         reasons.append("the set is empty")
     comment = {"comment": "NaN where " + " or where ".join(reasons)}
-    notes = {"largest_island": comment, "mean_island_area": comment} if reasons else {}
+    of_area = ("largest_island", "mean_island_area")
+    of_length = ("largest_length", "mean_island_length")
+    names = of_area if planes.rank == 2 else of_length
+    notes = dict.fromkeys(names, comment) if reasons else {}
     if too_many:
         notes["n_islands"] = {"comment": "too many for the full table: name the columns to have them all"}
     return notes

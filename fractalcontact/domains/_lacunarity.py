@@ -17,8 +17,8 @@ from fractalcontact.domains._mask_input import (
     build_dataset,
     check_box_sizes,
     check_mask,
+    mask_sides,
     parallel_map,
-    plane_shape,
     read_box_sizes,
     read_planes,
 )
@@ -34,8 +34,8 @@ LARGEST_INT64 = 2**63 - 1
 
 def _check(problems: Problems, *, mask: Any, box_sizes: Any, boxes: Any, periodic: Any, valid: Any) -> None:
     problems.choice("boxes", boxes, ("gliding", "fixed"))
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-    shape = plane_shape(mask)
+    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
+    shape = mask_sides(mask)
     check_box_sizes(problems, "box_sizes", box_sizes, min(shape))
 
 
@@ -56,7 +56,7 @@ def lacunarity(
 
     Parameters
     ----------
-    mask : DataArray, dims (..., y, x)
+    mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     box_sizes : sequence of int, optional
         Edges of the box in cells; by default the powers of two up to half the shorter side.
@@ -66,17 +66,19 @@ def lacunarity(
     periodic : bool, optional
         Whether the box wraps around the edges; by default along periodic axes. True needs periodic axes. On a
         free axis only positions inside the plane count.
-    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+    valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells; only boxes of observed cells count.
 
     Returns
     -------
     Dataset
         Over the leading dims and `box_size` (cells; `box_length` in m): `lacunarity`; `null_lacunarity`,
-        1 + (1 - p) / (p r^2) for independent cells of probability p, the coverage; `relative_lacunarity`, the
+        1 + (1 - p) / (p r^2), of a profile 1 + (1 - p) / (p r), for independent cells of probability p, the
+        coverage; `relative_lacunarity`, the
         ratio of the two; `normalised_lacunarity`, (lacunarity - 1) p / (1 - p). Over the leading dims:
         `coverage`; `lacunarity_slope`, the least-squares slope of ln lacunarity over ln r (D - 2 for a power
-        law); `lacunarity_area`, the integral of ln lacunarity over ln r; both with `null_` for the null.
+        law, D - 1 for a profile); `lacunarity_area`, the integral of ln lacunarity over ln r; both with
+        `null_` for the null.
 
     Raises
     ------
@@ -102,10 +104,14 @@ def lacunarity(
 
 def analyse(planes: Planes, box_sizes: Any = None, *, boxes: str = "gliding") -> xr.Dataset:
     """Return the result of `lacunarity` for planes, without labels."""
-    half = max(1, min(planes.grid.shape) // 2)
+    half = max(1, min(planes.sides) // 2)
     sizes = read_box_sizes(box_sizes, 2 ** np.arange(half.bit_length(), dtype=np.int64))
-    values = gliding_lacunarity(planes, sizes) if boxes == "gliding" else _fixed_lacunarity(planes, sizes)
-    null = _null_lacunarity(planes.coverage, sizes)
+    if planes.rank == 1:
+        values = _row_lacunarity(planes, sizes, boxes)
+    else:
+        of_planes = gliding_lacunarity if boxes == "gliding" else _fixed_lacunarity
+        values = of_planes(planes, sizes)
+    null = _null_lacunarity(planes.coverage, sizes, planes.rank)
     slope, area = _slope_and_area(sizes, values)
     null_slope, null_area = _slope_and_area(sizes, null)
     variables = {
@@ -197,14 +203,34 @@ def _mass_of_boxes(cells: Array, size: int) -> Array:
     return np.asarray(rows.reshape(ny // size, nx // size, size).sum(2))
 
 
-def _null_lacunarity(coverage: Array, sizes: Array) -> Array:
-    """Return the lacunarity of independent cells of coverage p, 1 + (1 - p) / (p r^2); (planes, sizes).
+def _row_lacunarity(planes: Planes, sizes: Array, boxes: str) -> Array:
+    """Return <M^2> / <M>^2 of profiles, over all boxes or those of the grid from the first cell."""
+    n, (wraps,) = planes.grid.shape[1], planes.periodic
+
+    def masses(row: Array, size: int) -> Array:
+        ahead = np.pad(row, (0, size - 1 if wraps and boxes == "gliding" else 0), mode="wrap")
+        total = np.insert(np.cumsum(ahead, dtype=np.int64), 0, 0)
+        mass = total[size:] - total[:-size]
+        return mass if boxes == "gliding" else mass[: n - size + 1 : size]
+
+    def at_size(plane: int, size: int) -> float:
+        mass, valid = masses(planes.cells[plane, 0], size), planes.valid_of(plane)
+        if valid is not None:
+            mass = mass[masses(valid[0], size) == size]
+        return _moment_ratio(mass.size, mass, mass**2)
+
+    values = [at_size(plane, size) for plane in range(planes.count) for size in sizes.tolist()]
+    return np.array(values).reshape(planes.count, sizes.size)
+
+
+def _null_lacunarity(coverage: Array, sizes: Array, rank: int) -> Array:
+    """Return the lacunarity of independent cells of coverage p, 1 + (1 - p) / (p r^rank); (planes, sizes).
 
     Its box counts are in `_random_null.py`.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(coverage > 0, (1.0 - coverage) / coverage, np.nan)
-    return np.asarray(1.0 + excess[:, None] / sizes.astype(float) ** 2)
+    return np.asarray(1.0 + excess[:, None] / sizes.astype(float) ** rank)
 
 
 def _normalised(coverage: Array, values: Array) -> Array:

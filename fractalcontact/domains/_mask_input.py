@@ -1,7 +1,8 @@
 """Masks of contact: their validation, their planes as plain arrays, and datasets on their leading dims.
 
-A mask is boolean, or integer flags where contact means value > 0, with dims (..., y, x). Every analysis works
-on a stack of planes; its results carry the leading dims of the mask.
+A mask is boolean, or integer flags where contact means value > 0, with dims (..., y, x), or (..., x) for the
+contact of a profile. Every analysis works on a stack of planes; its results carry the leading dims of the
+mask. A profile is a plane of one row with the rank 1: what depends on the rank is measured along the row.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ R = TypeVar("R")
 RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius")  # dims that results add
 CELLS_PER_THREAD = 1 << 18  # a pass over so many takes as long as to start a pool of threads
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
+PROFILE_DIMS = ("x",)
+MEASURES_OF_PROFILES = "box_dimension, box_counts, correlation_dimension, lacunarity, islands and describe"
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,8 @@ class Planes:
     """The planes of a mask, their grid, and the leading dims they came from.
 
     `cells` is uint8 of 0 and 1, shape (planes, ny, nx), C order. `valid` is None, or uint8 of shape
-    (1 or planes, ny, nx): cells that were not observed are 0 there, and 0 in `cells`.
+    (1 or planes, ny, nx): cells that were not observed are 0 there, and 0 in `cells`. `rank` is the number
+    of dims of a mask, 2 for a plane and 1 for a profile, which is a row here: ny is 1, and the spacing of y.
     """
 
     cells: Array
@@ -44,6 +48,7 @@ class Planes:
     grid: Grid
     dims: tuple[str, ...] = ()
     shape: tuple[int, ...] = ()
+    rank: int = 2
     coords: dict[str, xr.Variable] = field(default_factory=dict)
     plane_coords: dict[str, xr.Variable] = field(default_factory=dict)
 
@@ -56,6 +61,16 @@ class Planes:
     def plane_size(self) -> int:
         """Number of cells of a plane."""
         return int(self.cells[0].size) if self.count else 0
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """Numbers of cells along the axes of the mask, (ny, nx) or (nx,)."""
+        return self.grid.shape[-self.rank :]
+
+    @property
+    def periodic(self) -> tuple[bool, ...]:
+        """Which axes of the mask are periodic, (y, x) or (x,)."""
+        return self.grid.periodic[-self.rank :]
 
     @cached_property
     def observed(self) -> Array:
@@ -78,8 +93,9 @@ class Planes:
 
     @property
     def side(self) -> float:
-        """Edge in metres of a square with the area of one cell; NaN without coordinates."""
-        return float(np.sqrt(self.grid.cell_area)) if self.grid.has_coordinates else float("nan")
+        """Edge in metres of a square with the area of one cell, or its length; NaN without coordinates."""
+        edge = np.sqrt(self.grid.cell_area) if self.rank == 2 else self.grid.spacing[1]
+        return float(edge) if self.grid.has_coordinates else float("nan")
 
     def valid_of(self, plane: int) -> Array | None:
         """Return the observed cells of one plane, or None if all of them are."""
@@ -92,28 +108,48 @@ class Planes:
 
 
 def check_mask(
-    problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, argument: str = "mask"
+    problems: Problems,
+    mask: Any,
+    *,
+    valid: Any = None,
+    periodic: Any = None,
+    argument: str = "mask",
+    profiles: bool = False,
 ) -> bool:
-    """Check a mask, its observed cells and the choice of periodicity; `read_planes` then reads them."""
+    """Check a mask, its observed cells and the choice of periodicity; `read_planes` then reads them.
+
+    `profiles` allows masks of profiles, with dims (..., x).
+    """
     is_choice = problems.boolean("periodic", periodic, optional=True)
-    is_mask = _check_cells(problems, mask, argument)
+    is_mask = _check_cells(problems, mask, argument, profiles=profiles)
     is_valid = valid is None or _check_valid(problems, valid, mask if is_mask else None)
-    if is_mask and any(dim in mask.coords for dim in CORE_DIMS):
-        is_mask = problems.grid(argument, mask)
+    if is_mask and any(dim in mask.coords for dim in mask_dims(mask)):
+        is_mask = problems.grid(argument, mask, dims=mask_dims(mask))
     if is_mask and is_choice and periodic is not None:
         is_choice = problems.periodic("periodic", periodic, mask_grid(mask))
     return is_mask and is_valid and is_choice
 
 
-def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
+def mask_dims(mask: xr.DataArray) -> tuple[str, ...]:
+    """Return the dims of one mask: (y, x), or (x,) for the contact of a profile."""
+    is_profile = tuple(mask.dims[-1:]) == PROFILE_DIMS and "y" not in mask.dims
+    return PROFILE_DIMS if is_profile else CORE_DIMS
+
+
+def _check_cells(problems: Problems, mask: Any, argument: str, *, profiles: bool) -> bool:
     """Check the type, the dims and the size of a mask."""
+    expected = f"{EXPECTED} or (..., x)" if profiles else EXPECTED
+    is_profile = isinstance(mask, xr.DataArray) and mask_dims(mask) == PROFILE_DIMS
     if not isinstance(mask, xr.DataArray):
-        problems.add(argument, EXPECTED, mask)
+        problems.add(argument, expected, mask)
     elif mask.dtype.kind not in "biu":
-        expected = f"{EXPECTED}; compare numbers first, as in `pressure > 0`"
+        expected = f"{expected}; compare numbers first, as in `pressure > 0`"
         problems.add(argument, expected, f"type {mask.dtype}")
-    elif tuple(mask.dims[-2:]) != CORE_DIMS or min(mask.shape, default=0) < 1:
-        problems.add(argument, EXPECTED + ", none of them empty", f"sizes {dict(mask.sizes)}")
+    elif is_profile and not profiles:
+        there_is = f"; for the contact of a profile, dims (..., x), there are {MEASURES_OF_PROFILES}"
+        problems.add(argument, expected + there_is, f"sizes {dict(mask.sizes)}")
+    elif not (is_profile or tuple(mask.dims[-2:]) == CORE_DIMS) or min(mask.shape, default=0) < 1:
+        problems.add(argument, expected + ", none of them empty", f"sizes {dict(mask.sizes)}")
     elif set(RESULT_DIMS) & set(mask.dims):
         problems.add(f"{argument}.dims", f"leading dims other than {', '.join(RESULT_DIMS)}", mask.dims)
     else:
@@ -123,10 +159,10 @@ def _check_cells(problems: Problems, mask: Any, argument: str) -> bool:
 
 def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray | None) -> bool:
     """Check that the observed cells lie on the same grid, and on the same leading dims, as a valid mask."""
-    mask_dims = CORE_DIMS if mask is None else tuple(mask.dims)
+    core, every = (CORE_DIMS, CORE_DIMS) if mask is None else (mask_dims(mask), tuple(mask.dims))
     dims = tuple(valid.dims) if isinstance(valid, xr.DataArray) else None
-    if dims is None or valid.dtype.kind != "b" or (mask is not None and dims not in (CORE_DIMS, mask_dims)):
-        problems.add("valid", f"a boolean DataArray with dims (y, x) or {mask_dims}", valid)
+    if dims is None or valid.dtype.kind != "b" or (mask is not None and dims not in (core, every)):
+        problems.add("valid", f"a boolean DataArray with dims ({', '.join(core)}) or {every}", valid)
         return False
     if mask is None:
         return True
@@ -159,20 +195,32 @@ def plane_shape(mask: Any) -> tuple[int, int]:
     return int(mask.shape[-2]), int(mask.shape[-1])
 
 
+def mask_sides(mask: Any) -> tuple[int, ...]:
+    """Return the numbers of cells along the axes of a mask as `plane_shape`, (nx,) for that of a profile."""
+    if isinstance(mask, xr.DataArray) and mask_dims(mask) == PROFILE_DIMS and mask.size > 0:
+        return (int(mask.shape[-1]),)
+    return plane_shape(mask)
+
+
 def mask_grid(mask: xr.DataArray) -> Grid:
     """Return the grid of a mask that passed `check_mask`; without coordinates its unit is one cell."""
-    if any(dim in mask.coords for dim in CORE_DIMS):
-        return read_grid(mask)
-    shape = (int(mask.sizes["y"]), int(mask.sizes["x"]))
-    return Grid(shape, (1.0, 1.0), (False, False), has_coordinates=False)
+    dims = mask_dims(mask)
+    if any(dim in mask.coords for dim in dims):
+        return read_grid(mask, dims)
+    shape = tuple(int(mask.sizes[dim]) for dim in dims)
+    return Grid(shape, (1.0,) * len(dims), (False,) * len(dims), has_coordinates=False)
 
 
 def read_planes(
     mask: xr.DataArray, *, valid: xr.DataArray | None = None, periodic: bool | None = None
 ) -> Planes:
     """Return the planes of a mask that passed `check_mask`."""
-    grid = mask_grid(mask)
-    grid = Grid(grid.shape, grid.spacing, periodic_axes(periodic, grid), grid.has_coordinates)
+    grid, dims = mask_grid(mask), mask_dims(mask)
+    wraps = periodic_axes(periodic, grid)
+    if dims == PROFILE_DIMS:  # a plane of one row
+        grid = Grid((1, *grid.shape), (1.0, *grid.spacing), (False, *wraps), grid.has_coordinates)
+    else:
+        grid = Grid(grid.shape, grid.spacing, wraps, grid.has_coordinates)
     cells = _flags(mask).view(np.uint8).reshape(-1, *grid.shape)
     observed = None
     if valid is not None:
@@ -182,10 +230,11 @@ def read_planes(
         cells,
         observed,
         grid,
-        tuple(str(dim) for dim in mask.dims[:-2]),
-        tuple(mask.shape[:-2]),
-        leading_coords(mask, mask.dims[:-2], RESULT_DIMS),
-        {dim: mask.coords.variables[dim] for dim in CORE_DIMS} if grid.has_coordinates else {},
+        tuple(str(dim) for dim in mask.dims[: -len(dims)]),
+        tuple(mask.shape[: -len(dims)]),
+        len(dims),
+        leading_coords(mask, mask.dims[: -len(dims)], RESULT_DIMS),
+        {dim: mask.coords.variables[dim] for dim in dims} if grid.has_coordinates else {},
     )
 
 

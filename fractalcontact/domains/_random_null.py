@@ -74,19 +74,19 @@ def _fill_probability(cells: float, observed: float) -> float:
     return float(np.exp(gammaln(cells + 1.0) + gammaln(observed - cells + 1.0) - gammaln(observed + 1.0)))
 
 
-def expected_counts(cells: float, observed: float, sizes: Array, contents: Sequence[BoxContents]) -> Array:
-    """Boxes of each size that meet the null, out of observed / size^2 boxes that hold an observed cell."""
+def expected_counts(cells: float, observed: float, areas: Array, contents: Sequence[BoxContents]) -> Array:
+    """Boxes of each area that meet the null, out of observed / area boxes that hold an observed cell."""
     shares = [of.share @ (1.0 - miss_probability(cells, observed, of.cells)) for of in contents]
-    return np.asarray(observed / sizes.astype(float) ** 2 * np.array(shares, float))
+    return np.asarray(observed / areas.astype(float) * np.array(shares, float))
 
 
-def count_covariance(cells: float, observed: float, sizes: Array, contents: Sequence[BoxContents]) -> Array:
+def count_covariance(cells: float, observed: float, areas: Array, contents: Sequence[BoxContents]) -> Array:
     """Covariance of the counts at all pairs of sizes, on one grid, each small box inside a large one.
 
     Where boxes hold different numbers of observed cells, the variances are theirs and the correlations
     between sizes are those of full boxes.
     """
-    area = sizes.astype(float) ** 2
+    area = areas.astype(float)
     boxes = observed / area
     alone = miss_probability(cells, observed, area)
     small, large = np.minimum(area[:, None], area), np.maximum(area[:, None], area)
@@ -122,29 +122,29 @@ def _share_variance(cells: float, observed: float, contents: BoxContents) -> flo
 def fit_deviation(
     cells: float,
     observed: float,
-    sizes: Array,
+    areas: Array,
     contents: Sequence[BoxContents],
     counts: Array,
     weights: Array,
 ) -> float:
     """Return the standard deviation of sum(weights * ln N) over realisations of the null."""
     relative = weights / counts
-    variance = float(relative @ count_covariance(cells, observed, sizes, contents) @ relative)
+    variance = float(relative @ count_covariance(cells, observed, areas, contents) @ relative)
     return math.sqrt(max(variance, 0.0))
 
 
 def differs_from_null(
-    cells: float, observed: float, sizes: Array, mean_counts: Array, contents: Sequence[BoxContents]
+    cells: float, observed: float, areas: Array, mean_counts: Array, contents: Sequence[BoxContents]
 ) -> bool:
     """Return whether the mean counts at the `TESTED_SIZES` lie outside the range of the null.
 
     A departure must exceed 3.3 standard deviations and one box: where hardly two cells of the null are
     neighbours, one pair of neighbours is not significant.
     """
-    if sizes.size == 0:
+    if areas.size == 0:
         return False
-    null = expected_counts(cells, observed, sizes, contents)
-    deviation = np.sqrt(np.maximum(np.diag(count_covariance(cells, observed, sizes, contents)), 0.0))
+    null = expected_counts(cells, observed, areas, contents)
+    deviation = np.sqrt(np.maximum(np.diag(count_covariance(cells, observed, areas, contents)), 0.0))
     return bool(np.any(np.abs(mean_counts - null) > DEVIATIONS * deviation + 1.0))
 
 
@@ -156,13 +156,14 @@ def box_contents(planes: Planes, sizes: Array) -> list[dict[int, BoxContents]]:
     """
     if planes.valid is None:
         cells = float(np.prod(planes.grid.shape))
-        areas = [(size, float(size) ** 2) for size in sizes.tolist()]
+        areas = [(size, float(size) ** planes.rank) for size in sizes.tolist()]
         return [{size: BoxContents(np.array([area]), np.ones(1), cells / area) for size, area in areas}]
-    longest = max(1, min(planes.grid.shape) // 2)
+    longest = max(1, min(planes.sides) // 2)
     result = []
     for valid in planes.valid:
         usable = np.unique(np.minimum(sizes, longest)).tolist()
-        counts = {size: count_observed(valid, size, planes.grid.periodic) for size in usable}
+        values = valid if planes.rank == 2 else valid[0]
+        counts = {size: count_observed(values, size, planes.periodic) for size in usable}
         contents = {}
         for size in sizes.tolist():
             counted = min(size, longest)
@@ -170,14 +171,14 @@ def box_contents(planes: Planes, sizes: Array) -> list[dict[int, BoxContents]]:
             boxes = counts[counted][numbers]
             total = float(max(boxes.sum(), 1))
             contents[size] = BoxContents(
-                numbers * (size / counted) ** 2, boxes / total, total / float(size) ** 2
+                numbers * (size / counted) ** planes.rank, boxes / total, total / float(size) ** planes.rank
             )
         result.append(contents)
     return result
 
 
 def count_observed(valid: Array, size: int, periodic: Sequence[bool]) -> Array:
-    """Count the positions of the box by the observed cells it holds, (size^2 + 1,).
+    """Count the positions of the box by the observed cells it holds, (cells of the box + 1,).
 
     On a free axis boxes that hang over opposite edges by the same cut count once, with the cells of both;
     no axis is shorter than `2 size`.
@@ -190,4 +191,4 @@ def count_observed(valid: Array, size: int, periodic: Sequence[bool]) -> Array:
         high = np.take(total, [n], axis) - np.take(total, cut + n - size if wraps else n - cut, axis)
         inside = np.take(total, np.arange(size, n + 1), axis) - np.take(total, np.arange(n - size + 1), axis)
         sums = np.concatenate([inside, low + high], axis)
-    return np.bincount(sums.ravel(), minlength=size * size + 1)
+    return np.bincount(sums.ravel(), minlength=size**valid.ndim + 1)

@@ -24,10 +24,10 @@ def default_sizes(shape: Sequence[int]) -> Array:
     """Return the products of 2 and 3 up to the geometric mean of the cell and the extent, at least up to 9.
 
     Two sizes at a ratio of 2 or 3 give a local slope at the ratios by which most self-similar sets are
-    built. No size exceeds the shorter side.
+    built. No size exceeds the shorter side. `shape` has one length for each axis.
     """
-    ny, nx = shape
-    largest = min(max(int((ny * nx) ** 0.25 + 1e-9), 9), ny, nx)
+    extent = float(np.prod(shape)) ** (1.0 / len(shape))
+    largest = min(max(int(extent**0.5 + 1e-9), 9), *shape)
     powers = (2**i * 3**j for i in range(largest.bit_length()) for j in range(largest.bit_length()))
     return np.array(sorted(size for size in powers if size <= largest), np.int64)
 
@@ -198,16 +198,16 @@ def dimension_variables(
 ) -> dict[str, Any]:
     """Return a dimension, its interval and its window of scales; NaN in planes without a dimension.
 
-    A set in the plane has a dimension from 0 to 2: dimension and interval are limited to it. `windows` are
-    the scales used in each plane, all by default.
+    A set in the plane has a dimension from 0 to 2, on a line from 0 to 1: both are limited to it. `windows`
+    are the scales used in each plane, all by default.
     """
     has_value = np.isfinite(dimension)
     used = [scales[window] for window in windows or [slice(0, scales.size)] * planes.count]
     smallest, largest = (np.array([end(scale) for scale in used]) for end in (np.min, np.max))
     return {
-        name: planes.variable(np.clip(dimension, 0.0, 2.0)),
-        "ci_low": planes.variable(np.clip(dimension - half_width, 0.0, 2.0)),
-        "ci_high": planes.variable(np.clip(dimension + half_width, 0.0, 2.0)),
+        name: planes.variable(np.clip(dimension, 0.0, planes.rank)),
+        "ci_low": planes.variable(np.clip(dimension - half_width, 0.0, planes.rank)),
+        "ci_high": planes.variable(np.clip(dimension + half_width, 0.0, planes.rank)),
         "scale_min": planes.variable(np.where(has_value, smallest, np.nan)),
         "scale_max": planes.variable(np.where(has_value, largest, np.nan)),
     }
