@@ -119,8 +119,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     path : path-like
     chunks : "auto", int or mapping, optional
         Sizes of blocks as xarray takes them, for example ``{"step": 1}``: the arrays are read when they are
-        computed, and the file stays open; of its checksums only those of compressed arrays are compared.
-        Needs dask (extra `dask`).
+        computed, and the file stays open. The checksum of the whole file is then not compared, only those of
+        its compressed arrays: open a file once without `chunks` to be sure of it. Needs dask (extra `dask`).
 
     Returns
     -------
@@ -179,7 +179,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
 def _check_words(problems: Problems, groups: Mapping[str, xr.Dataset]) -> None:
     """Note names and attributes that a NetCDF file cannot hold."""
     for path, dataset in groups.items():
-        place = path.strip("/") + "/" if path != "/" else ""
+        group = path.strip("/")
+        place = f"result.{group}/" if group else "result."
         owners = {"": dataset.attrs} | {f"{key}.": value.attrs for key, value in dataset.variables.items()}
         for name in [*dataset.variables, *(dim for dim in dataset.dims if dim not in dataset.variables)]:
             expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"

@@ -10,7 +10,7 @@ from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import draw_theories, shear_legend
-from fractalcontact.plotting._inputs import as_dataset, result_of, table
+from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import load_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
@@ -167,6 +167,10 @@ def pressure_distribution(
     ax = _style.axes_or_new(ax)
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
     data = result_of(result, "pressure_distribution", names, ("step",))
+    require_dims(data, "pressure_distribution", {"area_share": "pressure_class"})
+    with Problems("fc.plotting.pressure_distribution") as problems:
+        count = data.sizes["pressure_class"]
+        problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
     data = data.isel(step=_style.spread_indices(data.sizes["step"], MOST_STEPS))
     share = table(data, "area_share", ("step", "pressure_class"))
     greatest = table(data, "maximum_pressure", ("step",))

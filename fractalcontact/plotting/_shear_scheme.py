@@ -81,7 +81,7 @@ def sliding_scheme(
     Raises
     ------
     InvalidInput
-        There is no plane of heights, or no delta-surface.
+        There is no plane of heights, or no delta-surface, or a height is infinite.
 
     Examples
     --------
@@ -100,6 +100,10 @@ def sliding_scheme(
         shape = lower.shape
         problems.require(min(shape) > 1, "surface", "at least two points along x and y", shape)
         problems.require(facing.shape == shape, "upper", f"the shape of surface, {shape}", facing.shape)
+        given = {"surface": lower, "delta": step.block} | ({} if upper is None else {"upper": facing})
+        for name, plane in given.items():
+            infinite = int(np.isinf(plane.values).sum())
+            problems.require(infinite == 0, name, "finite heights, or NaN", f"{infinite} infinite")
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.8, 3.0), width_ratios=(1.0, 1.9))
     _draw_plan(left, lower, step)
     name = r"$\delta_\mathrm{r}$" if upper is None else "lift"

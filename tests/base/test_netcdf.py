@@ -167,6 +167,7 @@ def test_all_names_and_attributes_that_cannot_be_stored_are_listed(tmp_path, res
         fc.save(tree, tmp_path / "tree.nc")
     for words in ("6 problems", "joints/settings: ", "joints/lists: ", "is_rough: ", "got 'a/b'", "got 1\n"):
         assert words in f"{caught.value}\n"
+    assert all(line.startswith("result.") for line in caught.value.problems)
     assert not list(tmp_path.iterdir())
 
 

@@ -89,3 +89,15 @@ def test_curves_are_in_a_figure_of_the_user(pressed):
 def test_missing_variables_are_named(draw, pressed):
     with pytest.raises(InvalidInput, match="result"):
         draw(pressed[["residual"]])
+
+
+@pytest.mark.parametrize("chosen", [0, slice(0)])
+def test_distribution_without_classes_is_refused(chosen, pressed):
+    with pytest.raises(InvalidInput, match="pressure_class"):
+        plotting.pressure_distribution(pressed.isel(pressure_class=chosen))
+
+
+def test_distribution_of_one_class_is_drawn(pressed):
+    ((pressure, _), *_) = values(plotting.pressure_distribution(pressed.isel(pressure_class=[-1])))
+    greatest = float(pressed["maximum_pressure"][0]) * float(pressed["pressure_class"][-1])
+    assert pressure == pytest.approx([greatest / 1e6])

@@ -6,6 +6,7 @@ import pytest
 from plotting_figures import factor, render
 
 from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
 
 
 def test_plan_and_section():
@@ -47,3 +48,15 @@ def test_heights_are_exaggerated_as_the_title_says():
     units = [factor(label) for label in (cut.get_xlabel(), cut.get_ylabel())]
     times = ((top - y) / units[1]) / ((right - x) / units[0])
     assert cut.get_title(loc="left").endswith(f"heights × {times:.0f}")
+
+
+@pytest.mark.parametrize("argument", ["surface", "delta", "upper"])
+@pytest.mark.parametrize("height", [np.inf, -np.inf])
+def test_infinite_height_is_refused(argument, height):
+    surface = synthetic.heights()
+    arguments = {"surface": surface, "delta": synthetic.delta(surface), "upper": surface}
+    arguments[argument] = arguments[argument].copy(deep=True)
+    arguments[argument][..., 3, 3] = height
+    with pytest.raises(InvalidInput) as caught:
+        plotting.sliding_scheme(**arguments)
+    assert caught.value.problems == (f"{argument}: expected finite heights, or NaN, got 1 infinite",)
