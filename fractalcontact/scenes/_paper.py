@@ -69,6 +69,7 @@ def paper_parts(tree: xr.DataTree) -> list[Part]:
         return []
     members = member_count(tree)
     studies = [of_member(tree, number) for number in range(members)] if members else [tree]
+    studies = [findings.with_whole_block(study) for study in studies]
     column = f"member 0 of {members}" if members else "this study"
     rows = [("section", "claim of the paper", column, "verdict")]
     for claim in CLAIMS:
