@@ -86,7 +86,7 @@ def bandis_aperture(roughness: float, wall_strength: float, compressive_strength
         problems.number("roughness", roughness, above=0, at_most=20)
         problems.number("compressive_strength", compressive_strength, above=0, at_most=LARGEST)
         if (
-            problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
+            problems.number("wall_strength", wall_strength, above=1 / LARGEST, at_most=LARGEST)
             and not problems.messages
         ):
             weakest = bool(float(wall_strength) <= float(compressive_strength))
@@ -142,7 +142,7 @@ def bandis_constants(
     """
     with Problems("fractalcontact.joints.bandis_constants") as problems:
         problems.number("roughness", roughness, at_least=0, at_most=20)
-        problems.number("wall_strength", wall_strength, above=0, at_most=LARGEST)
+        problems.number("wall_strength", wall_strength, above=1 / LARGEST, at_most=LARGEST)
         problems.number("aperture", aperture, above=0, at_most=LARGEST)
         problems.integer("cycle", cycle, at_least=1, at_most=len(CLOSURE_FITS))
         if not problems.messages:
@@ -287,7 +287,7 @@ def _check_hydraulic(aperture: Any, model: Any, given: dict[str, Any]) -> None:
                 problems.require(value is None, name, f"nothing with {model!r}", value)
         roughness, spread, contact = (given[name] for name in ("roughness", "spread", "contact_fraction"))
         problems.number("roughness", roughness, above=0, at_most=20, optional=True)
-        series = model == "zimmerman_bodvarsson"
+        series = is_model and model == "zimmerman_bodvarsson"
         if contact is not None:
             bounds: dict[str, Any] = {"at_least": 0.0, "at_most": GREATEST_CONTACT}
             problems.numbers("contact_fraction", contact, any_shape=True, **bounds)

@@ -126,6 +126,8 @@ KEPT = {
     "descending in a figure": ("plotting.surface", "surface", lambda: rough()[:, ::-1], "surface.x"),
     "no steps in a figure": ("plotting.closure_laws", "closure", lambda: closed().isel(step=slice(0)),
                              "closure.step"),
+    "bytes as a model": ("joints.hydraulic_aperture", "model", lambda: np.void(b"abc"), "model"),
+    "a wall without strength": ("joints.bandis_aperture", "wall_strength", lambda: 5e-324, "wall_strength"),
     "azimuth in time": ("joints.cyclic_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
 }  # fmt: skip
 
