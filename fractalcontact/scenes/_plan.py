@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from fractalcontact.base.tables import table
+from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._inputs import FRICTION_ANGLE, joint_options
@@ -26,6 +26,7 @@ from fractalcontact.scenes._stages import (
     arguments_of,
 )
 
+WITH_MEMORY = 80  # characters of a screen that holds the table with its column of memory
 STRENGTH = ("direct_shear", "shear_curve", "strength_envelope")
 
 
@@ -59,14 +60,19 @@ class Plan:
         return len(self.stages)
 
     def __str__(self) -> str:
-        """Return a table: stage, stages it needs, reason, peak memory."""
-        rows = [("stage", "needs", "reason", "peak memory")]
+        """Return a table: stage, stages it needs, reason, and peak memory where the screen is wide enough."""
+        rows: list[tuple[str, ...]] = [("stage", "needs", "reason", "peak memory")]
         for stage in self:
             needs = "all stored results" if stage.name == FIGURES else ", ".join(stage.needs)
             name = stage.name + ("" if stage.stored else " (not stored)")
             peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
             rows.append((name, needs, stage.reason, peak))
-        return "\n".join([table(rows), *(f"selected: {choice}" for choice in self.choices)])
+        notes = [f"selected: {choice}" for choice in self.choices]
+        if screen_width() < WITH_MEMORY:
+            rows = [row[:-1] for row in rows]
+            largest = max(self.memory, key=lambda name: self.memory[name], default="")
+            notes += [f"peak memory: {self.memory[largest] / 1e6:.0f} MB, {largest}"] if largest else []
+        return "\n".join([table(rows), *notes])
 
 
 def plan(scene: Scene) -> Plan:
