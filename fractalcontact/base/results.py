@@ -107,8 +107,8 @@ def public_result(
                 raise TypeError(f"{name}: {cause}{hint}") from None
             bound.apply_defaults()
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
-            if not in_blocks:
-                require_memory(name, loaded_bytes(bound.arguments), _size_of(bound.arguments))
+            if not in_blocks and (loaded := loaded_bytes(bound.arguments)):
+                require_memory(name, loaded, _size_of(bound.arguments))
             with Problems(name, error) as problems:
                 checked_flags = check_flags(problems, signature, bound.arguments) - own_flags
                 if check is not None:

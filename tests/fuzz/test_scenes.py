@@ -71,7 +71,7 @@ def refused(name, tmp_path, *replacements, **changes):
         text = text.replace(old, new)
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InvalidInput) as caught:
-        fc.scenes.validate(tmp_path / "study.toml")
+        fc.scenes.run(tmp_path / "study.toml", progress=False)
     return [line.partition(": expected")[0] for line in caught.value.problems]
 
 
@@ -85,13 +85,18 @@ def refused(name, tmp_path, *replacements, **changes):
         ("roughness", {"surface": {"shape": [1024]}}, "surface.shape"),
         ("roughness", {"want": {"dimensions": 5}}, "want.dimensions"),
         ("roughness", {"surface": {"rng": [[1, 2], [3]]}}, "surface: rng"),
-        ("roughness", {"surface": {"shape": [200_000, 200_000]}}, "surface: shape"),
         ("file", {"surface": {"read": "x" * 300}}, "surface.read"),
         ("roughness", {"title": 3}, "title"),
     ],
 )
 def test_kept_scene_gives_a_clear_error(tmp_path, name, changes, named):
     assert named in refused(name, tmp_path, **changes)
+
+
+def test_scene_beyond_the_memory_is_planned_and_not_run(tmp_path):
+    (problem,) = refused("roughness", tmp_path, surface={"shape": [200_000, 200_000]})
+    assert "memory" in problem
+    assert max(fc.scenes.plan(fc.scenes.load(tmp_path / "study.toml")).memory.values()) > 200_000**2 * 8
 
 
 @pytest.mark.parametrize(

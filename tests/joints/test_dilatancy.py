@@ -1,5 +1,7 @@
 """Dilatancy: rigid, under a normal force, and against a spring."""
 
+from functools import wraps
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -176,7 +178,13 @@ def test_what_the_closure_has_pressed_is_not_pressed_again(crack, monkeypatch):
     both = {"shear": [0.0, 8e-5, 2e-4], "direction": ["S", "E"], "normal_force": [10.0, 1e3]}
     alone = fc.joints.dilatancy(crack, **both)
     press, pressed = fc.contact.press, []
-    monkeypatch.setattr(fc.contact, "press", lambda *a, **k: pressed.append(1) or press(*a, **k))
+
+    @wraps(press)
+    def counted(*arguments, **options):
+        pressed.append(1)
+        return press(*arguments, **options)
+
+    monkeypatch.setattr(fc.contact, "press", counted)
     shared = fc.joints.dilatancy(crack, pressed=closing, **both)
     assert len(pressed) == 4  # shear 0 towards S, all three towards E
     towards = {"shear": [8e-5, 2e-4], "direction": "S"}
