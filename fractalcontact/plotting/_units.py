@@ -74,7 +74,9 @@ def shown_in(data: Any, units: Units | None, where: str) -> Any:
         parts = [node.to_dataset() for node in data.subtree]
     else:
         parts = list(data.values()) if isinstance(data, Mapping) and not hasattr(data, "dims") else [data]
-    variables = {name: part[name] for part in parts if hasattr(part, "coords") for name in _names(part)}
+    variables = {
+        name: _variable(part, name) for part in parts if hasattr(part, "coords") for name in _names(part)
+    }
     with Problems(f"fc.plotting.{where}") as problems:
         for name, unit in units.items():
             place = f"units[{name!r}]"
@@ -99,11 +101,15 @@ def _names(data: xr.Dataset | xr.DataArray) -> list[str]:
     return [str(name) for name in (*own, *data.coords)]
 
 
+def _variable(data: Any, name: str) -> Any:
+    """Return a variable by name; a DataArray itself has its own name."""
+    return data if isinstance(data, xr.DataArray) and name not in data.coords else data[name]
+
+
 def _marked(data: Any, units: Units) -> Any:
     marked = data.copy(deep=False)
     for name in set(units) & set(_names(data)):
-        target = marked if isinstance(marked, xr.DataArray) and name not in marked.coords else marked[name]
-        target.attrs[WANTED] = units[name]
+        _variable(marked, name).attrs[WANTED] = units[name]
     return marked
 
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from plotting_figures import drawn, factor
 
-from fractalcontact import plotting
+from fractalcontact import plotting, surfaces
 from fractalcontact.base.errors import InvalidInput
 
 
@@ -36,6 +36,33 @@ def test_units_of_maps_and_of_both_axes_of_an_envelope(study):
     assert bar.get_ylim()[1] * factor(bar.get_ylabel()) == pytest.approx(
         float(surface["height"].max()), rel=0.3
     )
+
+
+@pytest.mark.parametrize(
+    ("units", "bar", "along"),
+    [
+        ({"height": "nm"}, "nm", "mm"),
+        ({"x": "µm"}, "µm", "µm"),
+        ({"height": "m", "x": "m"}, "m", "m"),
+    ],
+)
+@pytest.mark.parametrize("drawing", [plotting.surface, plotting.field])
+@pytest.mark.parametrize("name", ["height", None])
+def test_units_of_an_array(drawing, name, units, bar, along):
+    heights = surfaces.fbm((16, 16), 1e-3, hurst=0.8, rms_increment=1e-5, rng=1).rename(name)
+    ax = drawing(heights, units=units)
+    assert ax.xaxis.get_units() == ax.yaxis.get_units() == along
+    assert ax.figure.axes[1].yaxis.get_units() == bar
+    assert not any("display_units" in part.attrs for part in (heights, heights["x"]))
+
+
+def test_units_of_an_array_with_scalars_beside_it(study):
+    state = study["joints/closure"].to_dataset()["state"].isel(shear=0, step=-1)
+    pressure = (1e9 * state).rename("pressure").assign_attrs(units="Pa")
+    ax = plotting.field(pressure, units={"pressure": "GPa", "shear": "m"})
+    assert ax.figure.axes[1].yaxis.get_units() == "GPa"
+    with pytest.raises(InvalidInput, match=r"units\['height'\]"):
+        plotting.field(pressure, units={"height": "mm"})
 
 
 def test_percent_or_fraction(study):
