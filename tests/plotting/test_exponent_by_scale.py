@@ -5,6 +5,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +27,9 @@ def test_no_window_is_drawn_where_there_is_none(result):
     assert ax.get_legend_handles_labels()[1] == ["octave, 95 %"]
 
 
-def test_missing_variable_is_named(result):
-    with pytest.raises(ValueError, match="window_hurst"):
-        plotting.scaling(result.drop_vars("window_hurst"))
+@pytest.mark.parametrize(
+    "name", ["window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max"]
+)
+def test_missing_variable_is_named(result, name):
+    with pytest.raises(InvalidInput, match=name):
+        plotting.scaling(result.drop_vars(name))
