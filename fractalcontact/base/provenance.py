@@ -26,8 +26,8 @@ from fractalcontact.base.threads import thread_count
 MEMBER = "member"
 LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
-# the arguments of a call that grow where results are joined along a dim
 SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part
+# the arguments of a call that grow where results are joined along a dim
 _ALONG: Mapping[str, tuple[str, ...]] = {
     "shear": ("shear",),
     "direction": ("direction",),
@@ -118,6 +118,13 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
+
+
+def content(summary: Any) -> Any:
+    """Return the summary of an argument without its provenance, which states run times."""
+    if not isinstance(summary, dict):
+        return summary
+    return {name: content(value) for name, value in summary.items() if name != "provenance"}
 
 
 def checksum(values: np.ndarray[Any, Any]) -> str:

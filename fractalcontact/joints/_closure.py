@@ -16,7 +16,7 @@ from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import plain
+from fractalcontact.base.provenance import content, plain
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
@@ -385,19 +385,12 @@ def check_pressed(
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(pressed) if isinstance(pressed, xr.Dataset) else {}
     stated, wanted = entry.get("parameters", {}), {"crack": crack, "bulk": bulk, **solver}
-    differing = [name for name in wanted if _content(stated.get(name)) != _content(plain(wanted[name]))]
+    differing = [name for name in wanted if content(stated.get(name)) != content(plain(wanted[name]))]
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected, pressed):
         problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
     problems.require(solver.get("hardness") is None, "pressed", "nothing with a hardness", pressed)
     problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
-
-
-def _content(summary: Any) -> Any:
-    """Return the summary of an argument without its provenance, which states run times."""
-    if not isinstance(summary, dict):
-        return summary
-    return {name: _content(value) for name, value in summary.items() if name != "provenance"}
 
 
 def _held_columns(

@@ -222,10 +222,13 @@ class Crack:
         return lower, upper[self.layout.slices]
 
     def summary(self) -> dict[str, Any]:
-        """Return the description of the crack in the provenance of a result, in plain types."""
+        """Return the description of the crack in the provenance of a result, in plain types.
+
+        Faces that are not in memory are loaded for their checksum, by which cracks are told apart.
+        """
         return {
-            "lower": plain(self.lower),
-            "upper": "mated" if self.upper is None else plain(self.upper),
+            "lower": plain(self.lower.compute()),
+            "upper": "mated" if self.upper is None else plain(self.upper.compute()),
             "young": plain(self.young),
             "poisson": plain(self.poisson),
             "block": list(self.block),
