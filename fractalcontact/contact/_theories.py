@@ -186,10 +186,9 @@ def _spectrum(heights: Array, grid: Grid) -> Spectrum:
     psd, weights = spectra.periodogram(values, steps, tapers)
     moments = spectra.spectral_moments(psd, values.shape, steps)
     q = spectra.radial_wavenumber(values.shape, steps)
-    square = (psd * weights * q**2).ravel() / np.prod(
-        [n * d for n, d in zip(values.shape, steps, strict=True)]
-    )
-    narrowest = 2 * math.pi / max(n * d for n, d in zip(values.shape, steps, strict=True))
+    extent = [edge / unit for edge in grid.extent]
+    square = (psd * weights * q**2).ravel() / math.prod(extent)
+    narrowest = 2 * math.pi / max(extent)
     ring = np.rint(q.ravel() / narrowest).astype(np.int64)
     slope_square = np.bincount(ring, square)
     filled = slope_square > 0
@@ -209,7 +208,7 @@ def _persson(spectrum: Spectrum, pressure: Array) -> tuple[Array, Array, Array]:
 
     Yang and Persson (2008): u = sqrt(pi) int dq q^2 C w int_p^inf dp'/p' F(w p'/E*), with
     F(t) = [gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2) and w = sqrt(2)/s, where s is the rms slope of the modes
-    up to q, so that 2 s ds = q^3 C dq/(2 pi) in the convention of Persson for C. Both integrals over q and p'
+    up to q, so that s ds = pi q^3 C dq in the convention of Persson for C. Both integrals over q and p'
     then are, ring by ring, differences of s k(T) with T = sqrt(2) p/(E* s).
     """
     area = special.erf(math.sqrt(2) * pressure / spectrum.slope)

@@ -31,10 +31,11 @@ NEEDS = {
     "zimmerman_bodvarsson": ("spread", "contact_fraction"),
     "walsh": ("contact_fraction",),
 }
-GREATEST_VARIATION = (
-    0.5  # of the open part: the next term of the series, 1.9 times its fourth power, is then 12 %
+# s/E of the open part up to which its series is used: the next term, 1.9 (s/E)^4, is then 12 % of E^3
+GREATEST_VARIATION = 0.5
+GREATEST_CONTACT = (
+    0.25  # few spots; the next term of the series of (1 - c)/(1 + c), 2 c^2, is then 13 % of E^3
 )
-GREATEST_CONTACT = 0.25  # the next term of (1 - c)/(1 + c), 2 c^2, is then 13 %
 
 
 class ClosureConstants(NamedTuple):
@@ -242,8 +243,9 @@ def hydraulic_aperture(
     Raises
     ------
     InvalidInput
-        An argument is outside its bounds, does not belong to the model or is missing; in a series, s above
-        E/2 or c above 0.25, where the next term is over 12 % of e^3.
+        An argument is outside its bounds, does not belong to the model or is missing. Bounds: c up to 0.25
+        in both models that take it; s up to E/2 for "zimmerman_bodvarsson", a series, the next term of which
+        is then about 12 % of E^3.
 
     References
     ----------

@@ -36,7 +36,7 @@ def _check(problems: Problems, *, surface: Any, cutoff: Any, keep: Any) -> None:
 @public_result(
     title="Filtered surface",
     references="ISO 16610-61 (2015), Linear areal Gaussian filters; ISO 16610-28 (2016), End effects",
-    achieved_error="below 0.002 of the amplitude of any wave, away from the edges",
+    achieved_error="below 0.002 of the amplitude of waves of at least four spacings, away from the edges",
     check=_check,
 )
 def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long") -> xr.DataArray:

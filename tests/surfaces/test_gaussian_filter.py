@@ -23,6 +23,16 @@ def test_transmission_of_a_wave(period, axis):
     assert float(filtered.max()) == pytest.approx(2.0 ** -((12 / period) ** 2), abs=1e-5)
 
 
+@pytest.mark.parametrize("cutoff", [4, 6, 12])
+@pytest.mark.parametrize("period", [4, 6, 8, 16])
+def test_stated_error_holds_from_four_spacings_on(cutoff, period):
+    """For the shortest wave, which the statement leaves out, a cutoff of four spacings is 0.06 off."""
+    wave = np.tile(np.cos(2 * np.pi * np.arange(96) / period), (96, 1))
+    filtered = fc.surfaces.gaussian_filter(surface_of(wave, periodic=True), cutoff * 1e-6)
+    assert "0.002 of the amplitude of waves of at least four spacings" in filtered.attrs["provenance"]
+    assert float(filtered.max()) == pytest.approx(2.0 ** -((cutoff / period) ** 2), abs=2e-3)
+
+
 def test_long_and_short_add_up():
     rough = fc.surfaces.fbm((40, 50), 1e-6, hurst=0.5, rms_increment=1e-7, rng=1)
     long, short = (fc.surfaces.gaussian_filter(rough, CUTOFF, keep=keep) for keep in ("long", "short"))
