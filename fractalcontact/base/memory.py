@@ -6,7 +6,7 @@ system keeps in memory count as free, for they are given up at need.
 
 A public function declares its peak (`public_result(memory=...)`) in bytes for each cell of its largest array,
 or as a function of the grid and the arguments. The numbers were measured as the growth of the resident
-memory of a process during a second call (tests/resources/test_memory.py repeats that).
+memory of a process during a second call; the peaks of whole scenes are tested (tests/resources).
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ class ContactOptions:
 
     def is_periodic(self, grid: Grid) -> bool:
         """Return whether the bodies on this grid are periodic."""
-        return all(grid.periodic) if self.boundary is None else self.boundary == "periodic"
+        return is_periodic(self.boundary, all(grid.periodic))
 
     def influence_on(self, grid: Grid) -> str:
         """Return the influence coefficients used on this grid."""
@@ -222,6 +222,11 @@ class LoadPath:
             return self.control, values
         with np.errstate(over="ignore"):  # what overflows is refused as out of proportion
             return "normal_force", values * nominal_area
+
+
+def is_periodic(boundary: str | None, wraps: bool) -> bool:
+    """Return whether the bodies are periodic, on a surface both axes of which are or are not."""
+    return wraps if boundary is None else boundary == "periodic"
 
 
 def check_scale(

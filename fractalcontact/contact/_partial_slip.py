@@ -22,7 +22,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._load_path import Step, scaled_path, solve_path
-from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale, is_periodic
 from fractalcontact.contact._superposition import (
     FORCE_ROUNDING,
     Superposition,
@@ -101,8 +101,7 @@ def check_sliding(problems: Problems, path: Array, friction: float, normal_force
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the normal and the tangential solution, and of the maps."""
-    boundary = arguments.get("boundary")
-    periodic = plane.periodic if boundary is None else boundary == "periodic"
+    periodic = is_periodic(arguments.get("boundary"), plane.periodic)
     solver = (FULL_BYTES if arguments.get("method") == "full" else NORMAL_BYTES)[0 if periodic else 1]
     maps = sum(map(map_bytes, word_tuple(arguments.get("keep"))))
     return plane.cells * (solver + 2.0 * maps * np.size(arguments.get("tangential_force", 0.0)))

@@ -21,7 +21,7 @@ from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
-from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale, is_periodic
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -41,6 +41,7 @@ NO_STIFFNESS = (
 )
 # bytes of a node: solver of a periodic and of a free body, steps before, indentation, gap with last solution
 PERIODIC_BYTES, FREE_BYTES, PATH_BYTES, YIELD_BYTES, RESULT_BYTES = 48.0, 156.0, 32.0, 48.0, 32.0
+PUNCH_BYTES = 72.0  # of a node: the solution that gives the stiffness, beside that of the step
 PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
@@ -85,10 +86,9 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the solver on the whole plane beside those of the maps."""
     loads = [arguments[name] for name in CONTROLS if arguments.get(name) is not None]
     steps = max(1, int(np.size(loads[0]))) if loads else 1
-    boundary = arguments.get("boundary")
-    periodic = plane.periodic if boundary is None else boundary == "periodic"
-    solver = PERIODIC_BYTES if periodic else FREE_BYTES
+    solver = PERIODIC_BYTES if is_periodic(arguments.get("boundary"), plane.periodic) else FREE_BYTES
     solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
+    solver += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("also")) else 0.0
     maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
     if plane.planes == 1:
         return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra
 from fractalcontact.base.grid import Grid
+from fractalcontact.base.memory import Plane
 from fractalcontact.joints._flow_network import Held, Network, held_cells, link_network
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -20,6 +23,19 @@ MAX_ITERATIONS = 200
 COARSEST = 400  # unknowns of the coarsest grid, solved directly
 LEAF = 9  # cells of a part that nested dissection leaves as it is
 HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones
+
+
+# bytes of an open cell at the peak: 760, 1430 and 1590 by elimination at n = 128, 256, 512; 320 to 620 by
+# multigrid at n = 800, as the allocator reuses its pages or not
+DIRECT_BYTES, MULTIGRID_BYTES = 1600.0, 450.0
+KEPT_BYTES = 48.0  # of a cell of every plane: its opening, and maps of pressure and flux
+
+
+def flow_memory(plane: Plane, _: Mapping[str, Any]) -> float:
+    """Return the bytes of the flow through one plane after the other, and of what is kept of each."""
+    cells = plane.cells / plane.planes
+    by_multigrid = cells > LARGEST_DIRECT and find_spec("pyamg") is not None
+    return cells * (MULTIGRID_BYTES if by_multigrid else DIRECT_BYTES) + KEPT_BYTES * plane.cells
 
 
 class Side(NamedTuple):

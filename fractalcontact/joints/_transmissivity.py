@@ -23,7 +23,7 @@ from fractalcontact.joints._flow_network import (
     spanning_cells,
     winding_cells,
 )
-from fractalcontact.joints._network_pressure import nested_dissection, pressures
+from fractalcontact.joints._network_pressure import flow_memory, nested_dissection, pressures
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -49,7 +49,7 @@ def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic:
         problems.periodic("periodic", periodic, read_grid(gap))
 
 
-@public_result(title="transmissivity of a joint", references=REFERENCES, check=_check)
+@public_result(title="transmissivity of a joint", references=REFERENCES, check=_check, memory=flow_memory)
 def transmissivity(
     gap: xr.DataArray,
     *,

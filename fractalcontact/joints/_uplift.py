@@ -17,7 +17,7 @@ from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._flow_network import check_gap
-from fractalcontact.joints._network_pressure import HeldFlow, Side
+from fractalcontact.joints._network_pressure import HeldFlow, Side, flow_memory
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -137,6 +137,7 @@ def _check_path(problems: Problems, gap: xr.DataArray) -> None:
         "Design of Gravity Dams (1976)"
     ),
     check=_check,
+    memory=flow_memory,
 )
 def uplift(
     gap: xr.DataArray,

@@ -38,6 +38,7 @@ def _check(problems: Problems, *, surface: Any, cutoff: Any, keep: Any) -> None:
     references="ISO 16610-61 (2015), Linear areal Gaussian filters; ISO 16610-28 (2016), End effects",
     achieved_error="below 0.002 of the amplitude of waves of at least four spacings, away from the edges",
     check=_check,
+    memory=42.0,
 )
 def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long") -> xr.DataArray:
     """Keep the wavelengths beyond a cutoff, or those below it, with the Gaussian filter of ISO 16610.

@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
-from fractalcontact.base.validation import LARGEST_INTEGER, Problems
+from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -49,16 +49,10 @@ def check_spacing(problems: Problems, spacing: Any, axes: int | None = None) -> 
     return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)
 
 
-def check_plane(
-    problems: Problems, shape: Any, spacing: Any, *, profile: bool = True, members: Any = None
-) -> bool:
-    """Check shape and spacing of new surfaces together, and whether they fit into memory."""
+def check_plane(problems: Problems, shape: Any, spacing: Any, *, profile: bool = True) -> bool:
+    """Check shape and spacing of new surfaces together."""
     valid_shape = check_shape(problems, shape, profile=profile)
     axes = np.size(shape) if valid_shape else None
-    if valid_shape:
-        is_count = is_real(members) and 0 < members <= LARGEST_INTEGER
-        count = members if is_count else 1  # `check_ensemble` tells any other
-        check_memory(problems.where, (count, *axis_sizes(shape)))
     return check_spacing(problems, spacing, axes) and valid_shape
 
 

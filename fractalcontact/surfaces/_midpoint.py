@@ -36,7 +36,7 @@ def _check(
     members: Any,
     rng: Any,
 ) -> None:
-    check_plane(problems, shape, spacing, profile=False, members=members)
+    check_plane(problems, shape, spacing, profile=False)
     problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
     check_length(problems, "rms_increment", rms_increment)
     check_ensemble(problems, members, rng)

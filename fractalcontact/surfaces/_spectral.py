@@ -17,7 +17,13 @@ from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
 from fractalcontact.base.validation import NONE, Problems, given_option
 from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble, drawing_memory
-from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
+from fractalcontact.surfaces._grid_input import (
+    axis_sizes,
+    axis_spacing,
+    check_length,
+    check_memory,
+    check_plane,
+)
 
 JACOBS = (
     "Jacobs, Junge and Pastewka, Quantitative characterization of surface topography using spectral "
@@ -46,7 +52,7 @@ def _check(
     rng: Any,
 ) -> None:
     before = len(problems.messages)
-    valid_plane = check_plane(problems, shape, spacing, members=members)
+    valid_plane = check_plane(problems, shape, spacing)
     axes = np.size(shape) if valid_plane else 2
     valid_hurst = problems.numbers("hurst", hurst, at_least=0.01, at_most=1.0) and problems.require(
         np.size(hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else ""), hurst
@@ -69,6 +75,7 @@ def _check(
         problems.require(isotropic or axes == 2, "anisotropy_ratio", "1 for a profile", anisotropy_ratio)
     check_ensemble(problems, members, rng)
     if len(problems.messages) == before:
+        check_memory(problems.where, (members or 1, *axis_sizes(shape)))  # before a look at all the modes
         _check_modes(
             problems, _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, azimuth), shape, spacing
         )

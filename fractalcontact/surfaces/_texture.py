@@ -44,6 +44,7 @@ def _check(problems: Problems, *, surface: Any) -> None:
     references="ISO 25178-2 (2021), Surface texture: areal; terms, definitions and parameters",
     achieved_error="exact to rounding for the core; a hundredth of a spacing for the lengths",
     check=_check,
+    memory=110.0,
 )
 def texture(surface: xr.DataArray) -> xr.Dataset:
     """Return the correlation lengths of a surface and the core of its height distribution (ISO 25178-2).

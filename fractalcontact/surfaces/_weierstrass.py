@@ -34,7 +34,7 @@ def _check(
     members: Any,
     rng: Any,
 ) -> None:
-    check_plane(problems, shape, spacing, members=members)
+    check_plane(problems, shape, spacing)
     problems.number("hurst", hurst, above=0, below=1)
     check_length(problems, "rms_height", rms_height)
     problems.number("ratio", ratio, above=1)
