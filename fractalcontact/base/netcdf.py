@@ -149,9 +149,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     where = "fractalcontact.open"
     with Problems(where, UnreadableFile) as problems:
         problems.file("path", path)
-        is_auto = isinstance(chunks, str) and chunks == "auto"
         expected = "'auto', a size of blocks, or a mapping of dims to sizes"
-        are_sizes = chunks is None or is_auto or _is_size(chunks) or _are_sizes(chunks)
+        are_sizes = chunks is None or _is_size(chunks) or _are_sizes(chunks)
         problems.require(are_sizes, "chunks", expected, chunks)
     if chunks is not None and importlib.util.find_spec("dask") is None:
         raise MissingExtra("chunks", "dask", "dask")
@@ -273,13 +272,14 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
 
 
 def _is_size(size: object) -> bool:
+    if isinstance(size, str):
+        return size == "auto"
     return isinstance(size, int) and not isinstance(size, bool) and (size > 0 or size == -1)
 
 
 def _are_sizes(chunks: object) -> bool:
     return isinstance(chunks, Mapping) and all(
-        isinstance(dim, str) and (size in ("auto",) if isinstance(size, str) else _is_size(size))
-        for dim, size in chunks.items()
+        isinstance(dim, str) and _is_size(size) for dim, size in chunks.items()
     )
 
 

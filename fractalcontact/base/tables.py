@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import textwrap
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -21,22 +19,9 @@ GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
 QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])|(?<=±) ")
 
 
-_fixed: ContextVar[int | None] = ContextVar("width of a page, in characters", default=None)
-
-
 def screen_width() -> int:
-    """Return the width of the terminal, which the environment variable COLUMNS overrides, or of a page."""
-    return _fixed.get() or shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
-
-
-@contextmanager
-def fixed_width(columns: int) -> Iterator[None]:
-    """Within this context write for a page of so many characters instead of the terminal."""
-    token = _fixed.set(columns)
-    try:
-        yield
-    finally:
-        _fixed.reset(token)
+    """Return the width of the terminal, which the environment variable COLUMNS overrides."""
+    return shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
 
 
 def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
@@ -112,9 +97,11 @@ class Note:
     """A remark, as text indented below its table and wrapped to the width of the screen."""
 
     words: str
+    indent: int = 2
 
     def __str__(self) -> str:
-        return textwrap.fill(self.words, screen_width(), initial_indent="  ", subsequent_indent="    ")
+        first, rest = " " * self.indent, " " * (self.indent + 2)
+        return textwrap.fill(self.words, screen_width(), initial_indent=first, subsequent_indent=rest)
 
 
 Part = Table | Note | str  # of a summary; a word stands on a line of its own

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.results import provenance_of
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.units import number, quantity_text
 
@@ -194,7 +195,8 @@ def peak_remarks(tree: xr.DataTree, friction: xr.Dataset) -> Iterator[str]:
         strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
         yield f"The peak friction angle {comment}.{strength}"
     elastic = group_of(tree, "joints/elastic_dilatancy")
-    if elastic is None or "elastic_energy" not in elastic or _form(friction) != "kinematic":
+    form = provenance_of(friction).get("parameters", {}).get("form")
+    if elastic is None or "elastic_energy" not in elastic or form != "kinematic":
         return
     angle = _energy_peak(elastic, friction)
     more, locked = (angle - friction["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
@@ -233,14 +235,6 @@ def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
         for number in members
     ]
     return peaks[0] if members == [None] else xr.concat(peaks, MEMBER)
-
-
-def _form(friction: xr.Dataset) -> str:
-    """Return the form of the friction angle that a result states."""
-    try:
-        return str(json.loads(friction.attrs["provenance"])["parameters"]["form"])
-    except (KeyError, TypeError, ValueError):
-        return ""
 
 
 def _material(tree: xr.DataTree) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.netcdf_header import Header, read_headers
-from fractalcontact.base.tables import Part, Table, screen_width, text_of
+from fractalcontact.base.tables import Note, Part, Table, screen_width, text_of
 
 REASONS = ("comment", "reason")  # attributes with a reason for each method, as JSON
 
@@ -98,12 +98,6 @@ def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
     for method, reason in by_method.items() if isinstance(by_method, dict) else ():
         methods.setdefault(str(reason), []).append(method)
     return {", ".join(names): reason for reason, names in methods.items() if reason}
-
-
-def note(text: str, indent: int = 2) -> str:
-    """Return a remark below a table, wrapped to the width of the screen."""
-    first, rest = " " * indent, " " * (indent + 2)
-    return textwrap.fill(text, screen_width(), initial_indent=first, subsequent_indent=rest)
 
 
 def _are_stages(stages: Any) -> bool:
@@ -202,4 +196,4 @@ def _reason_lines(group: Header) -> Iterable[str]:
             for methods, reason in reasons(attributes, key).items():
                 variables.setdefault(f"{methods}: {reason}", []).append(name)
     for text, names in variables.items():
-        yield note(f"{', '.join(names)}, {text}", indent=4)
+        yield str(Note(f"{', '.join(names)}, {text}", indent=4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +71,8 @@ def surface_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
     if scene.surface.generate is not None:
         shape, spacing = np.broadcast_to(options["shape"], 2), np.broadcast_to(options["spacing"], 2)
         return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
-    surface = read_surface(scene.surface, scene.folder)
+    # its heights do not matter: what is removed from them, or filled, leaves the grid as it is
+    surface = read_surface(replace(scene.surface, despike=False, fill=False, level=None), scene.folder)
     return (surface.sizes["y"], surface.sizes["x"]), spacing_of(surface)
 
 

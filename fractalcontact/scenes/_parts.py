@@ -33,6 +33,7 @@ from fractalcontact.scenes._inputs import (
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
+    FROM_RESULTS,
     PART_SIZE,
     PARTIAL_SLIP,
     Stage,
@@ -216,7 +217,7 @@ def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> Stag
     if name == "faces":
         return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
     options = joint_options(scene, name)
-    if name in ("friction", "closure_laws"):
+    if name in FROM_RESULTS:
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
     if stage.row.takes_surface:
         return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))

@@ -225,10 +225,9 @@ def _joint_roughness(tree: xr.DataTree) -> list[Part]:
         rows: list[tuple[str, ...]] = [
             ("joint roughness coefficient (JRC)", "mean", "scatter of the profiles")
         ]
-        for direction in np.atleast_1d(jrc["direction"].values):
-            one = jrc.sel(direction=direction) if "direction" in jrc.dims else jrc
-            low, high = (plain(one[f"roughness_coefficient_{end}"], 1) for end in ("low", "high"))
-            rows.append((str(direction), plain(one["roughness_coefficient"], 1), f"{low} ... {high}"))
+        for direction, profiles in _at_directions(jrc):
+            low, high = (plain(profiles[f"roughness_coefficient_{end}"], 1) for end in ("low", "high"))
+            rows.append((direction, plain(profiles["roughness_coefficient"], 1), f"{low} ... {high}"))
         tables.append(Table(rows))
     if (polar := group_of(tree, "joints/directional_roughness")) is not None:
         metric = polar["roughness_metric"].mean(MEMBER) if MEMBER in polar.dims else polar["roughness_metric"]
@@ -328,10 +327,9 @@ def _decorrelation(tree: xr.DataTree) -> list[Part]:
         return []
     names = ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high")
     rows = [("decorrelation", "length", "95 % interval")]
-    for direction in np.atleast_1d(lengths["direction"].values):
-        state = lengths.sel(direction=direction) if "direction" in lengths.dims else lengths
+    for direction, state in _at_directions(lengths):
         value, low, high = (amount(state[name]) for name in names)
-        rows.append((str(direction), value, "none" if low == "-" else f"{low} ... {high}"))
+        rows.append((direction, value, "none" if low == "-" else f"{low} ... {high}"))
     return [Table(rows)]
 
 
@@ -343,11 +341,11 @@ def _self_weight(tree: xr.DataTree) -> list[Part]:
     faces = "" if "converged" in strengths else " (rigid faces)"  # nothing was pressed without a modulus
     title = f"strength under self-weight{faces}"
     rows: list[tuple[str, ...]] = [(title, "over shear", *sizes, "exponent of size")]
-    for direction in np.atleast_1d(strengths["direction"].values):
-        for shear, state in _at_shears(strengths.sel(direction=direction)):
+    for direction, towards in _at_directions(strengths):
+        for shear, state in _at_shears(towards):
             every = [amount(state["shear_strength"].isel(structure_size=i)) for i in range(len(sizes))]
             exponent = plain(state["strength_exponent"], 3)
-            rows.append((str(direction), shear, *every, "the faces lock" if "-" in every else exponent))
+            rows.append((direction, shear, *every, "the faces lock" if "-" in every else exponent))
     return [Table(rows)]
 
 
@@ -437,16 +435,20 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
         yield length(shear), data.sel(shear=shear) if "shear" in data.dims else data
 
 
+def _at_directions(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Yield the name of every direction with its results."""
+    for direction in np.atleast_1d(data["direction"].values):
+        yield str(direction), data.sel(direction=direction) if "direction" in data.dims else data
+
+
 def _dilatancy(tree: xr.DataTree) -> list[Part]:
     rigid = group_of(tree, "joints/rigid_dilatancy")
     if rigid is None:
         return []
     rows = [("rigid dilatancy", "shear", "dilatancy", "mean slope")]
-    last = rigid.isel(shear=-1)
-    for direction in np.atleast_1d(rigid["direction"].values):
-        state = last.sel(direction=direction) if "direction" in last.dims else last
+    for direction, state in _at_directions(rigid.isel(shear=-1)):
         slope = plain(state["mean_slope"], 4, sign=True) if "mean_slope" in state else ""
-        rows.append((str(direction), amount(state["shear"]), amount(state["rigid_dilatancy"]), slope))
+        rows.append((direction, amount(state["shear"]), amount(state["rigid_dilatancy"]), slope))
     return [Table(rows)]
 
 
@@ -457,15 +459,14 @@ def _friction(tree: xr.DataTree) -> list[Part]:
     column = f"from shear, over {length(friction['peak_distance'].max())}"
     rows = [("peak shear strength", "nominal pressure", "strength", "friction angle", column)]
     names = ("peak_shear_strength", "peak_friction_angle", "peak_shear")
-    for direction in np.atleast_1d(friction["direction"].values):
-        towards = friction.sel(direction=direction) if "direction" in friction.dims else friction
+    for direction, towards in _at_directions(friction):
         for step in range(friction.sizes["step"]):
             state = towards.isel(step=step)
             strength = state["peak_shear_strength"]
             state = state.where(np.isfinite(strength))
             values = [amount(state[name]) for name in names] if _finite(strength).size else None
             pressure = amount(towards["nominal_pressure"].isel(step=step))
-            rows.append((str(direction), pressure, *(values or ("none: the faces lock", "", ""))))
+            rows.append((direction, pressure, *(values or ("none: the faces lock", "", ""))))
     return [Table(rows), *(Note(remark) for remark in peak_remarks(tree, friction))]
 
 

@@ -21,6 +21,7 @@ PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps 
 # stages of a joint with one path of load, and with one direction
 ONE_LOAD = ("closure", "elimination", "area_dimension", PARTIAL_SLIP)
 ONE_DIRECTION = (*ONE_LOAD, "delta_surface", "delta_dimension", "decorrelation_length")
+FROM_RESULTS = ("friction", "closure_laws")  # stages of a joint that take a result alone
 
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
 _FROM_SCENE = frozenset(

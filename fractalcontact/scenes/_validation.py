@@ -39,6 +39,7 @@ from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,
     FIGURES,
+    FROM_RESULTS,
     JOINT_STAGES,
     PARTIAL_SLIP,
     PRESS,
@@ -52,7 +53,6 @@ from fractalcontact.scenes._stages import (
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
 
-FROM_RESULTS = ("friction", "closure_laws")  # stages of a joint that take a result alone
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
 LARGE = 1 << 18  # points of a generated surface that is not made twice
 
