@@ -74,8 +74,7 @@ def area_dimension(
     label_axis(ax.xaxis, "spacing", along)
     label_axis(ax.yaxis, name_of(data["contact_fraction"]), across)
     ax.set_title(shear_text(data))
-    title, labels = load_words(data)
-    _style.sequence_legend(ax, title, labels, colours)
+    _style.sequence_legend(ax, *load_words(data), colours)
     entries = [
         _style.legend_line("cells", marker="o"),
         _style.legend_line("perimeter-\ncorrected", **CORRECTED),

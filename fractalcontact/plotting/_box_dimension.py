@@ -86,8 +86,7 @@ def box_dimension(
     first, *_, last = (*shown.values(), *shown.values())
     first.set_ylabel(name_of(data[name]))
     if data.sizes["step"] > 1:
-        title, labels = shear_words(data)
-        _style.sequence_legend(last, title, labels, colours)
+        _style.sequence_legend(last, *shear_words(data), colours)
     _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
     return as_array(shown)
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
@@ -107,7 +106,7 @@ def closure_laws(
     label_axis(ax.yaxis, name_of(data["normal_force"]), newton)
     _set_scales(ax, length(total), newton(force), log=log)
     if key:
-        shear_legend(ax, data, colours)
+        _style.sequence_legend(ax, *shear_words(data), colours)
     if inner_name != "closure":
         _style.side_legend(
             ax,
@@ -193,7 +192,7 @@ def closure_fits(closure: Any, laws: Any, *, units: Units | None = None, ax: Axe
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data["nominal_pressure"]), along)
     label_axis(ax.yaxis, name_of(data["interface_closure"]), up)
-    shear_legend(ax, data, colours)
+    _style.sequence_legend(ax, *shear_words(data), colours)
     entries = [_style.legend_line(f"{name},\nnot preferred", lw=0.9, ls=style)
                for name, style in zip(("exponential", "hyperbolic"), LAW_LINES, strict=True)]  # fmt: skip
     _style.side_legend(ax, [_style.legend_line("preferred", lw=1.8), *entries], title="law", low=True)
@@ -287,7 +286,7 @@ def contact_area(
     _set_scales(ax, scale(loads), percent(raw), log=log)
     if log and against != "closure":
         entries += _proportional_line(ax, scale(loads), percent(raw))
-    shear_legend(ax, data, colours)
+    _style.sequence_legend(ax, *shear_words(data), colours)
     if corrected:
         lines = [
             _style.legend_line("corrected for\nthe perimeter"),
@@ -315,13 +314,6 @@ def draw_theories(
         authors = ", ".join(part.capitalize() for part in word.split("_"))
         entries.append(_style.legend_line(authors.replace(", ", ",\n"), **style))
     return entries
-
-
-def shear_legend(ax: Axes, data: xr.Dataset, colours: Sequence[Any]) -> None:
-    """Label the curves by their shear; a single curve without a shear gets no legend."""
-    title, labels = shear_words(data)
-    if labels:
-        _style.sequence_legend(ax, title, labels, colours)
 
 
 def mark_points(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:

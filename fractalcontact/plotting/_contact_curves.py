@@ -9,9 +9,9 @@ import numpy as np
 from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._closure import draw_theories, shear_legend
+from fractalcontact.plotting._closure import draw_theories
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import load_words
+from fractalcontact.plotting._paths import load_words, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -196,8 +196,8 @@ def pressure_distribution(
     ax.set_ylabel(f"nominal area per pressure (1/{scale.unit})")
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
-    title, labels = load_words(data.drop_vars("normal_force", errors="ignore"))
-    _style.sequence_legend(ax, title, labels, colours)
+    words = load_words(data.drop_vars("normal_force", errors="ignore"))
+    _style.sequence_legend(ax, *words, colours)
     if spread:
         _style.side_legend(ax, [_style.legend_line("Persson", **THEORY)], title="theory", low=True)
     return ax
@@ -231,6 +231,6 @@ def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axe
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data[against]), scale)
     label_axis(ax.yaxis, "normal stiffness" if name in STIFFNESSES else name_of(data[name]), up)
-    shear_legend(ax, data, colours)
+    _style.sequence_legend(ax, *shear_words(data), colours)
     _style.side_legend(ax, entries, title="theory", low=True)
     return ax

@@ -152,12 +152,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     label_axis(right.xaxis, name_of(data["tangential_force"]), up)
     right.set_ylabel("part of the contact that sticks (%)")
     right.set_ylim(0, 105)
-    title, labels = shear_words(data) if "shear" in data.dims else ("", [])
-    if labels:
-        named = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)
-        _style.side_legend(
-            right, [_style.legend_line(labels[i], color=colours[i]) for i in named], title=title
-        )
+    _style.sequence_legend(right, *shear_words(data), colours)
     return shown
 
 

@@ -84,10 +84,8 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
         ax.set_ylim(bottom=0)
     ax.set_xlabel(axis_label(data[against], along) if labelled else against)
     label_axis(ax.yaxis, name_of(data["hydraulic_aperture"]), across)
-    title, labels = ("", []) if by_shear else shear_words(data)
-    if labels:
-        shown = _style.spread_indices(len(labels), _style.MAX_LEGEND_ENTRIES)
-        _style.side_legend(ax, [_style.legend_line(labels[i], color=colours[i]) for i in shown], title=title)
+    if not by_shear:
+        _style.sequence_legend(ax, *shear_words(data), colours)
     flows = words(data["axis"]) if "axis" in data.coords else []
     if flows:
         entries = [_style.legend_line(f"along {word}", ls=FLOW_LINES[j % 2]) for j, word in enumerate(flows)]
