@@ -120,7 +120,7 @@ def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width:
     shape, extent = state.shape[-2:], extent_of(state)
     cell = (extent[1] - extent[0]) / shape[1]
     if zoom is None:
-        if axes is not None and not hasattr(axes, "subplots"):
+        if _style.are_given(axes):
             return None
         zoom = min(shape) * cell * ZOOM if 72 * width < POINTS * shape[1] else 0.0
     size = round(zoom / cell)

@@ -93,7 +93,7 @@ def _curve_panels(
     axes: Panels | None, count: int, rows: int, columns: int, size: tuple[float, float]
 ) -> AxesArray:
     """Return two rows of Axes: for the curves, and for the local slopes below each of them."""
-    if axes is not None and not hasattr(axes, "subplots"):
+    if _style.are_given(axes):
         return _style.panels(axes, (2, count), size)
     made = _style.panels(axes, (2 * rows, columns), size, height_ratios=(2.2, 1.0) * rows)
     pairs = made.reshape(rows, 2, columns).transpose(1, 0, 2).reshape(2, rows * columns)

@@ -156,7 +156,7 @@ def _dilatancy(tree: xr.DataTree, axes: Panels | None) -> AxesArray:
         below = maps_height(path, path.sizes[dim], 0.75 * width)  # a column of windows is added
     upper: Any
     lower: Any
-    if axes is None or hasattr(axes, "subfigures"):
+    if not _style.are_given(axes):
         sheet: Any = _style.new_figure((width, top + below)) if axes is None else axes
         upper, lower = sheet.subfigures(2, 1, height_ratios=(top, below)) if maps is not None else (sheet, [])
     else:

@@ -146,6 +146,11 @@ def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL, **options: A
     return ax
 
 
+def are_given(axes: Panels | None) -> bool:
+    """Return True for the Axes of panels, False for None and for a figure to make them in."""
+    return axes is not None and not hasattr(axes, "subplots")
+
+
 def panels(
     axes: Panels | None,
     shape: tuple[int, int],
@@ -158,7 +163,7 @@ def panels(
 
     Those given are taken as they come. Otherwise they are made in the figure `axes`, or in a new one.
     """
-    if axes is not None and not hasattr(axes, "subplots"):
+    if are_given(axes):
         given = np.ravel(np.asarray(axes, dtype=object))
         needed = shape[0] * shape[1] if count is None else count
         with Problems("fc.plotting") as problems:
@@ -208,7 +213,7 @@ def figure_of(axes: Any) -> Figure:
 
 def sheet_of(axes: Panels | None, shown: AxesArray) -> Any:
     """Return the figure or subfigure of new panels, None where the panels were given."""
-    return None if axes is not None and not hasattr(axes, "subplots") else shown.ravel()[0].get_figure()
+    return None if are_given(axes) else shown.ravel()[0].get_figure()
 
 
 def ink() -> Any:
