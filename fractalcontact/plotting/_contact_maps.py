@@ -138,7 +138,6 @@ def _magnify(ax: Axes, of: Axes, plane: xr.DataArray, window: Any, letter: str) 
     part = plane.transpose("y", "x")[window]
     length = plane_scale(plane)
     _maps.state(ax, np.asarray(part.values), extent_of(part), length)
-    _maps.bare_frame(ax)
     draw_outline(of, extent_of(part), length, edgecolor=_style.RED, linewidth=1.0)
     for spine in ax.spines.values():
         spine.set(color=_style.RED, linewidth=1.0)
@@ -150,7 +149,6 @@ def _magnify(ax: Axes, of: Axes, plane: xr.DataArray, window: Any, letter: str) 
 def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> None:
     flags = np.asarray(plane.transpose("y", "x").values)
     _maps.state(ax, flags, extent_of(plane), plane_scale(plane))
-    _maps.bare_frame(ax)
     head = "" if number is None else rf"$\bf{{{_style.letter(number)}}}$  "
     fraction = 100 * float(np.mean(flags > 0)) if flags.size else 0.0
     percent = f"{fraction:.0f}" if fraction >= 10 else f"{fraction:.2g}"

@@ -118,12 +118,19 @@ def field(ax: Axes, values: Array, extent: Extent, length: Scale, shown: Scale, 
     return mappable
 
 
-def state(ax: Axes, flags: Array, extent: Extent, length: Scale) -> None:
-    """Draw contact flags (0 open, 1 contact, 2 yielded; or a boolean mask)."""
+def state(
+    ax: Axes,
+    flags: Array,
+    extent: Extent,
+    length: Scale,
+    colours: Sequence[str] = _style.STATE_COLOURS,
+) -> None:
+    """Draw the flags of a contact (0, 1, 2; or a boolean mask), each in its colour."""
     import matplotlib
 
-    palette = np.array([matplotlib.colors.to_rgb(c) for c in _style.STATE_COLOURS])
+    palette = np.array([matplotlib.colors.to_rgb(colour) for colour in colours])
     draw_image(ax, palette[np.clip(np.asarray(flags).astype(np.int64), 0, 2)], extent, length)
+    bare_frame(ax)
 
 
 def draw_image(ax: Axes, image: Array, extent: Extent, length: Scale) -> None:

@@ -16,8 +16,6 @@ from fractalcontact.plotting._surface import plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from fractalcontact.plotting._style import AxesArray, Panels
     from fractalcontact.plotting._units import Units
 
@@ -83,7 +81,8 @@ def slip_domains(
     shown = _style.panels(axes, (-(-count // columns), columns), (max(width, 3.0), height), count=count)
     for number, ax in enumerate(shown):
         step = path.isel(step=number)
-        _slip_map(ax, step["slip_state"])
+        plane = step["slip_state"].transpose("y", "x")
+        _maps.state(ax, plane.values, extent_of(plane), plane_scale(plane), _style.SLIP_COLOURS)
         head = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
         ax.set_title(head + ",  ".join(_title_parts(step, data)), fontsize="medium")
     if "x" in path.coords:
@@ -154,15 +153,6 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     right.set_ylim(0, 105)
     _style.sequence_legend(right, *shear_words(data), colours)
     return shown
-
-
-def _slip_map(ax: Axes, plane: xr.DataArray) -> None:
-    import matplotlib
-
-    palette = np.array([matplotlib.colors.to_rgb(colour) for colour in _style.SLIP_COLOURS])
-    flags = np.asarray(plane.transpose("y", "x").values).astype(np.int64)
-    _maps.draw_image(ax, palette[np.clip(flags, 0, 2)], extent_of(plane), plane_scale(plane))
-    _maps.bare_frame(ax)
 
 
 def _title_parts(step: xr.Dataset, data: xr.Dataset) -> list[str]:
