@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_of_columns
 from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of, table
@@ -70,8 +69,6 @@ def slip_domains(
     3
     """
     result = shown_in(result, units, "slip_domains")
-    with Problems("fc.plotting.slip_domains") as problems:
-        problems.integer("panels", panels, at_least=1)
     data = result_of(result, "slip_domains", ("slip_state",), ("step",))
     require_known_dims(data, "slip_domains", {"slip_state": ("step", "y", "x")})
     path = data.isel(step=_style.spread_indices(data.sizes["step"], panels))

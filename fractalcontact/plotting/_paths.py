@@ -80,7 +80,6 @@ def select_path(
 ) -> tuple[xr.Dataset, str]:
     """Return at most `most` states along the chosen path, and the dim of that path."""
     with Problems(f"fc.plotting.{where}") as problems:
-        problems.integer("panels", most, at_least=1)
         if data.sizes["shear"] > 1 and data.sizes["step"] > 1:
             problems.exactly_one(shear=shear, normal_force=normal_force)
         if normal_force is not None:

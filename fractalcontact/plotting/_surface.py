@@ -128,10 +128,9 @@ def field(data: Any, *, title: str = "", units: Units | None = None, ax: Axes | 
     return ax
 
 
-def _block_extent(block: Any) -> tuple[float, float, float, float]:
+def _block_extent(block: xr.DataArray) -> tuple[float, float, float, float]:
     with Problems("fc.plotting.surface") as problems:
-        if problems.require(isinstance(block, xr.DataArray), "block", "a DataArray with x and y", block):
-            problems.grid("block", block)
+        problems.grid("block", block)
     return extent_of(block)
 
 
