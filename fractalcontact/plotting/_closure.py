@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import nearest, result_of, table, words
-from fractalcontact.plotting._paths import shear_words
+from fractalcontact.plotting._paths import loads_of, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -263,10 +263,7 @@ def contact_area(
     result = shown_in(result, units, "contact_area")
     ax = _style.axes_or_new(ax)
     data = result_of(result, "contact_area", ("contact_fraction", against), ("shear", "step"))
-    with Problems("fc.plotting.contact_area") as problems:
-        own = data[against].dims
-        problems.require(set(own) <= {"shear", "step"}, "against", "a variable of every step", own)
-    loads = table(data, against, ("shear", "step"))
+    loads = loads_of(data, against, "contact_area")
     raw = table(data, "contact_fraction", ("shear", "step"))
     scale, percent = scale_of(data[against]), scale_of(data["contact_fraction"])
     corrected = "corrected_contact_fraction" in data

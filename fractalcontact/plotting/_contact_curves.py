@@ -11,7 +11,7 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import draw_theories
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import load_words, shear_words
+from fractalcontact.plotting._paths import load_words, loads_of, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -213,10 +213,7 @@ def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axe
     """Draw a variable of every step against its load, on logarithmic axes."""
     ax = _style.axes_or_new(ax)
     data = result_of(result, where, (name, against), ("shear", "step"))
-    with Problems(f"fc.plotting.{where}") as problems:
-        own = data[against].dims
-        problems.require(set(own) <= {"shear", "step"}, "against", "a variable of every step", own)
-    loads, values = (table(data, variable, ("shear", "step")) for variable in (against, name))
+    loads, values = loads_of(data, against, where), table(data, name, ("shear", "step"))
     scale = scale_of(data[against])
     up = PER_LENGTH if name in STIFFNESSES else scale_of(data[name])
     colours = _style.sequence_colours(len(loads))

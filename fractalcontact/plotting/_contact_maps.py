@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
     from fractalcontact.plotting._units import Units
 
-COLUMNS = 3
 ZOOM = 1 / 6  # edge of the magnified window over the shorter side
 POINTS = 1.0  # of a screen: a map whose cells are narrower is magnified
 
@@ -80,8 +79,8 @@ def contact_domains(
     data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
     require_known_dims(data, "contact_domains", {"state": ("shear", "step", "y", "x")})
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
-    count, columns = path.sizes[dim], number_of_columns(path.sizes[dim])
-    width = _style.WIDTH * columns / COLUMNS
+    count, columns = path.sizes[dim], _style.number_of_columns(path.sizes[dim])
+    width = _style.WIDTH * columns / _style.COLUMNS
     window = _window(path["state"], zoom, axes, width / columns)
     rows = -(-count // columns)
     size = (max(width, 3.0), maps_height(path, count, width))
@@ -155,14 +154,9 @@ def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> 
     ax.set_title(f"{head}{name}{',  ' if name else ''}{percent} % in contact", fontsize="medium")
 
 
-def number_of_columns(count: int) -> int:
-    """Return the number of columns for a number of maps."""
-    return 2 if count == 4 else min(count, COLUMNS)
-
-
 def maps_height(path: xr.Dataset, count: int, width: float) -> float:
     """Return the height (inches) of a figure of maps with the given width."""
-    columns = number_of_columns(count)
+    columns = _style.number_of_columns(count)
     left, right, bottom, top = extent_of(path["state"])
     shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
     return 0.5 + -(-count // columns) * (shape * (width / columns - 0.15) + 0.28)

@@ -37,7 +37,6 @@ CURVES = {
     "covering_area": (1.0, 0.0, -1.0),
     "covering_length": (1.0, 0.0, -1.0),
 }
-COLUMNS = 3
 CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
@@ -80,7 +79,7 @@ def dimension_curves(
     curves = shown_in(curves, units, "dimension_curves")
     datasets, fits = _curves_in(curves, estimates)
     names = list(datasets)
-    columns = 2 if len(names) == 4 else min(len(names), COLUMNS)
+    columns = _style.number_of_columns(len(names))
     rows = -(-len(names) // columns)
     width = 2.7 * columns + (0.4 if columns > 1 else 1.6)
     shown = _curve_panels(axes, len(names), rows, columns, (width, 3.7 * rows))

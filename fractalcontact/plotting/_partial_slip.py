@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._contact_maps import COLUMNS, maps_height, number_of_columns
+from fractalcontact.plotting._contact_maps import maps_height
 from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of, table
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._surface import plane_scale
@@ -72,8 +72,8 @@ def slip_domains(
     data = result_of(result, "slip_domains", ("slip_state",), ("step",))
     require_known_dims(data, "slip_domains", {"slip_state": ("step", "y", "x")})
     path = data.isel(step=_style.spread_indices(data.sizes["step"], panels))
-    count, columns = path.sizes["step"], number_of_columns(path.sizes["step"])
-    width = _style.WIDTH * columns / COLUMNS
+    count, columns = path.sizes["step"], _style.number_of_columns(path.sizes["step"])
+    width = _style.WIDTH * columns / _style.COLUMNS
     height = maps_height(path.rename(slip_state="state"), count, width) + 0.25
     shown = _style.panels(axes, (-(-count // columns), columns), (max(width, 3.0), height), count=count)
     for number, ax in enumerate(shown):

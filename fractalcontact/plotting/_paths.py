@@ -21,6 +21,14 @@ def load_of(data: xr.Dataset) -> str:
     return next((name for name in LOADS if name in data.variables), "")
 
 
+def loads_of(data: xr.Dataset, against: str, where: str) -> Any:
+    """Return the loads of every shear and step; raise InvalidInput for a variable that is none of a step."""
+    with Problems(f"fc.plotting.{where}") as problems:
+        own = data[against].dims
+        problems.require(set(own) <= {"shear", "step"}, "against", "a variable of every step", own)
+    return table(data, against, ("shear", "step"))
+
+
 def load_words(data: xr.Dataset) -> tuple[str, list[str]]:
     """Return a legend title and a label for each step: its load, or its number."""
     for name in LOADS:

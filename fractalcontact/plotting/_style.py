@@ -29,6 +29,7 @@ STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` w
 FONT_SIZE = 9.0  # points; the sizes of figures below are for text of this size
 WIDTH = 7.2  # inches, a figure with several panels
 PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
+COLUMNS = 3  # of panels, at most
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
 ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
@@ -177,6 +178,11 @@ def panels(
     for ax in shown.ravel():
         style_axes(ax)
     return shown
+
+
+def number_of_columns(count: int) -> int:
+    """Return the number of columns for a number of panels."""
+    return 2 if count == 4 else min(count, COLUMNS)
 
 
 def panel_row(axes: Panels | None, count: int, size: tuple[float, float], **layout: Any) -> AxesArray:
