@@ -13,7 +13,7 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
-from fractalcontact.plotting._units import axis_label, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,7 +128,10 @@ def _dimension_curve(ax: Axes, path: xr.Dataset, name: str, dim: str, colour: An
     if "null_dimension" in path:
         ax.plot(scale(x), table(path, "null_dimension", (dim,)), color=colour, **_style.NULL_LINE)
     _style.log_x_if_wide(ax, x)
-    ax.set_xlabel(axis_label(path[against], scale) if labelled else against)
+    if labelled:
+        label_axis(ax.xaxis, name_of(path[against]), scale)
+    else:
+        ax.set_xlabel(against)
 
 
 @_style.checked

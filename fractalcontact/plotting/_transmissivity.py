@@ -10,7 +10,7 @@ from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table, words
 from fractalcontact.plotting._paths import load_of, shear_words
-from fractalcontact.plotting._units import axis_label, label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,7 +82,10 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     _style.log_x_if_wide(ax, x)
     if np.nanmax(aperture, initial=0.0) > 0:
         ax.set_ylim(bottom=0)
-    ax.set_xlabel(axis_label(data[against], along) if labelled else against)
+    if labelled:
+        label_axis(ax.xaxis, name_of(data[against]), along)
+    else:
+        ax.set_xlabel(against)
     label_axis(ax.yaxis, name_of(data["hydraulic_aperture"]), across)
     if not by_shear:
         _style.sequence_legend(ax, *shear_words(data), colours)

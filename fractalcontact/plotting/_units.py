@@ -138,8 +138,3 @@ def name_of(data: xr.DataArray) -> str:
     quantity = QUANTITIES.get(name)
     long_name = data.attrs.get("long_name") or (quantity.long_name if quantity else name)
     return SHORT.get(name, str(long_name))
-
-
-def axis_label(data: xr.DataArray, scale: Scale) -> str:
-    """Return the label of an axis that shows `data` at `scale`."""
-    return scale.label(name_of(data))

@@ -27,6 +27,14 @@ def test_chosen_prefix_can_be_read(study):
     assert ax.xaxis.get_units() in ax.get_xlabel()
 
 
+def test_units_of_the_load_can_be_read(study):
+    ax = plotting.hydraulic_aperture(study["joints/transmissivity"], units={"normal_force": "N"})
+    assert (ax.get_xlabel(), ax.xaxis.get_units()) == ("normal force $F$ (N)", "N")
+    loads, shears = plotting.box_dimension(study["domains/box_dimension"], units={"shear": "m"})
+    assert loads.xaxis.get_units() in loads.get_xlabel()
+    assert (shears.get_xlabel(), shears.xaxis.get_units()) == ("shear displacement $v$ (m)", "m")
+
+
 def test_units_of_maps_and_of_both_axes_of_an_envelope(study):
     surface = study["surfaces"]
     ax = plotting.surface(surface, units={"x": "µm", "height": "nm"})
