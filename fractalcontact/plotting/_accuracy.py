@@ -73,8 +73,9 @@ def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArra
     shape = (len(benchmarks), 2)
     shown = _style.panels(axes, shape, (8.6, 2.7 * len(benchmarks)), sharey="row")
     for (left, right), (name, data) in zip(shown, benchmarks.items(), strict=True):
-        seconds = scale_for("s", table(data, "run_time", PLANE))
-        _error_curves(left, data, seconds(table(data, "run_time", PLANE)))
+        run_time = table(data, "run_time", PLANE)
+        seconds = scale_for("s", run_time)
+        _error_curves(left, data, seconds(run_time))
         label_axis(left.xaxis, name_of(data["run_time"]), seconds)
         left.set_ylabel("true error")
         entries = _error_curves(right, data, table(data, "memory", PLANE) / MEGABYTE)

@@ -67,8 +67,9 @@ def box_dimension(
     coverage (%) | box dimension $\Delta_\sigma$
     """
     result = shown_in(result, units, "box_dimension")
-    present = [name for name in DIMENSIONS if name in as_dataset(result, "box_dimension")]
-    data = result_of(result, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
+    dataset = as_dataset(result, "box_dimension")
+    present = [name for name in DIMENSIONS if name in dataset]
+    data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
     name = present[0]
     shown = path_panels(axes, data)
     colours = _style.sequence_colours(data.sizes["shear"])

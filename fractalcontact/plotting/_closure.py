@@ -97,14 +97,13 @@ def closure_laws(
     with Problems("fc.plotting.closure_laws") as problems:
         last = force.shape[1] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
+    _set_scales(ax, length(total), newton(force), log=log)
     if len(marked) and len(force):
         row = 0 if shear is None or len(force) == 1 else nearest(data["shear"], shear)
         steps = [int(step) for step in marked]
-        _set_scales(ax, length(total), newton(force), log=log)
         mark_points(ax, length(inner[row, steps]), newton(force[row, steps]), colours[row])
     label_axis(ax.xaxis, "closure", length)
     label_axis(ax.yaxis, name_of(data["normal_force"]), newton)
-    _set_scales(ax, length(total), newton(force), log=log)
     if key:
         _style.sequence_legend(ax, *shear_words(data), colours)
     if inner_name != "closure":
@@ -267,14 +266,13 @@ def contact_area(
     raw = table(data, "contact_fraction", ("shear", "step"))
     scale, percent = scale_of(data[against]), scale_of(data["contact_fraction"])
     corrected = "corrected_contact_fraction" in data
+    fraction = table(data, "corrected_contact_fraction", ("shear", "step")) if corrected else raw
     colours = _style.sequence_colours(len(loads))
     dot = "o" if loads.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
-        style = RAW_LINE if corrected else {}
-        ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **style)
         if corrected:
-            fraction = table(data, "corrected_contact_fraction", ("shear", "step"))[i]
-            ax.plot(scale(loads[i]), percent(fraction), color=colour, marker=dot)
+            ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **RAW_LINE)
+        ax.plot(scale(loads[i]), percent(fraction[i]), color=colour, marker=dot)
     label_axis(ax.xaxis, name_of(data[against]), scale)
     label_axis(ax.yaxis, "real / nominal contact area", percent)
     entries: list[Any] = []

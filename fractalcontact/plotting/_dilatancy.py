@@ -67,18 +67,18 @@ def rigid_dilatancy(dilatancy: Any, *, units: Units | None = None, ax: Axes | No
     across, along = scale_of(data["rigid_dilatancy"]), scale_of(data["shear"])
     entries, styles = [], direction_styles(data)
     dot = "o" if shear.size == 1 else ""
+    slopes = table(data, "mean_slope", ("direction",)) if "mean_slope" in data else None
     for i, (name, style) in enumerate(styles):
         ax.plot(along(shear), across(opening[i]), marker=dot, **style)
         entries.append(_style.legend_line(name, **style))
-        if "mean_slope" in data:
-            slope = float(table(data, "mean_slope", ("direction",))[i])
+        if slopes is not None:
             ends = np.array([0.0, np.nanmax(shear)])
-            ax.plot(along(ends), across(slope * ends), color=style["color"], **MEAN_SLOPE_LINE)
+            ax.plot(along(ends), across(slopes[i] * ends), color=style["color"], **MEAN_SLOPE_LINE)
     label_axis(ax.xaxis, name_of(data["shear"]), along)
     label_axis(ax.yaxis, name_of(data["rigid_dilatancy"]), across)
     if any(name for name, _ in styles):
         _style.side_legend(ax, entries, title="block slides")
-    if "mean_slope" in data:
+    if slopes is not None:
         _style.side_legend(ax, [_style.legend_line("mean slope", **MEAN_SLOPE_LINE)], low=True)
     return ax
 
