@@ -306,8 +306,8 @@ def draw_theories(
             continue
         style: dict[str, Any] = {"ls": "-.", "lw": 1.0, "color": colours[(i + 1) % len(colours)]}
         ax.plot(scale(loads), up(values[i]), **style)
-        authors = ", ".join(part.capitalize() for part in word.split("_"))
-        entries.append(_style.legend_line(authors.replace(", ", ",\n"), **style))
+        authors = ",\n".join(part.capitalize() for part in word.split("_"))
+        entries.append(_style.legend_line(authors, **style))
     return entries
 
 

@@ -13,11 +13,13 @@ from fractalcontact.base.results import provenance_of
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._contact_curves import PER_LENGTH
 from fractalcontact.plotting._inputs import table, words
 from fractalcontact.plotting._paper import group
 from fractalcontact.plotting._paths import shear_words
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
+from fractalcontact.plotting._transmissivity import FLOW_LINES
 from fractalcontact.plotting._units import label_axis
 
 if TYPE_CHECKING:
@@ -29,8 +31,7 @@ if TYPE_CHECKING:
 A4 = (8.27, 11.69)  # inches
 ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
 COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
-FLOW_LINES = ("-", (0, (4, 2)))
-STIFFNESS, FLOW = Scale(1e9, "MPa/mm"), Scale(1.0, "m³")
+FLOW = Scale(1.0, "m³")
 # what a consultant has to answer for, with its symbol and its unit
 INPUTS = {
     "young": ("E", "Pa"),
@@ -250,7 +251,7 @@ def _closure_lines(laws: xr.Dataset | None) -> Iterator[str]:
             yield f"  {shear}hyperbolic"
             for constant, symbol, scale in (
                 ("greatest_closure", "Vm", scale_for("m", law["greatest_closure_low"])),
-                ("initial_stiffness", "Kni", STIFFNESS),
+                ("initial_stiffness", "Kni", PER_LENGTH),
             ):
                 yield f"      {symbol} {_interval(law, constant, scale)}"
         elif name == "exponential":
@@ -282,7 +283,7 @@ def _flow_panels(
         else:
             closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
             stiffness = secant_stiffness(pressure, closed)
-        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", STIFFNESS)
+        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", PER_LENGTH)
         gap = table(_with_dims(closure), "mean_gap", ("shear", "step"))
         _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap))
     if flow is not None and "nominal_pressure" in flow.variables:
