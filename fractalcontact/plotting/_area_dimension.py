@@ -33,7 +33,7 @@ def area_dimension(
     shear : float, optional
         Shear (m), the nearest one is drawn; None: the middle one.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -57,7 +57,7 @@ def closure_laws(
     log : bool
         Logarithmic axes, which show every decade of the load.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -134,7 +134,7 @@ def closure_fits(closure: Any, laws: Any, *, units: Units | None = None, ax: Axe
     laws : Dataset or node of a DataTree
         From `fractalcontact.joints.closure_laws` of the same closure, also with a seating pressure.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -233,7 +233,7 @@ def contact_area(
     log : bool
         Logarithmic axes, which show every decade of the load; a dotted line is proportional to the load.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

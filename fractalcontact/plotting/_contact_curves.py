@@ -46,7 +46,7 @@ def mean_gap(
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -94,7 +94,7 @@ def stiffness(
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -140,7 +140,7 @@ def pressure_distribution(
         From `fractalcontact.contact.theories`: dash-dotted curves of Persson (2001), a Gaussian about the
         nominal pressure less that about its negative.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -53,7 +53,7 @@ def contact_domains(
         Edge (m) of the window, 0 for none. Default: a sixth of the shorter side if the cells of a map are
         narrower than a typographic point, else none; none on given `axes`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

@@ -30,7 +30,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     memory : Dataset or node of a DataTree
         From `fractalcontact.joints.decorrelation_length`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -87,7 +87,7 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
     dimension : Dataset or node of a DataTree
         From `fractalcontact.joints.delta_dimension`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

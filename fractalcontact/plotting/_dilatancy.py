@@ -34,7 +34,7 @@ def rigid_dilatancy(dilatancy: Any, *, units: Units | None = None, ax: Axes | No
         From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), and optionally
         mean_slope over direction.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -109,7 +109,7 @@ def elastic_dilatancy(
     marked : sequence of float
         Shear displacements (m) to mark A, B, C ... on the curve of the last force.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -55,7 +55,7 @@ def dimension_curves(
         From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
         scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

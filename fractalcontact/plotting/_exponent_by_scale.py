@@ -30,7 +30,7 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     result : Dataset or node of a DataTree
         From `fractalcontact.dimensions.scaling`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

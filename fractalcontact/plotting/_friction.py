@@ -50,7 +50,7 @@ def friction(
     reach : float, optional
         Largest shear displacement (m) to show.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

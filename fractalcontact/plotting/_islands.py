@@ -44,7 +44,7 @@ def islands(result: Any, *, units: Units | None = None, axes: Panels | None = No
         `island`. Of several masks the last one with an island is mapped, and each gets a curve (at most
         eight are drawn).
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -91,7 +91,7 @@ def island_map(
     title : str, optional
         Default: the number of islands.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

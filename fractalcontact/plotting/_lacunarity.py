@@ -37,7 +37,7 @@ def lacunarity(
     normal_force : float, optional
         Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. There is one for each of the
         dims that is longer than one. Default: a new figure.

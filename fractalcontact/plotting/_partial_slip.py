@@ -39,7 +39,7 @@ def slip_domains(
     panels : int
         Largest number of maps, spread evenly over the steps.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -99,7 +99,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
         From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
         (shear, step).
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

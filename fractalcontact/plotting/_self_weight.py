@@ -33,7 +33,7 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.self_weight`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

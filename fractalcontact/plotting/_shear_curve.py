@@ -33,7 +33,7 @@ def shear_curve(
     beside : Dataset or node of a DataTree, optional
         Such a result to draw dashed, in the colours of the same normal stresses.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

@@ -70,7 +70,7 @@ def sliding_scheme(
     upper : DataArray, Dataset or node of a DataTree, optional
         Heights (m) of the block in the same coordinates. Default: mated, equal to `surface`.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 

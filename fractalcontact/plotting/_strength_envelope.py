@@ -33,7 +33,7 @@ def strength_envelope(
     tests : Dataset or node of a DataTree, optional
         From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -47,7 +47,7 @@ def surface(
         colours are then those of the bar on average only.
     title : str
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 
@@ -93,7 +93,7 @@ def field(data: Any, *, title: str = "", units: Units | None = None, ax: Axes | 
         Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale.
     title : str
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -35,7 +35,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
         From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
         over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     ax : Axes, optional
         Default: those of a new figure.
 

@@ -37,7 +37,7 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.uplift`, of one gap.
     units : mapping of str to str, optional
-        Units of variables, `{"shear": "mm"}`. Default: with a suitable prefix.
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
