@@ -19,10 +19,15 @@ def shifted(heights: Array) -> tuple[Array, float, float]:
     Subtracting an observed height loses no digits of heights that are close to each other. Scaled values are
     within -1 and 1; NaN stays.
     """
-    observed = heights[np.isfinite(heights)]
-    reference = float(observed[observed.size // 2])
+    low, high = float(heights.min()), float(heights.max())
+    if np.isfinite(low) and np.isfinite(high):
+        reference = float(heights.flat[heights.size // 2])
+    else:
+        observed = heights[np.isfinite(heights)]
+        reference = float(observed[observed.size // 2])
+        low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     offset = heights - reference
-    largest = float(np.nanmax(np.abs(offset)))
+    largest = max(high - reference, reference - low)
     scale = math.ldexp(1.0, math.frexp(largest)[1]) if largest > 0 else 1.0
     offset /= scale
     return offset, reference, scale
@@ -58,17 +63,23 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
 def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
     """Return the slope of the mean plane along each axis, y first; NaN if it is undetermined."""
     values, _, scale = shifted(heights)
+    return tuple(scale * slope for slope in scaled_slopes(values, spacing))
+
+
+def scaled_slopes(values: Array, spacing: Sequence[float]) -> tuple[float, ...]:
+    """Return the slopes of heights that `shifted` has scaled; they are not changed."""
     observed = np.isfinite(values)
-    values[~observed] = 0.0
-    basis = _basis(heights.shape, 1)
+    if not observed.all():
+        values = np.where(observed, values, 0.0)
+    basis = _basis(values.shape, 1)
     gram = _gram(basis, observed)
     singular = np.linalg.svd(gram, compute_uv=False)
     if singular[-1] < RANK * singular[0]:
-        return (math.nan,) * heights.ndim
+        return (math.nan,) * values.ndim
     weights = np.linalg.solve(gram, np.array([_project(values, functions) for functions in basis]))
     # the basis is 1, then each axis in half-extents, x before y
-    halves = [0.5 * (n - 1) * step for n, step in zip(heights.shape, spacing, strict=True)]
-    return tuple(float(w) * scale / half for w, half in zip(weights[:0:-1], halves, strict=True))
+    halves = [0.5 * (n - 1) * step for n, step in zip(values.shape, spacing, strict=True)]
+    return tuple(float(w) / half for w, half in zip(weights[:0:-1], halves, strict=True))
 
 
 def _basis(shape: tuple[int, ...], order: int) -> list[tuple[Array, ...]]:
@@ -81,11 +92,13 @@ def _basis(shape: tuple[int, ...], order: int) -> list[tuple[Array, ...]]:
 
 def _gram(basis: list[tuple[Array, ...]], observed: Array) -> Array:
     """Return the sums of products of the basis over the observed points."""
-    weight = observed.astype(np.float64)
+    complete = bool(observed.all())
+    weight = np.ones(1) if complete else observed.astype(np.float64)
     gram = np.empty((len(basis), len(basis)))
     for (i, first), (j, second) in itertools.combinations_with_replacement(enumerate(basis), 2):
         functions = tuple(a * b for a, b in zip(first, second, strict=True))
-        gram[i, j] = gram[j, i] = _project(weight, functions)
+        total = math.prod(float(f.sum()) for f in functions) if complete else _project(weight, functions)
+        gram[i, j] = gram[j, i] = total
     return gram
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,14 @@ import xarray as xr
 from fractalcontact.base import spectra
 from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.polynomial import shifted, slopes
+from fractalcontact.base.polynomial import scaled_slopes, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
 Array = np.ndarray[Any, np.dtype[Any]]
 
+BLOCK = 1 << 14  # points at a time, so that their differences stay in the cache
 HEIGHT_STATISTICS = (
     "mean_height",
     "rms_height",
@@ -108,7 +110,7 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     values["missing_points"] = values["missing_points"].astype(np.int64)
     by_modes = all(grid.periodic) and not np.isnan(planes).any()
     result = xr.Dataset(
-        {name: (leading, value) for name, value in values.items()},
+        {name: (leading, value) for name, value in values.items()} | {"run_time": np.nan},  # is set later
         coords=leading_coords(surface, leading, _result_names(len(grid.shape))),
         attrs={"derivatives": "modes" if by_modes else "differences"},
     )
@@ -123,15 +125,17 @@ def _result_names(axes: int) -> list[str]:
 
 def _explain_missing(result: xr.Dataset, planes: Array) -> None:
     """Set the attribute `reason` of every statistic that is NaN."""
+    variables = {name: result.variables[name] for name in result.data_vars if name != "run_time"}
+    undefined = [name for name, variable in variables.items() if np.isnan(variable.values).any()]
+    if not undefined:
+        return
     empty = bool(np.isnan(planes).all(axis=tuple(range(1, planes.ndim))).any())
-    flat = bool((result["peak_to_valley"] == 0).any())
-    for name in ("skewness", "kurtosis", "nayak_parameter"):
-        if flat:
-            result[name].attrs["reason"] = "all heights of a surface are equal"
-    for variable in result.data_vars.values():
-        if "reason" not in variable.attrs and bool(np.isnan(variable).any()):
-            reason = "no point was observed" if empty else "too few neighbouring points were observed"
-            variable.attrs["reason"] = reason
+    flat = bool((variables["peak_to_valley"].values == 0).any())
+    for name in undefined:
+        reason = "no point was observed" if empty else "too few neighbouring points were observed"
+        if flat and name in ("skewness", "kurtosis", "nayak_parameter"):
+            reason = "all heights of a surface are equal"
+        variables[name].attrs["reason"] = reason
 
 
 def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> dict[str, float]:
@@ -139,29 +143,35 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
 
     A complete periodic plane is differentiated by its Fourier modes; any other by differences of neighbours.
     """
-    result = _heights(heights)
-    if math.isnan(result["mean_height"]):
+    complete = not np.isnan(heights.min())
+    if not complete and np.isnan(heights).all():
+        result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": float(heights.size)}
         return result | dict.fromkeys(_gradient_names(heights.ndim), math.nan)
-    values, _, scale = shifted(heights)
+    values, reference, scale = shifted(heights)
+    result = _heights(values if complete else values[~np.isnan(values)], reference, scale)
+    result["missing_points"] = 0.0 if complete else float(np.count_nonzero(np.isnan(values)))
     unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
     steps = [step / unit for step in spacing]
-    if all(periodic) and not np.isnan(values).any():
+    ratio = scale / unit
+    neighbours = _neighbours(values, steps, periodic, ratio, complete)
+    if all(periodic) and complete:
         psd, _ = spectra.periodogram(values, steps)
         moments = spectra.spectral_moments(psd, values.shape, steps)
         along = spectra.directional_slopes(psd, values.shape, steps)
     else:
-        moments, along = _differences(values, steps, periodic, (result["rms_height"] / scale) ** 2)
-    ratio = scale / unit
-    mean = slopes(heights, spacing)
+        squares = neighbours.slope_squares
+        height = (result["rms_height"] / scale) ** 2
+        moments = spectra.Moments(height, sum(squares), neighbours.laplacian_square, values.ndim)
+        along = tuple(math.sqrt(square) for square in squares)
+    mean = scaled_slopes(values, spacing)
     result["rms_slope"] = moments.rms_slope * ratio
     result["rms_curvature"] = moments.rms_curvature * ratio / unit
     result["nayak_parameter"] = moments.nayak
     for name, rms, slope in zip(("y", "x")[2 - heights.ndim :], along, mean, strict=True):
         result[f"rms_slope_{name}"] = rms * ratio
-        result[f"mean_slope_{name}"] = slope
-    excess = _developed_excess(values, [step / ratio for step in steps], periodic)
-    result["developed_area_ratio"] = 1.0 + excess
-    result["developed_area_excess"] = excess
+        result[f"mean_slope_{name}"] = scale * slope
+    result["developed_area_ratio"] = 1.0 + neighbours.excess
+    result["developed_area_excess"] = neighbours.excess
     return result
 
 
@@ -172,81 +182,130 @@ def _gradient_names(axes: int) -> list[str]:
     ]
 
 
-def _heights(heights: Array) -> dict[str, float]:
-    """Return the statistics of the distribution of heights."""
-    observed = heights[~np.isnan(heights)]
-    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {
-        "missing_points": float(heights.size - observed.size)
-    }
-    if observed.size == 0:
-        return result
-    values, reference, scale = shifted(observed)
+def _heights(values: Array, reference: float, scale: float) -> dict[str, float]:
+    """Return the statistics of the distribution of heights reference + scale * values."""
+    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan)
     mean = float(values.mean())
-    values -= mean
-    squares = values * values  # higher powers as products: numpy takes ten times as long for values**3
-    variance = float(np.mean(squares))
+    highest, lowest = float(values.max()), float(values.min())
+    sums = np.zeros(4)
+    line = values.reshape(-1)
+    for start in range(0, line.size, BLOCK):
+        part = line[start : start + BLOCK] - mean
+        squares = part * part  # higher powers as products: numpy takes ten times as long for values**3
+        sums += (np.abs(part).sum(), squares.sum(), squares @ part, squares @ squares)
+    size, variance = line.size, float(sums[1]) / line.size
     result["mean_height"] = reference + scale * mean
     result["rms_height"] = scale * math.sqrt(variance)
-    result["mean_absolute_height"] = scale * float(np.mean(np.abs(values)))
-    result["peak_height"] = scale * float(values.max())
-    result["valley_depth"] = -scale * float(values.min())
-    result["peak_to_valley"] = float(observed.max() - observed.min())
-    if result["peak_to_valley"] > 0.0:
-        result["skewness"] = float(np.mean(squares * values)) / variance**1.5
-        result["kurtosis"] = float(np.mean(squares * squares)) / variance**2
+    result["mean_absolute_height"] = scale * float(sums[0]) / size
+    result["peak_height"] = scale * (highest - mean)
+    result["valley_depth"] = scale * (mean - lowest)
+    result["peak_to_valley"] = scale * (highest - lowest)
+    if highest > lowest:
+        result["skewness"] = float(sums[2]) / size / variance**1.5
+        result["kurtosis"] = float(sums[3]) / size / variance**2
     return result
 
 
-def _differences(
-    values: Array, steps: Sequence[float], periodic: Sequence[bool], height: float
-) -> tuple[spectra.Moments, tuple[float, ...]]:
-    """Return the moments from differences of neighbours, and the rms slope along each axis."""
-    squares = []
-    laplacian: Array = np.zeros_like(values)
-    for axis, (step, wraps) in enumerate(zip(steps, periodic, strict=True)):
-        squares.append(_mean_square(_step(values, axis, wraps) / step))
-        laplacian = laplacian + _second(values, axis, wraps) / step**2
-    moments = spectra.Moments(height, sum(squares), _mean_square(laplacian), values.ndim)
-    return moments, tuple(float(math.sqrt(square)) for square in squares)
+@dataclass(frozen=True)
+class Neighbours:
+    """Means over pairs, triples and cells of neighbours, in scaled heights and steps; NaN without any.
+
+    Attributes
+    ----------
+    slope_squares : tuple of float
+        Mean square difference quotient along each axis.
+    laplacian_square : float
+        Mean square of the sum of second difference quotients.
+    excess : float
+        Mean of sqrt(1 + gradient^2) - 1 over chords, or over triangles of cells cut both ways.
+    """
+
+    slope_squares: tuple[float, ...]
+    laplacian_square: float
+    excess: float
 
 
-def _step(values: Array, axis: int, wraps: bool) -> Array:
-    if wraps:
-        return np.roll(values, -1, axis) - values
-    return np.diff(values, axis=axis)
+def _neighbours(
+    values: Array, steps: Sequence[float], periodic: Sequence[bool], ratio: float, complete: bool
+) -> Neighbours:
+    """Return the means over neighbours; `ratio` is the unit of height over that of length."""
+    plane = values.reshape((1,) * (2 - values.ndim) + values.shape)
+    step_y, step_x = (1.0, *steps)[-2:]
+    wrap_y, wrap_x = (False, *periodic)[-2:]
+    ny, nx = plane.shape
+    sums = []
+    rows = max(1, BLOCK // nx)  # a block and its differences stay in the cache
+    for start in range(0, ny, rows):
+        stop = min(start + rows, ny)
+        above, below = int(wrap_y or start > 0), int(wrap_y or stop < ny)
+        if start >= above and stop + below <= ny:
+            block = plane[start - above : stop + below]
+        else:
+            block = plane[np.arange(start - above, stop + below) % ny]
+        if wrap_x:
+            block = np.concatenate([block[:, -1:], block, block[:, :1]], axis=1)
+        own = (above, stop - start), (int(wrap_x), nx)
+        sums.append(_block_sums(block, own, (step_y, step_x), ratio * ratio, complete))
+    means = [float(total / count) if count else math.nan for total, count in np.sum(sums, axis=0)]
+    return Neighbours(tuple(means[2 - values.ndim : 2]), *means[2:])
 
 
-def _second(values: Array, axis: int, wraps: bool) -> Array:
-    """Return second differences on all points, NaN where a neighbour is missing."""
-    second = np.roll(values, -1, axis) - 2.0 * values + np.roll(values, 1, axis)
-    if not wraps:
-        edge = [slice(None)] * values.ndim
-        for end in (0, -1):
-            edge[axis] = slice(end, end + 1 or None)
-            second[tuple(edge)] = np.nan
-    return second
+def _block_sums(
+    block: Array,
+    own: tuple[tuple[int, int], tuple[int, int]],
+    steps: tuple[float, float],
+    ratio_squared: float,
+    complete: bool,
+) -> list[tuple[float, int]]:
+    """Return sums and counts: squares of the slopes along y and x and of the Laplacian, excess of area.
+
+    `own` is the first row and the number of rows that the block is about, and the same of its columns; the
+    others are neighbours. A block of one row, without neighbours, is a profile.
+    """
+    (first_row, rows), (first_column, columns) = own
+    across = np.diff(block[first_row:], axis=1)  # from each point to the next
+    across /= steps[1]
+    along = np.diff(block, axis=0)
+    along /= steps[0]
+    laplacian = np.diff(across[:rows], axis=1)
+    laplacian /= steps[1]
+    if len(block) > 1:
+        bend = np.diff(along, axis=0)
+        bend /= steps[0]
+        start = 1 - first_row  # the first row of the plane has no second difference
+        laplacian = laplacian[start : start + len(bend)]
+        laplacian += bend[:, 1:-1]
+    laplacian *= laplacian
+    along, across = along[first_row:], across[:, first_column:]
+    along *= along
+    across *= across
+    results = [along[:, first_column : first_column + columns], across[:rows], laplacian]
+    sums = [_sum(values, complete) for values in results]
+    across *= ratio_squared
+    if len(block) == 1:
+        return [*sums, _sum(_excess(across), complete)]
+    along *= ratio_squared
+    cells = across.shape[1]
+    excess = np.zeros((len(along), cells))
+    for above in (0, 1):
+        for left in (0, 1):
+            start = first_column + left
+            excess += _excess(across[above : above + len(along)] + along[:, start : start + cells])
+    excess *= 0.25
+    return [*sums, _sum(excess, complete)]
 
 
-def _mean_square(values: Array) -> float:
-    observed = values[~np.isnan(values)]
-    return float(np.mean(observed**2)) if observed.size else math.nan
-
-
-def _developed_excess(values: Array, steps: Sequence[float], periodic: Sequence[bool]) -> float:
-    """Return the mean of sqrt(1 + gradient^2) - 1 over chords, or over triangles of cells cut both ways."""
-    if values.ndim == 1:
-        slope = _step(values, 0, periodic[0]) / steps[0]
-        excess = _excess(slope**2)
-        return float(np.nanmean(excess)) if np.isfinite(excess).any() else math.nan
-    across = _step(values, 1, periodic[1]) / steps[1]
-    along = _step(values, 0, periodic[0]) / steps[0]
-    rows = (across, np.roll(across, -1, 0)) if periodic[0] else (across[:-1], across[1:])
-    columns = (along, np.roll(along, -1, 1)) if periodic[1] else (along[:, :-1], along[:, 1:])
-    excess = np.mean([_excess(row**2 + column**2) for row in rows for column in columns], axis=0)
-    observed = excess[np.isfinite(excess)]
-    return float(observed.mean()) if observed.size else math.nan
+def _sum(values: Array, complete: bool) -> tuple[float, int]:
+    """Return the sum of the observed values, and their number."""
+    if not complete:
+        values = values[np.isfinite(values)]
+    return float(values.sum()), values.size
 
 
 def _excess(square: Array) -> Array:
-    """Return sqrt(1 + square) - 1 without loss of digits for small slopes."""
-    return np.asarray(square / (1.0 + np.sqrt(1.0 + square)))
+    """Return sqrt(1 + square) - 1 without loss of digits for small slopes; `square` is overwritten."""
+    root = square + 1.0
+    np.sqrt(root, out=root)
+    root += 1.0
+    square /= root
+    return square
