@@ -110,8 +110,9 @@ def radial_average(
     counts : ndarray of int64, shape (k,)
         Modes of the full plane in each ring; half of them are independent.
     """
-    radius = radial_wavenumber(shape, spacing)
-    weights = np.broadcast_to(half_weights(shape[-1]), radius.shape)
+    ny, half = shape[0], shape[0] // 2 + 1
+    waves = half_wavenumbers(shape, spacing)
+    radius = np.sqrt(_square((waves[0][:half], waves[1]))).ravel()  # rows of -q_y have the same
     nyquist = np.pi / max(spacing)
     if edges is None:
         finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
@@ -119,23 +120,30 @@ def radial_average(
         low = finer * (np.arange(int(np.ceil(0.5 * step / finer - 0.5 - 1e-9))) + 0.5)
         edges = np.concatenate([low, edges])
     edges = np.asarray(edges, dtype=np.float64)
-    ring = np.searchsorted(edges, radius.ravel(), side="right") - 1
-    inside = (
-        (ring >= 0)
-        & (ring < edges.size - 1)
-        & (radius.ravel() <= nyquist * (1 + 1e-12))
-        & (radius.ravel() > 0)
-    )
-    ring, weight = ring[inside], weights.ravel()[inside]
-    counts = np.bincount(ring, weight, minlength=edges.size - 1)
+    rings = edges.size - 1
+    ring = np.searchsorted(edges, radius, side="right")  # 0 and rings + 1 hold what is in no ring
+    ring[(radius > nyquist * (1 + 1e-12)) | (radius == 0)] = 0
+
+    def sums(weights: Array) -> Array:
+        return np.bincount(ring, weights.ravel(), minlength=rings + 2)[1 : rings + 1]
+
+    columns = half_weights(shape[1])
+    rows = np.full(half, 2.0)
+    rows[0] = 1.0
+    if ny % 2 == 0:
+        rows[-1] = 1.0
+    weights = np.multiply.outer(rows, columns).ravel()
+    counts = sums(weights)
     filled = counts > 0
-    q = np.bincount(ring, weight * radius.ravel()[inside], minlength=counts.size)[filled] / counts[filled]
-    planes = psd.reshape(-1, radius.size)[:, inside]
-    mean: Array = np.stack(
-        [np.bincount(ring, weight * plane, minlength=counts.size)[filled] for plane in planes]
-    )
-    mean = mean / counts[filled]
-    return q, mean.reshape(*psd.shape[: -len(shape)], q.size), counts[filled].astype(np.int64)
+    weights *= radius
+    q = sums(weights)[filled] / counts[filled]
+    means = []
+    for plane in psd.reshape(-1, ny, columns.size):
+        folded = plane[:half] * columns
+        folded[1 : (ny + 1) // 2] += plane[: ny // 2 : -1] * columns
+        means.append(sums(folded)[filled] / counts[filled])
+    mean = np.reshape(means, (*psd.shape[: -len(shape)], q.size))
+    return q, mean, counts[filled].astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,10 +51,12 @@ def curve_dataset(
     *,
     value: str,
     count: str | None = None,
+    further: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Stack the curves of all surfaces along the leading dims of the input.
 
-    `value` and `count` are the names of the variables; `slopes` are the local slopes of the curves.
+    `value` and `count` are the names of the variables; `slopes` are the local slopes of the curves; `further`
+    are coordinates beside that of `dim`.
     """
     leading = surface.dims[: surface.ndim - surfaces[0].axes]
     sizes = [surface.sizes[d] for d in leading]
@@ -69,8 +71,10 @@ def curve_dataset(
         data["vertical_scale"] = (leading, np.reshape([curve.height_factor for curve in curves], sizes))
     data["local_slope"] = stacked(slopes)
     coords = {**leading_coords(surface, leading, (*data, dim, "wavelength", *ALWAYS)), dim: curves[0].scale}
+    coords |= further or {}
     axes = zip(surface.dims[-surfaces[0].axes :], surfaces[0].grid.periodic, strict=True)
     periodic = " ".join(str(axis) for axis, is_periodic in axes if is_periodic) or "none"
+    data["run_time"] = np.nan  # is set at the end; a variable that is added later takes longer
     return xr.Dataset(data, coords=coords, attrs={"periodic_axes": periodic})
 
 

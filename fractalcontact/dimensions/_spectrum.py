@@ -91,8 +91,10 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     curves = [spectrum_curve(single, taper, tile) for single in surfaces]
     slopes = [_local_slope(curve.scale, curve.value, curve.count) for curve in curves]
     name = _NAMES[surfaces[0].axes]
-    result = curve_dataset(surface, surfaces, "wavenumber", curves, slopes, value=name, count="mode_count")
-    return result.assign_coords(wavelength=2.0 * np.pi / result["wavenumber"])
+    wavelength = {"wavelength": ("wavenumber", 2.0 * np.pi / curves[0].scale)}
+    return curve_dataset(
+        surface, surfaces, "wavenumber", curves, slopes, value=name, count="mode_count", further=wavelength
+    )
 
 
 def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Curve:
@@ -104,14 +106,13 @@ def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Cu
         "hann" if window == "hann" or (window == "auto" and not is_periodic) else None
         for is_periodic in periodic
     )
-    total: Array = np.zeros(1)
-    number = 0
+    total, number = None, 0
     for part in _tiles(surface, tile):
         heights = without_trend(part, plane=not all(periodic))
         power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
-        total = total + power
+        total = power if total is None else total + power
         number += 1
-    power = total / number
+    power = total if number == 1 else total / number
     if axes == 2:
         q, mean, count = spectra.radial_average(power, shape, spacing)
     else:
