@@ -9,7 +9,7 @@ the largest relative difference; then both run in turn, `--rounds` times, on one
 formed within each round. A peer that takes more than `--limit` seconds is left out at larger sizes. Nothing
 here is a dependency:
 
-    pip install porespy gstools SurfaceTopography surfalize
+    pip install porespy gstools scikit-gstat SurfaceTopography surfalize
 
 Writes `peers.csv` and the figure `peers.png` into `--out`.
 """
@@ -115,6 +115,25 @@ def variogram_along_x(surface: xr.DataArray) -> tuple[Answer, Answer]:
     return ours, lambda: np.asarray(gstools.vario_estimate_axis(free.T, direction="x")[lags])
 
 
+def variogram_of_profile(surface: xr.DataArray) -> tuple[Answer, Answer]:
+    """The variogram of one profile at the lags of a few hundred spacings, from all pairs of points."""
+    import skgstat
+
+    heights, lags = surface.values[0], np.arange(1, min(surface.shape[1] // 2, 256) + 1)
+    line = xr.DataArray(heights, dims="x", coords={"x": surface["x"].values}, name="height")
+    at = np.arange(heights.size, dtype=float)
+
+    def ours() -> np.ndarray:
+        curve = fc.dimensions.variogram(line, max_lag=(lags[-1] + 0.01) * SPACING)
+        return np.asarray(curve["variogram"].values[: lags.size])
+
+    def theirs() -> np.ndarray:
+        # classes end at the bounds: one lag in each
+        return np.asarray(skgstat.Variogram(at, heights, bin_func=list(lags + 0.5), fit_method=None).experimental)
+
+    return ours, theirs
+
+
 def power_spectrum(surface: xr.DataArray) -> tuple[Answer, Answer]:
     """The radially averaged power spectrum, at the wavelengths from 8 points to a quarter of the surface."""
     from SurfaceTopography import Topography
@@ -197,6 +216,7 @@ QUESTIONS = (
     Question("boxes on one grid", "porespy", aligned_boxes, "the same"),
     Question("fewest boxes over all offsets", "numpy", fewest_boxes, "the same"),
     Question("variogram along x, all lags", "gstools", variogram_along_x, "rounding"),
+    Question("variogram of a profile", "skgstat", variogram_of_profile, "rounding"),
     Question("radial power spectrum", "SurfaceTopography", power_spectrum, "other rings: 10 %"),
     Question("rms height in windows", "SurfaceTopography", window_roughness, "windows that overlap: 10 %"),
     Question("parameters of ISO 25178", "surfalize", height_parameters, "slopes of other order: 10 %"),
@@ -233,6 +253,7 @@ def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--sizes", default="512")
+    parser.add_argument("--only", default="", help="words: questions whose name contains one of them")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--limit", type=float, default=60.0, help="seconds after which a peer is left out")
     parser.add_argument("--out", default="peers")
@@ -242,7 +263,8 @@ def main() -> None:
     for n in map(int, options.sizes.split(",")):
         surface = surface_of(n)
         for question in QUESTIONS:
-            if find_spec(question.peer) is None or question.name in slow:
+            wanted = any(word in question.name for word in options.only.split(","))
+            if find_spec(question.peer) is None or question.name in slow or not wanted:
                 continue
             row = {"n": n, "question": question.name, "peer": question.peer, "expected": question.expected}
             row |= measure(question, surface, options.rounds)

@@ -29,16 +29,24 @@ class Surface:
 
     Attributes
     ----------
-    source : DataArray
-        Dims (y, x), or (x,) for a profile.
+    stack : DataArray
+        Dims (..., y, x), or (..., x) for a profile.
     grid : Grid
+    index : tuple of int
+        The place of this surface along the leading dims.
     """
 
-    source: xr.DataArray
+    stack: xr.DataArray
     grid: Grid
+    index: tuple[int, ...] = ()
     _unit: float = 1.0
     _heights: Array | None = None
     _is_plane: bool | None = None
+
+    @property
+    def source(self) -> xr.DataArray:
+        """Dims (y, x), or (x,) for a profile."""
+        return self.stack.isel(dict(zip(self.stack.dims, self.index, strict=False)))
 
     @property
     def heights(self) -> Array:
@@ -60,7 +68,8 @@ class Surface:
     @property
     def raw(self) -> Array:
         """Heights in m, shape (ny, nx)."""
-        return np.asarray(self.source.values, dtype=np.float64).reshape(self.shape)
+        data = self.stack.variable.data[self.index]
+        return np.asarray(data, dtype=np.float64).reshape(self.shape)
 
     @property
     def squares_overflow(self) -> bool:
@@ -69,12 +78,12 @@ class Surface:
 
     def in_own_unit(self) -> Surface:
         """Return the same surface with the scaled heights taken as metres."""
-        return Surface(self.source, self.grid, 1.0, self.heights, self._is_plane)
+        return Surface(self.stack, self.grid, self.index, 1.0, self.heights, self._is_plane)
 
     @property
     def is_lazy(self) -> bool:
         """Whether the heights are not in memory yet."""
-        return self._heights is None and is_lazy(self.source)
+        return self._heights is None and is_lazy(self.stack)
 
     @property
     def axes(self) -> int:
@@ -268,7 +277,7 @@ def read_surfaces(surface: xr.DataArray) -> list[Surface]:
     grid = read_grid(surface, core)
     leading = [dim for dim in surface.dims if dim not in core]
     indices = np.ndindex(*(surface.sizes[dim] for dim in leading))
-    return [Surface(surface.isel(dict(zip(leading, index, strict=True))), grid) for index in indices]
+    return [Surface(surface, grid, index) for index in indices]
 
 
 def read_scales(scales: Any) -> Scales:

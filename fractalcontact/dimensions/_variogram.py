@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SQUARE, ABSOLUTE, SECOND = 0, 1, 2  # measures of an increment, see `_kernels.pair_sums`
 _FEW = 64  # lag vectors up to which direct sums are faster than transforms
+_TOGETHER = 1 << 20  # points of profiles that are transformed together
 _SEPARATE = 4.5  # spacings up to which every distance is a point of the curve
 _NAMES = ("variogram", "madogram", "second_variogram", "lag", "pair_count", *ALWAYS)
 
@@ -177,9 +178,12 @@ def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> 
 def _lag_dataset(
     surface: xr.DataArray, max_lag: float | None, measure: Callable[..., Curve], name: str
 ) -> xr.Dataset:
-    surfaces = read_surfaces(surface)
-    curves = [measure(single, None if max_lag is None else float(max_lag)) for single in surfaces]
-    slopes = [local_slope(curve.scale, curve.value) for curve in curves]
+    surfaces, longest = read_surfaces(surface), None if max_lag is None else float(max_lag)
+    curves = _profile_variograms(surfaces, longest) if measure is variogram_curve else None
+    if curves is None:
+        curves = [measure(single, longest) for single in surfaces]
+    values = np.stack([curve.value for curve in curves])
+    slopes = list(local_slope(curves[0].scale, values))
     return curve_dataset(surface, surfaces, "lag", curves, slopes, value=name, count="pair_count")
 
 
@@ -209,6 +213,42 @@ def variogram_curve(surface: Surface, longest: float | None = None) -> Curve:
         longest,
     )
     return Curve(lag, 0.5 * surface.unit**2 * mean, pairs // 2)
+
+
+def _profile_variograms(surfaces: Sequence[Surface], longest: float | None) -> list[Curve] | None:
+    """Return the variograms of complete profiles, all at once; None for others, and for a few lags.
+
+    One line takes some 20 microseconds, a tenth of `variogram_curve`: its lags are those of all lines.
+    """
+    first = surfaces[0]
+    if first.axes == 2 or first.is_lazy:
+        return None
+    (spacing, periodic), n = (first.spacing[1], first.periodic[1]), first.shape[1]
+    longest = min(0.5 * first.grid.extent[0] if longest is None else longest, first.grid.extent[0])
+    steps = np.arange(1, _largest_steps(first, longest, 1)[1] + 1)
+    lines = np.stack([single.raw[0] for single in surfaces])
+    if steps.size <= _FEW or not np.isfinite(lines).all():
+        return None
+    torus = n if periodic else fft.fast_length(2 * n)
+    counts = np.full(steps.size, n) if periodic else n - steps
+    pairs = np.where(periodic & (2 * steps == n), counts // 2, counts)  # each is met twice at half a period
+    curves = []
+    for start in range(0, len(lines), rows := max(1, _TOGETHER // torus)):
+        low = lines[start : start + rows].min(axis=1, keepdims=True)
+        heights = lines[start : start + rows] - low
+        unit = np.ldexp(1.0, np.frexp(heights.max(axis=1, keepdims=True))[1])
+        heights /= unit
+        heights -= heights.mean(axis=1, keepdims=True)
+        padded = np.zeros((len(heights), torus))
+        padded[:, :n] = heights
+        modes = fft.rfft(padded)
+        products = fft.irfft(modes.real**2 + modes.imag**2 + 0j, torus)[:, steps]
+        until = np.cumsum(heights * heights, axis=1)
+        total = until[:, -1:]
+        squares = 2.0 * total if periodic else until[:, n - 1 - steps] + (total - until[:, steps - 1])
+        means = np.maximum(squares - 2.0 * products, 0.0) * (0.5 * unit**2) / counts
+        curves += [Curve(steps * spacing, mean, pairs) for mean in means]
+    return curves
 
 
 def madogram_curve(surface: Surface, longest: float | None = None) -> Curve:

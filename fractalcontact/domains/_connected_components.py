@@ -153,7 +153,7 @@ def label_plane(
     details: list[tuple[Array, ...]] = []
     for start in range(0, ny, height):
         parts, number = ndimage.label(cells[start : start + height], STRUCTURES[connectivity])
-        counts.append(np.bincount(parts.ravel(), minlength=number + 1)[1:].astype(count_dtype))
+        counts.append(_part_sizes(parts, number).astype(count_dtype))
         measures &= detailed is not None or count + number <= MANY_ISLANDS
         if measures:
             arrays = _empty_measures(number + 1)
@@ -161,7 +161,8 @@ def label_plane(
             details.append(tuple(values[1:] for values in arrays))
         else:
             details.clear()
-        parts[parts > 0] += count
+        if count:
+            parts[parts > 0] += count
         links += [_links(rows[-1], parts[0], step, wrap_x, down=0) for step in steps if rows]
         rows += [parts[0].copy(), parts[-1].copy()]
         columns.append(parts[:, [0, -1]].copy())
@@ -175,6 +176,16 @@ def label_plane(
         PartMeasures(*(np.concatenate(each) for each in zip(*details, strict=True))) if measures else None
     )
     return Components(*joined, np.concatenate(counts), measured, ends, parts if keep else None)
+
+
+def _part_sizes(parts: Array, number: int) -> Array:
+    """Return the cells of every part, from its runs of equal labels: `bincount` takes as long as to label."""
+    line = parts.reshape(-1)
+    ends = np.append(np.flatnonzero(line[1:] != line[:-1]), line.size - 1)
+    if ends.size > line.size // 8:
+        return np.asarray(np.bincount(line, minlength=number + 1)[1:])
+    lengths = np.diff(ends, prepend=-1)
+    return np.asarray(np.bincount(line[ends], lengths, minlength=number + 1)[1:])
 
 
 def _join(links: Array) -> tuple[Array, Array, Array, Array, Array]:
