@@ -106,13 +106,15 @@ def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Cu
         "hann" if window == "hann" or (window == "auto" and not is_periodic) else None
         for is_periodic in periodic
     )
-    total, number = None, 0
+    total: Array | None = None
+    number = 0
     for part in _tiles(surface, tile):
         heights = without_trend(part, plane=not all(periodic))
         power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
         total = power if total is None else total + power
         number += 1
-    power = total if number == 1 else total / number
+    assert total is not None  # a surface has a tile at least
+    power = total / number
     if axes == 2:
         q, mean, count = spectra.radial_average(power, shape, spacing)
     else:

@@ -150,7 +150,8 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
     )
     more = f" and {len(found) - _NAMED} weaker ones" if len(found) > _NAMED else ""
     count = f"{len(found)} single waves" if len(found) > 1 else "a single wave"
-    return Surface(surface.stack, surface.grid, surface.index, surface.unit, heights), f"{count} removed: {named}{more}"
+    without = Surface(surface.stack, surface.grid, surface.index, surface.unit, heights)
+    return without, f"{count} removed: {named}{more}"
 
 
 def _is_progression(found: Sequence[Wave]) -> bool:

@@ -289,8 +289,8 @@ def compare(case: Case, names: list[str], options: argparse.Namespace) -> list[d
                 if seconds > options.patience:  # this run is its repeat
                     once.add(name)
                     rows.append(rows[-1] | {"kind": "repeat"})
-            is_slow = seconds > options.patience
-            if error <= options.target * (1 if is_slow else options.beyond) or seconds > 10 * options.patience:
+            enough = options.target * (options.beyond if seconds <= options.patience else 1.0)
+            if error <= enough or seconds > 10 * options.patience:
                 break
     for _ in range(options.repeats):
         for name, tolerance in met.items():
@@ -522,7 +522,9 @@ def parsed(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--target", type=float, default=1e-6, help="complementarity to reach")
     parser.add_argument("--loosest", type=float, default=1e-3, help="tolerance where the sweeps begin")
     parser.add_argument("--beyond", type=float, default=0.1, help="share of the target where a sweep ends")
-    parser.add_argument("--patience", type=float, default=60.0, help="seconds beyond which a run is not repeated")
+    parser.add_argument(
+        "--patience", type=float, default=60.0, help="seconds beyond which a run is not repeated"
+    )
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--clock", choices=("wall", "processor"), default="wall", help="processor: if busy")
     parser.add_argument("--out", type=Path, default=Path("bench-solvers"))
