@@ -120,10 +120,16 @@ class ContactSystem:
         object.__setattr__(self, "p_max", self.dtype(self.p_max))
 
     @classmethod
-    def on_plane(cls, problem: Problem, dtype: Any, local_compliance: float | None = None) -> ContactSystem:
-        """Return the system of all nodes of a problem."""
+    def on_plane(
+        cls,
+        problem: Problem,
+        dtype: Any,
+        local_compliance: float | None = None,
+        operator: Operator | None = None,
+    ) -> ContactSystem:
+        """Return the system of all nodes of a problem; its operator may be given."""
         body = problem.body
-        operator = body.operator(dtype)
+        operator = operator or body.operator(dtype)
         # that of a periodic body serves both, with its array of the modes
         multiplier = operator.multiplier if isinstance(operator, PeriodicOperator) else None
         preconditioner = ExtensionPreconditioner(body, dtype, multiplier)

@@ -7,7 +7,7 @@ Epstein (1903), summed after Ewald (1921).
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -42,15 +42,21 @@ def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) ->
     from fractalcontact.base.threads import in_bands
     from fractalcontact.contact._kernels import love_table
 
+    table = np.empty(shape)
+    in_bands(love_table, shape[0], table.size, table, *spacing, *_gauss_rules())
+    return table
+
+
+@cache
+def _gauss_rules() -> tuple[Array, Array, Array]:
+    """Return orders of Gauss quadrature with their nodes and weights on a unit interval, a row each."""
     orders = (3, 4, 6, 10, 16)
-    rules = [np.polynomial.legendre.leggauss(order) for order in orders]
     nodes = np.zeros((len(orders), max(orders)))
     weights = np.zeros_like(nodes)
-    for row, (x, w) in enumerate(rules):
-        nodes[row, : x.size], weights[row, : x.size] = x / 2, w / 2
-    table = np.empty(shape)
-    in_bands(love_table, shape[0], table.size, table, *spacing, np.array(orders), nodes, weights)
-    return table
+    for row, order in enumerate(orders):
+        x, w = np.polynomial.legendre.leggauss(order)  # takes as long as the table of 64 x 64 nodes
+        nodes[row, :order], weights[row, :order] = x / 2, w / 2
+    return np.array(orders), nodes, weights
 
 
 def disc_radius(choice: str | float, spacing: tuple[float, float]) -> float:

@@ -5,6 +5,7 @@ The kernels are imported where they run, because options are validated without t
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
@@ -47,6 +48,12 @@ class FreeOperator:
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
         self.modes: Array | None = None
         self.transforms = 0
+
+    def rounded(self, dtype: Any) -> FreeOperator:
+        """Return the same operator in another precision."""
+        other = copy(self)
+        other.symbol, other.modes, other.transforms = self.symbol.astype(dtype), None, 0
+        return other
 
     # `out` is of no use: the displacement is cropped from the padded plane, which is held anyway
     def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002

@@ -20,7 +20,7 @@ import numpy as np
 
 from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
 from fractalcontact.contact._multigrid_start import cold_start
-from fractalcontact.contact._operator import Operator, PairSum
+from fractalcontact.contact._operator import FreeOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
 from fractalcontact.contact._scaled_problem import Control, Problem, Solution
 
@@ -239,7 +239,8 @@ class WindowSolver:
     def with_displacement(self, solution: Solution, pressure: Array) -> Solution:
         """Return a solution with its pressure, and the displacement under it, on the whole extent."""
         if self._operator is None:
-            self._operator = self.problem.body.operator()
+            tables = self._pair_tables
+            self._operator = FreeOperator(tables[0]) if tables else self.problem.body.operator()
         self.transforms += 1
         return replace(solution, pressure=pressure, displacement=self._operator.apply(pressure))
 
@@ -312,7 +313,11 @@ class WindowSolver:
         """Return the system of a window in one precision; kept for a free body, whose kernel takes time."""
         if dtype in self._systems:
             return self._systems[dtype]
-        system = ContactSystem.on_plane(part, dtype, self.problem.local_compliance)
+        operator = None
+        if dtype is np.float32 and not part.body.periodic:  # the kernel is computed once for both
+            double = self.system(part, np.float64).operator
+            operator = double.rounded(dtype) if isinstance(double, FreeOperator) else None
+        system = ContactSystem.on_plane(part, dtype, self.problem.local_compliance, operator)
         if not part.body.periodic:
             self._systems[dtype] = system
         return system
