@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import warnings
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -355,8 +355,7 @@ def _balanced(
     """
     from scipy.optimize import brentq
 
-    count = itertools.count(1)
-
+    @lru_cache(maxsize=4)  # the search asks again for the two steps that enclose the balance, and for its end
     def state(place: float) -> State:
         step = min(int(place), len(stresses) - 2)
         share, (low, high) = place - step, stresses[step : step + 2]
@@ -366,7 +365,7 @@ def _balanced(
         uplift = float(np.nan_to_num(water[0] + water[1] * p).mean())
         error = (stress + uplift) / total - 1.0
         balances = abs(error) <= STRESS_BALANCE
-        return State(p, residual, _isolated(gap, p), next(count), balances, float(stress), error)
+        return State(p, residual, _isolated(gap, p), 0, balances, float(stress), error)
 
     place = len(stresses) - 1
     found = state(place)
@@ -375,7 +374,8 @@ def _balanced(
         found = state(place)
     if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
         root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=PLACE_ERROR)
-        return state(root)
+        return state(root)._replace(iterations=state.cache_info().misses)
+    found = found._replace(iterations=state.cache_info().misses)
     if found.converged:
         return found
     return found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
