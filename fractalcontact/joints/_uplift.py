@@ -367,7 +367,7 @@ def _balanced(
         balances = abs(error) <= STRESS_BALANCE
         return State(p, residual, _isolated(gap, p), 0, balances, float(stress), error)
 
-    place = len(stresses) - 1
+    place = float(len(stresses) - 1)  # as the search states it
     found = state(place)
     while place > 0 and found.balance_error > 0:
         place, above = place - 1, found

@@ -82,6 +82,14 @@ def spacing_of(surface: xr.DataArray) -> tuple[float, float]:
     return y, x
 
 
+def block_shape(scene: Scene, shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[int, int]:
+    """Return the cells (y, x) of the block of a joint: all of the surface where the scene states no block."""
+    if scene.joint.block is None:
+        return shape
+    rows, columns = np.rint(np.broadcast_to(scene.joint.block, 2) / np.asarray(spacing))
+    return int(rows), int(columns)
+
+
 def locate(path: str, folder: Path) -> Path:
     """Return the file that a scene names.
 

@@ -15,8 +15,8 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memory
 from fractalcontact.scenes._autotune import PERIODIC
 from fractalcontact.scenes._inputs import (
+    block_shape,
     contact_options,
-    crack_options,
     generator_options,
     joint_options,
     slip_options,
@@ -25,11 +25,11 @@ from fractalcontact.scenes._inputs import (
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
     FIGURES,
-    PART_SIZE,
     PARTIAL_SLIP,
     Stage,
     arguments_of,
     public_function,
+    section_length,
 )
 
 # bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
@@ -46,13 +46,10 @@ def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
     if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
         return {}
     try:
-        (ny, nx), spacing = surface_grid(scene)
+        shape, spacing = surface_grid(scene)
     except InvalidInput:
         return {}
-    surface = Plane((ny, nx), generator in PERIODIC)
-    edges = crack_options(scene).get("block")
-    cells = np.rint(np.broadcast_to(edges, 2) / np.asarray(spacing)) if edges is not None else (ny, nx)
-    block = Plane((int(cells[0]), int(cells[1])))
+    surface, block = Plane(shape, generator in PERIODIC), Plane(block_shape(scene, shape, spacing))
     held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
     loaded: set[str] = set()
     peaks = {}
@@ -70,7 +67,7 @@ def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
             continue
         options = _options(scene, stage)
         steps, shears = _count(options, LOADS), _count(options, ("shear",))
-        section = steps if "hardness" in options else min(steps, max(1, int(PART_SIZE // plane.cells)))
+        section = section_length(steps, int(plane.cells), has_hardness="hardness" in options)
         planes = section if stage.reads_part else steps * shears if stage.reads_map else 1
         call = _with_steps(options, section) | {"keep": stage.keep}
         estimate = public_function(stage.row.function).memory  # type: ignore[attr-defined]

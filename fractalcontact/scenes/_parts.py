@@ -34,10 +34,10 @@ from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
     FROM_RESULTS,
-    PART_SIZE,
     PARTIAL_SLIP,
     Stage,
     public_function,
+    section_length,
 )
 
 if TYPE_CHECKING:
@@ -206,10 +206,10 @@ def _contact_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
 
 
 def _sections(path: Any, nodes: int, *, has_hardness: bool) -> list[Any]:
-    """Cut a load path into sections; with a hardness the state depends on the load history: one section."""
-    length = max(1, PART_SIZE // nodes)
-    if not isinstance(path, list) or len(path) <= length or has_hardness:
+    """Cut a load path into sections."""
+    if not isinstance(path, list):
         return [path]
+    length = section_length(len(path), nodes, has_hardness=has_hardness)
     return [path[k : k + length] for k in range(0, len(path), length)]
 
 

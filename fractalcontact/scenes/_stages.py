@@ -240,6 +240,11 @@ class Stage:
         return self.reads_map and not self.whole_path
 
 
+def section_length(steps: int, nodes: int, *, has_hardness: bool) -> int:
+    """Return how many steps of a load path a part holds: all where the state depends on the history."""
+    return steps if has_hardness else min(steps, max(1, PART_SIZE // nodes))
+
+
 def public_function(name: str) -> Callable[..., Any]:
     """Return a public function by the name under which users call it, "contact.press" for example."""
     subpackage, _, function = name.partition(".")

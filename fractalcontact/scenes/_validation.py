@@ -23,6 +23,7 @@ from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._inputs import (
     PRESSING,
+    block_shape,
     contact_options,
     crack_options,
     generator_options,
@@ -301,10 +302,9 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
 
 def _empty_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
     """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
+    spacing, shape = spacing_of(surface), (surface.sizes["y"], surface.sizes["x"])
+    cells = shape if scene.is_pressed else block_shape(scene, shape, spacing)
     is_surface = scene.is_pressed or scene.joint.block is None
-    spacing = spacing_of(surface)
-    edges = np.broadcast_to(0.0 if is_surface else scene.joint.block, 2)
-    cells = surface.shape if is_surface else tuple(np.rint(edges / spacing).astype(int).tolist())
     periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
     maps = _zeros(cells, spacing, periodic)
     return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
