@@ -17,6 +17,7 @@ from typing import Any
 
 SHARE = 32768  # elements worth a thread of their own
 LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+NAME = "fractalcontact"  # of the threads that wait for bands
 # matplotlib is not safe in threads: its parser of formulas is shared, and so are its settings
 DRAWING_LOCK = threading.RLock()
 
@@ -152,7 +153,7 @@ def _started(count: int) -> _Queue | None:
     started = 0
     try:
         for _ in range(count):
-            threading.Thread(target=_work, args=(queue,), daemon=True).start()
+            threading.Thread(target=_work, args=(queue,), daemon=True, name=NAME).start()
             started += 1
     except RuntimeError:  # a limit of the system, or the interpreter is about to end
         return None

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.netcdf import written_whole
+from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems
@@ -50,6 +51,7 @@ Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
 FORMATS = ("png", "svg", "pdf")
+LARGE = 1 << 26  # bytes of a study whose figures are drawn one after the other: two at once take more memory
 PAPER_BAND = (2.15, 2.29)  # fractal dimensions that the paper gives for its surface
 # names of the same figures in a study that is not compared with the paper
 JOINT = {
@@ -114,13 +116,21 @@ def draw(
                 problems.choice("formats", word, FORMATS)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, drawing in track(_all_drawings(tree, paper), progress, "figures", unit="figure"):
+    drawings = _all_drawings(tree, paper)
+    files = [[folder / f"{name}.{suffix}" for suffix in formats] for name, _ in drawings]
+
+    def draw_one(number: int) -> None:
         with DRAWING_LOCK, drawn_for_files():
-            figure = figure_of(drawing())
-            written += [_write(figure, folder / f"{name}.{suffix}") for suffix in formats]
+            figure = figure_of(drawings[number][1]())
+            for file in files[number]:
+                _write(figure, file)
             figure.clear()
-    return written
+
+    small = sum(node.nbytes for node in tree.subtree) < LARGE
+    drawn = calls_in_two_processes(draw_one, len(drawings)) if small else map(draw_one, range(len(drawings)))
+    for _ in track(drawn, progress, "figures", unit="figure", total=len(drawings)):
+        pass
+    return [file for each in files for file in each]
 
 
 def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Drawing]]:

@@ -19,6 +19,8 @@ from fractalcontact.scenes._paper import paper_parts
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+Summary = list[list[Part]]  # sections of tables, remarks and lines
+
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 # symbol of ISO 25178 and variable of `surfaces.describe`
 ISO_25178 = {
@@ -66,13 +68,18 @@ def summary(tree: xr.DataTree) -> str:
     """
     with Problems("fractalcontact.scenes.summary") as problems:
         problems.tree("tree", tree)
+    return summary_text(tree, summary_parts(tree))
+
+
+def summary_text(tree: xr.DataTree, sections: Summary) -> str:
+    """Return the sections of the summary as text, below the title of the study."""
     title = str(tree.attrs.get("title", tree.name or "result"))
-    return "\n\n".join([title, *(text_of(parts) for parts in summary_parts(tree))])
+    return "\n\n".join([title, *map(text_of, sections)])
 
 
-def summary_parts(tree: xr.DataTree) -> list[list[Part]]:
-    """Return the sections of the summary, each a list of tables, remarks and lines."""
-    sections: list[list[Part]] = [
+def summary_parts(tree: xr.DataTree) -> Summary:
+    """Return the sections of the summary."""
+    sections: Summary = [
         _ensemble(member_count(tree)),
         _selected(tree),
         _dimensions(tree),

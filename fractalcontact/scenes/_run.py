@@ -24,10 +24,11 @@ from fractalcontact.scenes._caveats import caveats, of_member
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
-from fractalcontact.scenes._html_report import REPORT, report
+from fractalcontact.scenes._html_report import REPORT, write_report
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
+from fractalcontact.scenes._report import Summary, summary_parts
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
@@ -90,6 +91,17 @@ def run(
     >>> print((last.sel(direction=["E", "W"]) * 1e3).round(2).values)  # mm at 10 mm of shear
     [1.15 0.5 ]
     """
+    return run_and_summarise(scene, out, progress, workers, client)[0]
+
+
+def run_and_summarise(
+    scene: Scene | str | os.PathLike[str],
+    out: str | os.PathLike[str] | None,
+    progress: bool,
+    workers: int,
+    client: Any = None,
+) -> tuple[xr.DataTree, Summary]:
+    """Run a scene and return its results with the summary that the report has; it is empty without `out`."""
     start = time.perf_counter()
     _check_workers(workers, client)
     with worker_processes(workers) as processes:
@@ -100,7 +112,7 @@ def run(
 
 def _run(
     scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None, start: float
-) -> xr.DataTree:
+) -> tuple[xr.DataTree, Summary]:
     folder = None if out is None else output_folder(out)
     scene, choices = choose(scene)
     store = PartStore(folder)
@@ -117,7 +129,7 @@ def _run(
         tree = _assemble(scene, groups, study.seconds, choices, missing)
         _note_run_time(tree, start)
         if folder is None:
-            return tree
+            return tree, []
         if missing:
             netcdf.save(tree, folder / PARTIAL_RESULT)
             raise signals.Stopped(
@@ -132,12 +144,13 @@ def _run(
                 figures = _draw(tree, folder, progress, paper=scene.paper)
                 _note_run_time(tree, start)
                 netcdf.replace_attribute(folder / RESULT, "provenance", tree.attrs["provenance"])
-            report(tree, folder / REPORT, figures=figures)
+            sections = summary_parts(tree)
+            write_report(tree, folder / REPORT, figures, sections)
             if scene.want.datasheet:
                 tables(tree, folder / TABLES)
                 _draw_datasheet(tree, folder / DATASHEET)
         store.clear()
-    return tree
+    return tree, sections
 
 
 def _check_workers(workers: int, client: Any) -> None:

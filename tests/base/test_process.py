@@ -1,11 +1,16 @@
-"""Peak memory of the process, and saving a file without importing dask."""
+"""Peak memory of the process, calls shared with a copy of it, and saving a file without importing dask."""
 
+import multiprocessing
+import os
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
-from fractalcontact.base.process import peak_memory
+from fractalcontact.base import threads
+from fractalcontact.base.process import calls_in_two_processes, peak_memory
 
 
 def test_peak_memory_includes_a_large_block():
@@ -26,3 +31,77 @@ def test_dask_is_not_imported_to_save_a_result(tmp_path):
     )
     command = [sys.executable, "-c", code, str(tmp_path / "surface.nc")]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+COUNT = 12
+
+
+@pytest.fixture
+def note(tmp_path, monkeypatch):
+    """Return a function that notes in a file which process called it; two processors are available."""
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+
+    def note(number):
+        time.sleep(0.02)
+        with (tmp_path / str(number)).open("a") as file:
+            file.write(f"{os.getpid()} ")
+
+    note.callers = lambda: [(tmp_path / str(number)).read_text().split() for number in range(COUNT)]
+    return note
+
+
+def alone():
+    """Whether no thread keeps this process from being copied, as one of pytest-xdist does."""
+    others = [each for each in threading.enumerate() if each.name != threads.NAME]
+    return sys.platform == "linux" and others == [threading.main_thread()]
+
+
+def test_every_call_is_made_once_by_one_of_two_processes(note):
+    assert sorted(calls_in_two_processes(note, COUNT)) == list(range(COUNT))
+    callers = note.callers()
+    assert all(len(each) == 1 for each in callers)
+    assert len({each[0] for each in callers}) == (2 if alone() else 1)
+
+
+@pytest.mark.parametrize("end", [lambda: os._exit(1), lambda: 1 / 0])
+def test_calls_that_the_copy_does_not_end_are_made_here(note, end):
+    own = os.getpid()
+
+    def call(number):
+        if os.getpid() != own:
+            end()
+        note(number)
+
+    assert sorted(calls_in_two_processes(call, COUNT)) == list(range(COUNT))
+    assert note.callers() == [[str(own)]] * COUNT
+
+
+def test_error_of_a_call_is_raised_and_ends_the_copy(note):
+    def call(number):
+        note(number)
+        if number == 3:
+            raise OSError(28, "no space")
+
+    with pytest.raises(OSError, match="no space"):
+        list(calls_in_two_processes(call, COUNT))
+    assert multiprocessing.active_children() == []
+
+
+@pytest.mark.parametrize("reason", ["one processor", "another thread", "not the main thread"])
+def test_process_is_not_copied_where_that_is_unsafe_or_useless(note, monkeypatch, reason):
+    numbers, done = [], threading.Event()
+    if reason == "one processor":
+        monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")
+        numbers = list(calls_in_two_processes(note, COUNT))
+    elif reason == "another thread":
+        other = threading.Thread(target=done.wait)
+        other.start()
+        numbers = list(calls_in_two_processes(note, COUNT))
+        done.set()
+        other.join()
+    else:
+        other = threading.Thread(target=lambda: numbers.extend(calls_in_two_processes(note, COUNT)))
+        other.start()
+        other.join()
+    assert numbers == list(range(COUNT))
+    assert note.callers() == [[str(os.getpid())]] * COUNT

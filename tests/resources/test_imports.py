@@ -148,7 +148,7 @@ domains = ["percolation"]
 
 
 def test_memory_of_scalar_results_is_independent_of_path_length(tmp_path, monkeypatch):
-    monkeypatch.setattr("fractalcontact.scenes._parts.PART_SIZE", 10 * 64 * 64)
+    monkeypatch.setattr("fractalcontact.scenes._stages.PART_SIZE", 10 * 64 * 64)
     peaks = []
     for count in (10, 20, 160):  # the first loads and compiles
         path = scene(tmp_path, LONG.replace("COUNT", str(count)))

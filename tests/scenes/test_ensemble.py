@@ -106,7 +106,7 @@ class Recorder(Executor):
 def test_long_path_is_solved_in_sections_and_keeps_no_map(tmp_path, monkeypatch):
     (tmp_path / "path.toml").write_text(PATH, encoding="utf-8")
     undivided = fc.scenes.run(tmp_path / "path.toml", progress=False)
-    monkeypatch.setattr("fractalcontact.scenes._parts.PART_SIZE", 8 * 32 * 32)
+    monkeypatch.setattr("fractalcontact.scenes._stages.PART_SIZE", 8 * 32 * 32)
     recorder = Recorder()
     parts = fc.scenes.run(tmp_path / "path.toml", progress=False, client=recorder)
     steps = [results[0].sizes["step"] for results in recorder.results if "closure" in results[0]]

@@ -87,7 +87,7 @@ def study(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "sections of a path":
-            patch.setattr("fractalcontact.scenes._parts.PART_SIZE", 32 * 32)
+            patch.setattr("fractalcontact.scenes._stages.PART_SIZE", 32 * 32)
         text = DOMAINS_OF_A_JOINT if request.param == "domains of a joint" else STUDY
         fc.scenes.run(write(folder, text), out=folder, progress=False)
     return fc.open(folder / "result.nc")

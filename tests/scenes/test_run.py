@@ -61,7 +61,8 @@ def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch, err
     calls = []
     watch_calls(monkeypatch, calls.append)
     # the report computes too: the friction by the other form
-    monkeypatch.setattr("fractalcontact.scenes._run.report", lambda *a, **k: None)
+    monkeypatch.setattr("fractalcontact.scenes._run.summary_parts", lambda tree: [])
+    monkeypatch.setattr("fractalcontact.scenes._run.write_report", lambda *a, **k: None)
     again = fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
     assert not [name for name in calls if name != "describe"]  # the parts of the first run are still there
     assert list(tmp_path.glob("*.png"))

@@ -130,7 +130,7 @@ def test_a_stopped_study_resumes_after_the_uplift(scene, tmp_path, monkeypatch):
     whole = fc.scenes.run(path, progress=False)
     from fractalcontact.scenes import _run
 
-    monkeypatch.setattr(_run, "report", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(_run, "write_report", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         fc.scenes.run(path, out=out, progress=False)
     monkeypatch.undo()
