@@ -212,15 +212,11 @@ def _run(options: argparse.Namespace) -> int:
         raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
     with Problems("fractalcontact run") as problems:
         problems.integer("--workers", options.workers, at_least=0, at_most=most_workers())
-    from fractalcontact.scenes._report import summary_text
-    from fractalcontact.scenes._run import run_and_summarise
-
-    # the summary of report and screen is computed once
-    tree, summary = run_and_summarise(options.scene, options.out, not options.quiet, options.workers)
-    if not options.quiet:
+    speaks = not options.quiet
+    scenes.run(options.scene, out=options.out, progress=speaks, summary=speaks, workers=options.workers)
+    if speaks:
         from fractalcontact.base.tables import screen_width
 
-        print(summary_text(tree, summary))
         figures = len(list(Path(options.out).glob("*.png")))
         size = (Path(options.out) / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""

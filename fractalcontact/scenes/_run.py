@@ -28,7 +28,7 @@ from fractalcontact.scenes._html_report import REPORT, write_report
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
-from fractalcontact.scenes._report import Summary, summary_parts
+from fractalcontact.scenes._report import Summary, summary_parts, summary_text
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
@@ -44,6 +44,7 @@ def run(
     *,
     out: str | os.PathLike[str] | None = None,
     progress: bool = True,
+    summary: bool = False,
     workers: int = 0,
     client: Any = None,
 ) -> xr.DataTree:
@@ -58,6 +59,8 @@ def run(
         there.
     progress : bool, default True
         Show a bar for stages of several parts.
+    summary : bool, default False
+        Print the summary at the end, see `fractalcontact.scenes.summary`.
     workers : int, default 0
         Share the study between so many processes on this machine; 0 for none, at most 4 for each processor.
         An ensemble is shared by members, any other study by the parts of a stage. A script needs an
@@ -91,28 +94,22 @@ def run(
     >>> print((last.sel(direction=["E", "W"]) * 1e3).round(2).values)  # mm at 10 mm of shear
     [1.15 0.5 ]
     """
-    return run_and_summarise(scene, out, progress, workers, client)[0]
-
-
-def run_and_summarise(
-    scene: Scene | str | os.PathLike[str],
-    out: str | os.PathLike[str] | None,
-    progress: bool,
-    workers: int,
-    client: Any = None,
-) -> tuple[xr.DataTree, Summary]:
-    """Run a scene and return its results with the summary that the report has; it is empty without `out`."""
     start = time.perf_counter()
-    _check_workers(workers, client)
+    _check(summary, workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
         check_memory(scene, stages_of(scene), workers)
-        return _run(scene, out, progress, workers_of(processes if client is None else client), start)
+        among = workers_of(processes if client is None else client)
+        tree, sections = _run(scene, out, progress, among, start)
+    if summary:
+        print(summary_text(tree, summary_parts(tree) if sections is None else sections))  # noqa: T201
+    return tree
 
 
 def _run(
     scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None, start: float
-) -> tuple[xr.DataTree, Summary]:
+) -> tuple[xr.DataTree, Summary | None]:
+    """Return the results, and the summary where the report has computed it."""
     folder = None if out is None else output_folder(out)
     scene, choices = choose(scene)
     store = PartStore(folder)
@@ -129,7 +126,7 @@ def _run(
         tree = _assemble(scene, groups, study.seconds, choices, missing)
         _note_run_time(tree, start)
         if folder is None:
-            return tree, []
+            return tree, None
         if missing:
             netcdf.save(tree, folder / PARTIAL_RESULT)
             raise signals.Stopped(
@@ -153,8 +150,9 @@ def _run(
     return tree, sections
 
 
-def _check_workers(workers: int, client: Any) -> None:
+def _check(summary: Any, workers: Any, client: Any) -> None:
     with Problems("fractalcontact.scenes.run") as problems:
+        problems.boolean("summary", summary)
         if problems.integer("workers", workers, at_least=0, at_most=most_workers()) and workers:
             problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)

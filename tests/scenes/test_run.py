@@ -241,6 +241,21 @@ def test_parts_run_on_an_executor(tmp_path):
         np.testing.assert_array_equal(serial["joints/closure"][name], shared["joints/closure"][name])
 
 
+@pytest.mark.parametrize("folder", ["out", None])
+def test_summary_is_printed_on_request_and_computed_once(tmp_path, capsys, monkeypatch, folder):
+    computed, module = [], "fractalcontact.scenes._run"
+    sections_of = sys.modules[module].summary_parts
+    monkeypatch.setattr(f"{module}.summary_parts", lambda tree: computed.append(tree) or sections_of(tree))
+    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
+    out = None if folder is None else tmp_path / folder
+    tree = fc.scenes.run(tmp_path / "study.toml", out=out, progress=False, summary=True)
+    assert capsys.readouterr().out.strip() == fc.scenes.summary(tree)
+    assert len(computed) == 1
+    if out is not None:
+        last = tree["joints/closure/closure"].isel(shear=-1, step=-1)
+        assert f"{float(last) * 1e6:.3g} µm" in (out / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("paper", [True, False])
 def test_only_a_scene_of_the_paper_is_compared_with_it(tmp_path, paper):
     top = "paper = true\n" if paper else ""
