@@ -51,7 +51,7 @@ def note(tmp_path, monkeypatch):
 
 
 def alone():
-    """Whether no thread keeps this process from being copied; that of a progress bar of another test does not."""
+    """Whether no thread keeps this process from being copied; that of a progress bar does not."""
     others = [each for each in threading.enumerate() if each.name != threads.NAME]
     others = [each for each in others if type(each).__name__ != "TMonitor"]
     return sys.platform == "linux" and others == [threading.main_thread()]
