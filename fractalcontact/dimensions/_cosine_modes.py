@@ -110,7 +110,7 @@ class FreeModes:
 
     @property
     def count(self) -> None:
-        """Return no numbers: every mode stands for itself."""
+        """None: every mode counts once."""
 
     @property
     def number(self) -> float:

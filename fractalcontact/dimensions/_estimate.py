@@ -336,7 +336,7 @@ def _expected_spectrum(surface: Surface, _: Curve, hurst: float) -> Array | None
 
 def _spectrum_covariance(surface: Surface, curve: Curve, _: float) -> Array | str:
     if surface.axes == 1:
-        return "a ring of a profile is one mode, whose logarithm is no normal variable"
+        return "a ring of a profile is one mode, whose logarithm is not normally distributed"
     sides = surface.grid.extent
     if abs(sides[0] - sides[1]) > _SQUARE * max(sides):
         return "the covariance of the rings is known for squares only"

@@ -260,12 +260,12 @@ def octaves(blocks: Blocks) -> list[Octave]:
     shortest = 2.0
     result: list[Octave] = []
     low = 0.0  # waves along a diagonal are shorter than two spacings
-    while (left := blocks.count[blocks.wavelength >= low * (1 - 1e-9)].sum()) >= _LEAST:
+    while blocks.count[blocks.wavelength >= low * (1 - 1e-9)].sum() >= _LEAST:
         high = 2.0 * max(low, shortest)
         if blocks.count[blocks.wavelength >= high * (1 - 1e-9)].sum() < _LEAST:
             high = float(blocks.wavelength.max()) * (1 + 1e-6)
         inside = (blocks.wavelength >= low * (1 - 1e-9)) & (blocks.wavelength < high * (1 - 1e-9))
-        if blocks.count[inside].sum() >= _LEAST and left > 0:
+        if blocks.count[inside].sum() >= _LEAST:
             bottom = float(blocks.wavelength[inside].min()) if low == 0.0 else low
             result.append(Octave(bottom, high, inside, fit_power_law(blocks, inside), blocks))
         low = high

@@ -14,8 +14,8 @@ import numpy as np
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_modes, _profile_likelihood
 from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
 from fractalcontact.dimensions._exponent_by_scale import (
+    Blocks,
     frame_blocks,
-    free_blocks,
     longest_run,
     octaves,
     run_estimate,
@@ -35,7 +35,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import FORMS, NONE
 from fractalcontact.dimensions._waves import without_waves
 from fractalcontact.dimensions._whittle import (
@@ -99,14 +99,7 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
     estimate = _fitted(surface, scales, noise, psf)
     estimate = replace(estimate, note=joined(wave_note, estimate.note))
     if is_interpolated and not estimate.reason:
-        return replace(
-            estimate,
-            standard_error=np.nan,
-            ci_low=np.nan,
-            ci_high=np.nan,
-            reason=_LINEAR,
-            note=joined(_LINEAR, estimate.note),
-        )
+        return replace(estimate.without_interval(_LINEAR), note=joined(_LINEAR, estimate.note))
     return estimate
 
 
@@ -122,7 +115,7 @@ def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) ->
     estimate = family(surface, scales, noise, spread)
     if not any(surface.grid.periodic) or estimate.reason:
         return estimate
-    return replace(estimate, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=_PERIODIC_GAPS)
+    return estimate.without_interval(_PERIODIC_GAPS)
 
 
 def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
@@ -163,9 +156,11 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     is_odd = is_bent or (noise and fit.noise < 0.0)
     is_odd |= not blocks.note and (fit.hurst > 1.0 or modes.scatter(fit) < -UNEVEN)
     if modes.gapped is None and (spread is not None or (is_odd and not surface.finest_scale)):
-        other, is_even = _with_blur(heights, surface, scales, noise, spread)
+        frame = _mode_blocks.frame(heights.shape, surface.plane_spacing)
+        power = _cosine_modes.mode_power(heights)
+        other, is_even = _with_blur(power, frame, surface, scales, noise, spread)
         if other is None and is_even and is_bent and scales is None:
-            other = _longest_run(modes, heights, surface)
+            other = _longest_run(modes, frame_blocks(power, frame), surface)
     if other is not None:
         estimate, stride, hurst = *other, other[0].hurst
         blocks = heterogeneity(_moments(levelled, stride), surface.plane_spacing, hurst)
@@ -205,7 +200,7 @@ def _modes(heights: Array, spacing: tuple[float, float], scales: Scales, pilot: 
     if heights.size > _LARGE and np.isfinite(heights.min()):
         return _mode_blocks.BlockModes.of(heights, spacing, scales)
     lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
-    chosen = _between(_cosine_modes.wavelengths(lattice), scales)
+    chosen = between(_cosine_modes.wavelengths(lattice), scales)
     return _cosine_modes.FreeModes.of(heights, lattice, chosen, pilot)
 
 
@@ -221,15 +216,18 @@ def _allowing_noise(estimate: Estimate, modes: SurfaceModes, fit: WhittleFit) ->
 
 
 def _with_blur(
-    heights: Array, surface: Surface, scales: Scales, noise: bool, spread: float | None
+    power: Array,
+    frame: _mode_blocks.Frame,
+    surface: Surface,
+    scales: Scales,
+    noise: bool,
+    spread: float | None,
 ) -> tuple[tuple[Estimate, int] | None, bool]:
     """Return the estimate with blur and noise, and a lag beyond the blur; None where they are not seen.
 
     The second result is whether no few waves dominate the modes.
     """
-    frame = _mode_blocks.frame(heights.shape, surface.plane_spacing)
-    power, inside = _cosine_modes.mode_power(heights), _chosen(frame, surface, scales)
-    fit = fit_blurred(power, frame, noise=noise, spread=spread, chosen=inside)
+    fit = fit_blurred(power, frame, noise=noise, spread=spread, chosen=_chosen(frame, surface, scales))
     if fit is None or not _is_seen(fit, surface.axes, spread):
         return None, fit is None or fit.is_even
     if scales is None and spread is None and not noise:
@@ -243,7 +241,7 @@ def _with_blur(
 
 def _chosen(frame: _mode_blocks.Frame, surface: Surface, scales: Scales) -> Array:
     """Return the blocks of modes inside the window."""
-    return _between(2.0 * np.pi / np.sqrt(frame.squares) * surface.spacing[1], scales)
+    return between(2.0 * np.pi / np.sqrt(frame.squares) * surface.spacing[1], scales)
 
 
 def _is_seen(fit: BlurredFit, axes: int, spread: float | None) -> bool:
@@ -275,15 +273,15 @@ def _blurred_estimate(fit: BlurredFit, surface: Surface, amplitude: float) -> Es
     )
 
 
-def _longest_run(modes: SurfaceModes, heights: Array, surface: Surface) -> tuple[Estimate, int] | None:
+def _longest_run(modes: SurfaceModes, blocks: Blocks, surface: Surface) -> tuple[Estimate, int] | None:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
     None if there is no run, or if few waves dominate it.
     """
-    run = longest_run(octaves(free_blocks(heights, surface.plane_spacing)))
+    run = longest_run(octaves(blocks))
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None
-    inside = (modes.order >= run.low * (1 - 1e-9)) & (modes.order <= run.high * (1 + 1e-9))
+    inside = between(modes.order, (run.low, run.high))
     if modes.is_uneven(inside, run.fit.hurst):
         return None
     return run_estimate(run, surface), max(1, round(0.5 * run.low))
@@ -309,9 +307,7 @@ def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate
     else:
         fit, estimate = fit_interval(modes, 0.5, noise)
     if noise and (surface.axes == 1 or (scales is None and abs(fit.misfit) > SIGNIFICANT)):
-        estimate = replace(
-            estimate, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=_CUT_OFF_BELOW_NOISE
-        )
+        estimate = estimate.without_interval(_CUT_OFF_BELOW_NOISE)
     rounding_note = "" if noise else _quantisation_note(surface.heights, estimate.standard_error)
     if rounding_note:
         with_noise = fit_interval(modes, 0.5, True)[1]
@@ -412,10 +408,11 @@ def _profile_modes(
     if (share := _largest_share(modes)) > _SINGLE:
         reason = f"a single wave holds {100.0 * share:.0f} % of the shorter waves: no fractal"
         return undefined(reason), none
+    blocks = frame_blocks(modes, frame)
     fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=_chosen(frame, surface, scales))
     if fit is not None and _is_seen(fit, surface.axes, spread):
         if scales is None and spread is None and not noise:
-            several = several_exponents(fit, frame_blocks(modes, frame), surface)
+            several = several_exponents(fit, blocks, surface)
             if several is not None:
                 return several, none
         amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
@@ -423,7 +420,7 @@ def _profile_modes(
         longest = heights.size * dx if scales is None else scales[1]
         window = _BLURRED_WINDOW if scales is None else _ASKED
         return replace(estimate, scale_max=longest, window=window), none
-    record = octaves(free_blocks(heights, (1.0,)))
+    record = octaves(blocks)
     run = longest_run(record)
     if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
         return run_estimate(run, surface), none
@@ -475,12 +472,6 @@ def _pilot(heights: Array, spacing: tuple[float, float]) -> float:
 def _rms_increment(fit: WhittleFit) -> float:
     """Return the rms increment over one x spacing that corresponds to the amplitude."""
     return float(np.sqrt(2.0 * fit.amplitude / (1.0 - fit.hurst))) if fit.hurst < 1.0 else float("nan")
-
-
-def _between(lengths: Array, scales: Scales) -> Array:
-    if scales is None:
-        return np.ones(lengths.shape, dtype=bool)
-    return np.asarray((lengths >= scales[0] * (1 - 1e-9)) & (lengths <= scales[1] * (1 + 1e-9)))
 
 
 def _without_small_gaps(heights: Array, spacing: tuple[float, float]) -> Array:

@@ -54,6 +54,10 @@ class Estimate:
     note: str = ""
     fitted_hurst: float = np.nan
 
+    def without_interval(self, reason: str) -> Estimate:
+        """Return the estimate without its standard error and interval."""
+        return replace(self, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=reason)
+
     def gridded(self, finest: float) -> Estimate:
         """Widen the interval by what gridding may have done to the power of the window.
 

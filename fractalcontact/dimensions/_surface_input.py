@@ -285,6 +285,13 @@ def read_scales(scales: Any) -> Scales:
     return None if scales is None else (float(scales[0]), float(scales[1]))
 
 
+def between(lengths: Array, scales: Scales) -> Array:
+    """Return which lengths lie in a window, its ends included except for rounding; all without a window."""
+    if scales is None:
+        return np.ones(lengths.shape, dtype=bool)
+    return np.asarray((lengths >= scales[0] * (1 - 1e-9)) & (lengths <= scales[1] * (1 + 1e-9)))
+
+
 def _core_dims(surface: xr.DataArray) -> tuple[str, ...]:
     return ("y", "x") if "y" in surface.dims else ("x",)
 
