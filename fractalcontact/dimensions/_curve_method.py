@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,12 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _CORRELATED = "the points of the curve are correlated, so the scatter about a straight line gives no interval"
-_INCOMPLETE = "points are missing, which the covariance of the curve does not know"
+_INCOMPLETE = "points are missing; the covariance holds for complete heights"
 _LOWEST, _HIGHEST = 0.02, 0.98  # H at which the covariance is taken
 
 
@@ -89,7 +89,7 @@ class CurveMethod:
         overflows = not self.unit_note and surface.squares_overflow
         curve = self.measure(surface.in_own_unit() if overflows else surface, *longest)
         lengths = 2.0 * np.pi / curve.scale if self.as_wavelength else curve.scale
-        inside = (lengths >= low * (1 - 1e-9)) & (lengths <= high * (1 + 1e-9)) & (curve.value > 0)
+        inside = between(lengths, (low, high)) & (curve.value > 0)
         if np.count_nonzero(inside) < 2:
             return undefined(f"fewer than two points of the curve between {low:g} m and {high:g} m")
         x, y = curve.scale[inside], curve.value[inside]
@@ -111,9 +111,7 @@ class CurveMethod:
         if noise:
             return replace(estimate, reason="noise is not in the model of this method")
         if surface.finest_scale or not surface.is_complete:
-            return replace(
-                estimate, reason="points are missing, which the covariance of the curve does not know"
-            )
+            return replace(estimate, reason=_INCOMPLETE)
         return line.with_interval(estimate, y)
 
 
@@ -126,17 +124,23 @@ class _Line:
     curve: Curve
     inside: Array
     weights: Array
+    _evaluated: dict[float, Array | None] = field(default_factory=dict)  # the expected curve by H
 
     @property
     def scale(self) -> Array:
         return np.asarray(self.curve.scale[self.inside])
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether the expected curve is no power law."""
+        return self._at(0.5) is not None
 
     def hurst(self, values: Array, part: slice = slice(None)) -> float:
         """Return H of values at the points, or at a part of them."""
         x, y, weights = self.scale[part], values[part], self.weights[part]
         slope = fit_line(x, y, weights).slope
         uncorrected = self.method.to_hurst(slope, self.surface.axes)
-        if self.method.expected is None or self.method.expected(self.surface, self.curve, 0.5) is None:
+        if not self.is_corrected:
             return uncorrected
         from scipy.optimize import brentq
 
@@ -144,16 +148,23 @@ class _Line:
             return fit_line(x, y / self._expected(hurst)[part], weights).slope
 
         low, high = 1e-3, 0.999
-        direction = np.sign(excess_slope(low) - excess_slope(high))
-        if not direction * excess_slope(low) > 0.0 > direction * excess_slope(high):
+        at_low, at_high = excess_slope(low), excess_slope(high)
+        direction = np.sign(at_low - at_high)
+        if not direction * at_low > 0.0 > direction * at_high:
             return uncorrected
         return float(brentq(excess_slope, low, high, xtol=1e-6))
 
     def _expected(self, hurst: float) -> Array:
-        if self.method.expected is None:
-            return np.ones(self.scale.size)
-        values = self.method.expected(self.surface, self.curve, hurst)
-        return np.ones(self.scale.size) if values is None else values[self.inside]
+        values = self._at(hurst)
+        return np.ones(self.scale.size) if values is None else values
+
+    def _at(self, hurst: float) -> Array | None:
+        """Return the expected curve at the points, evaluated once for each H; None of a power law."""
+        if hurst not in self._evaluated:
+            expected = self.method.expected
+            values = None if expected is None else expected(self.surface, self.curve, hurst)
+            self._evaluated[hurst] = None if values is None else values[self.inside]
+        return self._evaluated[hurst]
 
     def with_interval(self, estimate: Estimate, values: Array) -> Estimate:
         """Return the estimate with its interval, widened where the curve is bent."""
@@ -191,7 +202,7 @@ class _Line:
     def _sensitivity(self, hurst: float) -> float:
         """Return the change of the slope with H."""
         step = 1e-3
-        if self.method.expected is None or self.method.expected(self.surface, self.curve, 0.5) is None:
+        if not self.is_corrected:
             axes = self.surface.axes
             return 1.0 / (self.method.to_hurst(1.0, axes) - self.method.to_hurst(0.0, axes))
         middle = float(np.clip(hurst, 2.0 * step, 1.0 - 2.0 * step))

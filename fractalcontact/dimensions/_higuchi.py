@@ -106,15 +106,18 @@ def mean_increment_covariance(lags: Array, points: int, hurst: float) -> Array:
     """
     result = np.empty((lags.size, lags.size))
     shifts = np.arange(-points, points + 1).astype(float)
+    longest = int(lags.max())
+    powers = np.abs(np.arange(-points - longest, points + longest + 1.0)) ** (2.0 * hurst)
 
-    def power(distance: Array) -> Array:
-        return np.asarray(np.abs(distance) ** (2.0 * hurst))
+    def power(ahead: int) -> Array:
+        """Return |shift + ahead|^(2 H) of every shift."""
+        return np.asarray(powers[longest + ahead : longest + ahead + shifts.size])
 
     for i, k in enumerate(lags):
         for j, m in enumerate(lags[: i + 1]):
             first, second = points - k, points - m
             pairs = np.maximum(np.minimum(first, second - shifts) - np.maximum(0.0, -shifts), 0.0)
-            product = 0.5 * (power(shifts + m) + power(shifts - k) - power(shifts) - power(shifts + m - k))
+            product = 0.5 * (power(m) + power(-k) - power(0) - power(m - k))
             r = np.clip(product / float(k * m) ** hurst, -1.0, 1.0)
             absolute = (2.0 / np.pi) * (np.sqrt(1.0 - r * r) + r * np.arcsin(r) - 1.0)
             relative = float(np.sum(pairs * absolute)) / (first * second) * np.pi / 2.0

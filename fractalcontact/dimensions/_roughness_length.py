@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -121,14 +122,19 @@ def expected_roughness(edges: Array, spacing: tuple[float, float], hurst: float)
     return roughness
 
 
+@lru_cache(maxsize=64)  # more than the windows of one surface
 def _autocorrelations(n: int) -> tuple[Array, Array]:
-    """Return the autocorrelation at each lag of a constant and of a tilt of n points, both of norm one."""
+    """Return the autocorrelation at each lag of a constant and of a tilt of n points, both of norm one.
+
+    They do not depend on H and are the larger part of the work.
+    """
     positions = np.arange(n) - 0.5 * (n - 1)
     norm = np.sqrt(np.sum(positions**2))
     constant, tilt = np.full(n, n**-0.5), positions / norm if n > 1 else np.zeros(1)
     flat, tilted = (np.correlate(line, line, "full")[n - 1 :] for line in (constant, tilt))
     flat[1:] *= 2.0  # lags of both signs
     tilted[1:] *= 2.0
+    flat.flags.writeable = tilted.flags.writeable = False  # shared by all calls
     return flat, tilted
 
 
