@@ -45,12 +45,15 @@ class Heterogeneity:
     low, high : float
         Quartiles of the exponents of the blocks where those differ more than by chance; NaN otherwise.
     note : str
+    levels_differ : bool
+        Whether the blocks are not equally rough.
     """
 
     widening: float = 1.0
     low: float = np.nan
     high: float = np.nan
     note: str = ""
+    levels_differ: bool = False
 
     def widened(self, hurst: float, low: float, high: float) -> tuple[float, float]:
         """Return the interval, widened about the estimate, that holds the exponents of the blocks."""
@@ -90,7 +93,8 @@ def heterogeneity(moments: Moments, spacing: tuple[float, ...], hurst: float) ->
     is_finite = np.isfinite(logs).all(axis=1)
     levels = logs[:, ::2].mean(axis=1)
     limit = float(chdtri(len(logs) - 1, _FALSE_ALARM))
-    if not is_finite.all() or _chi_square(levels, shares / (level @ covariance @ level)) > limit:
+    levels_differ = not is_finite.all() or _chi_square(levels, shares / (level @ covariance @ level)) > limit
+    if levels_differ:
         # without variation along one axis, as beside a step, no block has a level: the axes are summed then
         has_levels = bool(np.isfinite(levels).any())
         squared = np.exp(levels - levels.max()) if has_levels else squares[:, ::2].sum(axis=1)
@@ -109,7 +113,7 @@ def heterogeneity(moments: Moments, spacing: tuple[float, ...], hurst: float) ->
             "the exponent differs from part to part of the surface: the interval holds the middle half of "
             f"them, {low:.2f} to {high:.2f}"
         )
-    return Heterogeneity(widening, low, high, "; ".join(notes))
+    return Heterogeneity(widening, low, high, "; ".join(notes), levels_differ)
 
 
 def _block_covariance(moments: Moments, spacing: tuple[float, ...], hurst: float, blocks: int) -> Array:
@@ -178,10 +182,10 @@ def _lines(excess: Array) -> Array:
             for k in range(-reach, reach + 1)
         ]
         total = sum(np.clip(padded[y : y + ny, x : x + nx], -_NEAR, _FAR) for y, x in steps)
-        found = total > _LINE * _ON_LINE
+        above = total > _LINE * _ON_LINE
         for y, x in steps:
             marked = np.zeros(padded.shape, dtype=bool)
-            marked[y : y + ny, x : x + nx] = found
+            marked[y : y + ny, x : x + nx] = above
             out |= marked[reach : reach + ny, reach : reach + nx]
     return out & (excess > 0.0)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._heterogeneity import heterogeneity, step_cells
+from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity, step_cells
 from fractalcontact.dimensions._increment_covariance import (
     NODES,
     complete_covariance,
@@ -77,20 +77,21 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
     reason = _no_interval(surface, noise)
     if reason:
         return Estimate(fit.hurst, rms_increment=fit.rms_increment * unit, reason=reason, **window)
-    error, low, high, note = _interval(surface, moments, unit, fit, lags)
-    if surface.axes == 2 and asked is None and "not equally rough" in note and not surface.is_lazy:
+    blocks = heterogeneity(moments, surface.relative_spacing, fit.hurst)
+    if surface.axes == 2 and asked is None and blocks.levels_differ and not surface.is_lazy:
         ground = without_steps(surface.heights, surface.plane_spacing, fit.hurst)
         if ground is not None:
             return replace(ground, rms_increment=ground.rms_increment * surface.unit, **window)
+    error, low, high, note = _interval(surface, moments, unit, fit, blocks, lags)
     return Estimate(fit.hurst, error, low, high, rms_increment=fit.rms_increment * unit, note=note, **window)
 
 
-def without_steps(heights: Array, spacing: tuple[float, float], whole: float) -> Estimate | None:
+def without_steps(heights: Array, spacing: tuple[float, float], full_hurst: float) -> Estimate | None:
     """Return the estimate of the ground between steps or scratches; None where there are none.
 
     Leaving the roughest blocks out also leaves out some that are rough by chance: the interval reaches half
-    of the way to `whole`, the exponent of the whole surface, up to a limit. None as well where the rest does
-    not follow one power law.
+    of the way to `full_hurst`, the exponent of the whole surface, up to a limit. None as well where the rest
+    does not follow one power law.
     """
     if np.isnan(heights).any() or (cells := step_cells(heights)) is None:
         return None
@@ -101,7 +102,7 @@ def without_steps(heights: Array, spacing: tuple[float, float], whole: float) ->
         return None
     if heterogeneity(moments, spacing, fit.hurst).note:
         return None
-    allowance = min(0.5 * abs(fit.hurst - whole), _CHOSEN)
+    allowance = min(0.5 * abs(fit.hurst - full_hurst), _CHOSEN)
     low, high = normal_interval(fit.hurst, fit.standard_error)
     return Estimate(
         fit.hurst,
@@ -111,16 +112,15 @@ def without_steps(heights: Array, spacing: tuple[float, float], whole: float) ->
         rms_increment=fit.rms_increment,
         window="increments over 1, 2 and 4 spacings beside the steps",
         note=f"steps, scratches or spikes cross {100.0 * float(cells.mean()):.0f} % of the surface, which "
-        f"are left out; with them the exponent is {whole:.2f}",
+        f"are left out; with them the exponent is {full_hurst:.2f}",
     )
 
 
 def _interval(
-    surface: Surface, moments: Moments, unit: float, fit: ClosedForm, lags: int
+    surface: Surface, moments: Moments, unit: float, fit: ClosedForm, blocks: Heterogeneity, lags: int
 ) -> tuple[float, float, float, str]:
     """Return standard error, interval and notes, widened where the surface does not fit the model."""
     error = fit.standard_error * fit.inflation
-    blocks = heterogeneity(moments, surface.relative_spacing, fit.hurst)
     low, high = blocks.widened(fit.hurst, *normal_interval(fit.hurst, error))
     low, high, noise_note = fit.widened_for_noise(low, high)
     rounding_note = ""
