@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -184,15 +185,19 @@ def _ratio(places: int, square: float, mass: int) -> float:
 
 def _fixed_lacunarity(planes: Planes, sizes: Array) -> Array:
     """Return <M^2> / <M>^2 over the fully observed boxes inside, of the grid from the first cell."""
+    return _from_masses(planes, sizes, _mass_of_boxes)
+
+
+def _from_masses(planes: Planes, sizes: Array, masses: Callable[[Array, int], Array]) -> Array:
+    """Return <M^2> / <M>^2; `masses` sums cells (ny, nx) over the boxes of one size."""
 
     def at_size(plane: int, size: int) -> float:
-        mass = _mass_of_boxes(planes.cells[plane], size)
-        valid = planes.valid_of(plane)
+        mass, valid = masses(planes.cells[plane], size), planes.valid_of(plane)
         if valid is not None:
-            mass = mass[_mass_of_boxes(valid, size) == size * size]
+            mass = mass[masses(valid, size) == size**planes.rank]
         return _moment_ratio(mass.size, mass.ravel(), mass.ravel() ** 2)
 
-    values = [at_size(plane, int(size)) for plane in range(planes.count) for size in sizes]
+    values = [at_size(plane, size) for plane in range(planes.count) for size in sizes.tolist()]
     return np.array(values).reshape(planes.count, sizes.size)
 
 
@@ -207,20 +212,13 @@ def _row_lacunarity(planes: Planes, sizes: Array, boxes: str) -> Array:
     """Return <M^2> / <M>^2 of profiles, over all boxes or those of the grid from the first cell."""
     n, (wraps,) = planes.grid.shape[1], planes.periodic
 
-    def masses(row: Array, size: int) -> Array:
-        ahead = np.pad(row, (0, size - 1 if wraps and boxes == "gliding" else 0), mode="wrap")
+    def masses(cells: Array, size: int) -> Array:
+        ahead = np.pad(cells[0], (0, size - 1 if wraps and boxes == "gliding" else 0), mode="wrap")
         total = np.insert(np.cumsum(ahead, dtype=np.int64), 0, 0)
         mass = total[size:] - total[:-size]
         return mass if boxes == "gliding" else mass[: n - size + 1 : size]
 
-    def at_size(plane: int, size: int) -> float:
-        mass, valid = masses(planes.cells[plane, 0], size), planes.valid_of(plane)
-        if valid is not None:
-            mass = mass[masses(valid[0], size) == size]
-        return _moment_ratio(mass.size, mass, mass**2)
-
-    values = [at_size(plane, size) for plane in range(planes.count) for size in sizes.tolist()]
-    return np.array(values).reshape(planes.count, sizes.size)
+    return _from_masses(planes, sizes, masses)
 
 
 def _null_lacunarity(coverage: Array, sizes: Array, rank: int) -> Array:

@@ -31,7 +31,7 @@ RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius")  
 CELLS_PER_THREAD = 1 << 18  # a pass over so many takes as long as to start a pool of threads
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
 PROFILE_DIMS = ("x",)
-MEASURES_OF_PROFILES = "box_dimension, box_counts, correlation_dimension, lacunarity, islands and describe"
+PROFILE_FUNCTIONS = "box_dimension, box_counts, correlation_dimension, lacunarity, islands and describe"
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ def _check_cells(problems: Problems, mask: Any, argument: str, *, profiles: bool
         expected = f"{expected}; compare numbers first, as in `pressure > 0`"
         problems.add(argument, expected, f"type {mask.dtype}")
     elif is_profile and not profiles:
-        there_is = f"; for the contact of a profile, dims (..., x), there are {MEASURES_OF_PROFILES}"
-        problems.add(argument, expected + there_is, f"sizes {dict(mask.sizes)}")
+        alternative = f"; for the contact of a profile, dims (..., x), there are {PROFILE_FUNCTIONS}"
+        problems.add(argument, expected + alternative, f"sizes {dict(mask.sizes)}")
     elif not (is_profile or tuple(mask.dims[-2:]) == CORE_DIMS) or min(mask.shape, default=0) < 1:
         problems.add(argument, expected + ", none of them empty", f"sizes {dict(mask.sizes)}")
     elif set(RESULT_DIMS) & set(mask.dims):
