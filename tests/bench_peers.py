@@ -28,10 +28,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 os.environ.setdefault("FRACTALCONTACT_THREADS", "1")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # numpy reads it when it is imported
+
+import numpy as np
 import xarray as xr
 
 import fractalcontact as fc
@@ -184,8 +184,8 @@ def height_parameters(surface: xr.DataArray) -> tuple[Answer, Answer]:
     names = ("rms_height", "mean_absolute_height", "skewness", "kurtosis", "peak_to_valley", "rms_slope")
 
     def ours() -> np.ndarray:
-        found = fc.surfaces.describe(free)
-        values = [float(found[name]) for name in (*names, "developed_area_excess")]
+        parameters = fc.surfaces.describe(free)
+        values = [float(parameters[name]) for name in (*names, "developed_area_excess")]
         return np.array(values) * [1e6, 1e6, 1, 1, 1e6, 1, 100]
 
     def theirs() -> np.ndarray:
@@ -203,8 +203,8 @@ def islands(surface: xr.DataArray) -> tuple[Answer, Answer]:
     values = mask.values
 
     def ours() -> np.ndarray:
-        found = fc.domains.islands(mask, periodic=False, keep=(), table=())
-        return np.array([int(found["n_islands"]), int(found["largest_cells"])])
+        result = fc.domains.islands(mask, periodic=False, keep=(), table=())
+        return np.array([int(result["n_islands"]), int(result["largest_cells"])])
 
     def theirs() -> np.ndarray:
         label, count = ndimage.label(values)
@@ -229,9 +229,9 @@ def measure(question: Question, surface: xr.DataArray, rounds: int) -> dict[str,
     """Return the difference of both answers, their times and the ratio within each round."""
     ours, theirs = question.both(surface)
     mine, other = np.asarray(ours(), float), np.asarray(theirs(), float)
-    known = np.isfinite(mine) & np.isfinite(other)
-    scale = np.maximum(np.abs(mine[known]), 1e-300)
-    difference = float(np.max(np.abs(mine[known] - other[known]) / scale))
+    finite = np.isfinite(mine) & np.isfinite(other)
+    scale = np.maximum(np.abs(mine[finite]), 1e-300)
+    difference = float(np.max(np.abs(mine[finite] - other[finite]) / scale))
     times: list[tuple[float, float]] = []
     for _ in range(rounds):
         laps = []
@@ -276,6 +276,8 @@ def main() -> None:
             ratio = f"{row['ratio_median']:7.1f} times (least {row['ratio_min']:.1f})"
             differ = f"answers differ by {row['difference']:.1e} ({question.expected})"
             print(f"{n:5d}  {question.name:30s} {question.peer:18s} {times}  {ratio}  {differ}", flush=True)
+    if not rows:
+        sys.exit("nothing was measured: none of the other packages is installed")
     out = Path(options.out)
     out.mkdir(parents=True, exist_ok=True)
     with (out / "peers.csv").open("w", newline="", encoding="utf-8") as stream:
