@@ -72,8 +72,6 @@ class BlurredFit:
         A key of `FORMS`.
     shortest : float
         Shortest wavelength used, in spacings of x.
-    modes : float
-        Number of modes used.
     scatter : float
         z of the scatter of the modes about the model.
     flatness : float
@@ -97,7 +95,6 @@ class BlurredFit:
     noise: float
     form: str
     shortest: float
-    modes: float
     scatter: float
     flatness: float
     gain: float
@@ -178,9 +175,11 @@ def fit_blurred(
         noise=best.noise * best.amplitude if best.has_noise else np.nan,
         form=best.form,
         shortest=float(2.0 * np.pi / np.sqrt(frame.squares[window.inside].max())),
-        modes=float(window.count.sum()),
         scatter=scatter,
-        flatness=min(_flatness(power, frame, window.inside), -abs(_asymmetry(power, frame, window.inside))),
+        flatness=min(
+            _flatness(power, frame, window.inside, search.spread_in_blocks(window, best)),
+            -abs(_asymmetry(power, frame, window.inside)),
+        ),
         gain=plain[0] - best.penalised if plain else np.inf,
         penalised=best.penalised,
         inside=window.inside,
@@ -219,7 +218,6 @@ class _Search:
     def __init__(self, power: Array, frame: Frame, noise: bool, square: float | None) -> None:
         self.power, self.frame, self.noise, self.square = power, frame, noise, square
         self.allowed: Array = np.ones(power.size, dtype=bool)
-        self._is_reflected = True
 
     def window(self) -> tuple[Window, _Fit]:
         """Return the largest window that a model fits, and that model.
@@ -284,7 +282,6 @@ class _Search:
         squares = self.frame.squares
         inside = self.allowed & (squares <= reach**2)
         if fit.square < _NARROW:
-            self._is_reflected = True
             return Window(self.frame, inside, self.power)
         edges = edge_power(self.frame, fit.hurst, fit.square)
         signal = np.exp(
@@ -396,6 +393,14 @@ class _Search:
         deviation = np.sqrt((2.0 + 12.0 * np.mean(1.0 / window.count)) / square.size)
         return float((square.mean() - 1.0) / deviation)
 
+    def spread_in_blocks(self, window: Window, fit: _Fit) -> Array:
+        """Return the variance of the logarithm of the expected power within each block."""
+        frame = self.frame
+        signal = window.signal(fit.form, fit.hurst, fit.square)[0]
+        share = signal / (signal + fit.noise)
+        fall = (2.0 * fit.hurst + frame.axes) / window.squares + 2.0 * fit.square
+        return np.asarray(share**2 * fall**2 * frame.variances[1][window.inside])
+
     def error(self, window: Window, fit: _Fit) -> float:
         """Return the standard error of H."""
         columns = self._evaluate(window, fit)[1]
@@ -443,8 +448,11 @@ class _Search:
         return float(hurst)
 
 
-def _flatness(power: Array, frame: Frame, inside: Array) -> float:
-    """Return z of the mean logarithm of the squared modes about the logarithm of the mean of their block."""
+def _flatness(power: Array, frame: Frame, inside: Array, spread: Array) -> float:
+    """Return z of the mean logarithm of the squared modes about the logarithm of the mean of their block.
+
+    `spread` is the variance of the logarithm of their expected power, which lowers it by half as much.
+    """
     from scipy.special import polygamma, psi
 
     count = frame.count[inside]
@@ -453,7 +461,7 @@ def _flatness(power: Array, frame: Frame, inside: Array) -> float:
         means = np.log(frame.mean(power)[inside])
     expected = psi(0.5) - psi(0.5 * count) + np.log(count)  # of logarithms of chi square
     variance = np.sum(count * polygamma(1, 0.5) - count**2 * polygamma(1, 0.5 * count))
-    excess = float(np.sum(count * (logs - means - expected)))
+    excess = float(np.sum(count * (logs - means - expected + 0.5 * spread)))
     return excess / float(np.sqrt(variance)) if variance > 0.0 else 0.0
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.dimensions._surface_input import Scales, between
 from fractalcontact.dimensions._whittle import CHI_SQUARE, UNEVEN, WhittleFit, fit_from_starts
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -85,6 +86,17 @@ class Frame:
     def squares(self) -> Array:
         """Squared wavenumber at the centre of each block."""
         return np.asarray(sum(w * w for w in self.waves))
+
+    @cached_property
+    def variances(self) -> tuple[Array, Array]:
+        """Variance of the wavenumber in each block, summed over the axes: itself, and times its square."""
+        plain, weighted = np.zeros(self.count.size), np.zeros(self.count.size)
+        for starts, i, n, d, w in zip(
+            self.starts, self.index, self.shape, self.spacing, self.waves, strict=True
+        ):
+            variance = (np.diff(starts)[i] ** 2 - 1.0) / 12.0 * (np.pi / (n * d)) ** 2
+            plain, weighted = plain + variance, weighted + variance * w**2
+        return plain, weighted
 
     @cached_property
     def aliases(self) -> Array:
@@ -315,9 +327,7 @@ class BlockModes:
     gapped: None = None
 
     @classmethod
-    def of(
-        cls, heights: Array, spacing: tuple[float, float], scales: tuple[float, float] | None
-    ) -> BlockModes:
+    def of(cls, heights: Array, spacing: tuple[float, float], scales: Scales) -> BlockModes:
         """Transform a surface; `scales` is a window of wavelengths in spacings of x."""
         from fractalcontact.dimensions._cosine_modes import Lattice, expected_power, mode_power
 
@@ -332,9 +342,7 @@ class BlockModes:
         count = np.outer(*(np.diff(s) for s in starts)).astype(float)
         along_y, along_x = (np.pi * k / (n * d) for k, n, d in zip(centres, (ny, nx), spacing, strict=True))
         order = 2.0 * np.pi / np.hypot(along_y[:, None], along_x)
-        chosen = np.ones(order.shape, dtype=bool)
-        if scales is not None:
-            chosen = (order >= scales[0] * (1 - 1e-9)) & (order <= scales[1] * (1 + 1e-9))
+        chosen = between(order, scales)
         expected = expected_power_at((ny, nx), spacing, centres)
 
         def model(hurst: float) -> Array:

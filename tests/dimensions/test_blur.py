@@ -40,6 +40,15 @@ def test_exponent_before_blur(hurst, spread, between):
     assert "in the model" in result.hurst.attrs["comment"]
 
 
+def test_blur_of_a_large_surface_is_seen():
+    """The modes of a block are not equally strong, which shows where there are many."""
+    result = estimated(blurred(0.7, 1.0, shape=(1024, 1024)))
+    margin = 0.25 * float(result.ci_high - result.ci_low)
+    assert float(result.ci_low) - margin <= 0.7 <= float(result.ci_high) + margin
+    assert float(result.ci_high - result.ci_low) < 0.04
+    assert float(result.blur_spread) == pytest.approx(SPACING, rel=0.05)
+
+
 def test_noise_after_blur_is_measured():
     result = estimated(blurred(0.5, 1.0, 0.05))
     assert float(result.noise_height) == pytest.approx(0.05 * STEP, rel=0.05)
