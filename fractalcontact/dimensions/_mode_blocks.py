@@ -231,8 +231,8 @@ def _starts(n: int, first: int) -> Array:
     """Return the first mode of each block along an axis; odd widths have a mode at their centre."""
     starts = [first]
     while starts[-1] < n:
-        width = max(1, starts[-1] // _PER)
-        starts.append(min(n, starts[-1] + width - (width % 2 == 0)))
+        width = min(max(1, starts[-1] // _PER), n - starts[-1])
+        starts.append(starts[-1] + width - (width % 2 == 0))
     return np.array(starts)
 
 
