@@ -9,6 +9,7 @@ import io
 import json
 import math
 import os
+import re
 import string
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -54,6 +55,7 @@ FLAG_COLOURS = {
 }
 OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
 LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
+PLAIN_LIST = re.compile(r"\[[^\[\]{}\"]*\]")  # in JSON: of numbers, without words, lists or objects
 HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
 
 
@@ -263,7 +265,7 @@ def _surface_section(surface: dict[str, Any], of_member: str) -> str:
     return f"""<figure>
 <canvas id="surface-view" width="1000" height="620" tabindex="0" role="img"
  aria-label="The surface in perspective; heights from {low} to {high}"></canvas>
-<figcaption>Drag to turn, or use the arrow keys. Heights are enlarged
+<figcaption><span class="screen">Drag to turn, or use the arrow keys. </span>Heights are enlarged
 <output id="exaggeration-value"></output>.{means}{of_member}
 <span class="key" style="display:inline-block">{low}
 <i style="width:8em;background:linear-gradient(to right, {ramp})"></i> {high}</span></figcaption>
@@ -418,7 +420,7 @@ def _figure(name: str, content: bytes) -> str:
     title = name.replace("_", " ").capitalize()
     source = base64.b64encode(content).decode()
     return (
-        f'<figure><img src="data:image/webp;base64,{source}" alt="{title}" loading="lazy">'
+        f'<figure><img src="data:image/webp;base64,{source}" alt="{title}">'
         f"<figcaption>{title}</figcaption></figure>\n"
     )
 
@@ -479,4 +481,6 @@ def _provenance_section(tree: xr.DataTree) -> str:
 
 
 def _as_json(entry: Any) -> str:
-    return f'<pre class="wrap">{html.escape(json.dumps(entry, indent=1))}</pre>'
+    """Return JSON with a line for each key; a list of plain values stays on one line."""
+    text = PLAIN_LIST.sub(lambda match: " ".join(match.group().split()), json.dumps(entry, indent=1))
+    return f'<pre class="wrap">{html.escape(text)}</pre>'

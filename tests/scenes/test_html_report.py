@@ -212,11 +212,38 @@ def test_table_of_a_curve_equals_the_curve(study):
     )
 
 
-def test_report_works_in_a_browser(study, tmp_path):
-    """Move a slider and turn the surface in Chromium: the map and the picture change, nothing is reported."""
+@pytest.fixture
+def browse(tmp_path):
+    """Return a function that opens a page in Chromium without a window, with more flags."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         pytest.skip("no Chromium on this machine")
+
+    def opened(page, *flags):
+        command = [browser, "--headless", "--no-sandbox", "--disable-gpu", *flags,
+                   f"--user-data-dir={tmp_path / 'profile'}", page.as_uri()]  # fmt: skip
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+    return opened
+
+
+def test_only_open_tables_are_printed(study, browse, tmp_path):
+    text = (study[1] / "report.html").read_text(encoding="utf-8")
+    assert text.count("<details>") > 5
+    contents = {}
+    for name, tag in (("closed", "<details>"), ("open", "<details open>")):
+        page, printed = tmp_path / f"{name}.html", tmp_path / f"{name}.pdf"
+        page.write_text(text.replace("<details>", tag), encoding="utf-8")
+        browse(page, f"--print-to-pdf={printed}")
+        contents[name] = printed.read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", contents["closed"])) <= 6
+    link = b"data:text/csv"  # above each printed table
+    assert link in contents["open"]
+    assert link not in contents["closed"]
+
+
+def test_report_works_in_a_browser(study, browse, tmp_path):
+    """Move a slider and turn the surface in Chromium: the map and the picture change, nothing is reported."""
     text = (study[1] / "report.html").read_text(encoding="utf-8")
     moves = """<script>
       const noted = {};
@@ -231,17 +258,7 @@ def test_report_works_in_a_browser(study, tmp_path):
     </script>"""
     page = tmp_path / "page.html"
     page.write_text(text.replace("</body>", moves + "</body>"), encoding="utf-8")
-    flags = (
-        "--headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=5000 --dump-dom"
-    )
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    answer = subprocess.run(
-        [browser, *flags.split(), profile, page.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    answer = browse(page, "--enable-logging=stderr", "--virtual-time-budget=5000", "--dump-dom")
     assert "CONSOLE" not in answer.stderr
     noted = json.loads(re.search('<p id="noted">(.*?)</p>', answer.stdout, re.DOTALL)[1])
     for before, after in zip(noted["before"], noted["after"], strict=True):
