@@ -137,7 +137,7 @@ for ax, name in zip(axes.flat, error, strict=True):
 for ax in axes[-1]:
     ax.set_xticks(RADII, [str(radius) for radius in RADII])
     ax.minorticks_off()
-figure.supxlabel("radius or half wavelength / spacing", fontsize="medium")
+axes[-1, 1].set_xlabel("radius or half wavelength / spacing")
 for ax in axes[:, 0]:
     ax.set_ylabel("error")
 handles = {

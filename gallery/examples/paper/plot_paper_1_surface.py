@@ -23,7 +23,7 @@ figure = fc.plotting.paper_figure(study, 1)
 # The paper gives fractal dimensions from 2.15 to 2.29 for its surface (shaded). The surface here is
 # synthetic, with similar roughness.
 
-dimensions = fc.plotting.dimensions(study["dimensions"], band=(2.15, 2.29))
+dimensions = fc.plotting.dimensions(study["dimensions"], band=(2.15, 2.29), band_name="1998 paper")
 print(study["dimensions"].to_dataset())
 
 # %%

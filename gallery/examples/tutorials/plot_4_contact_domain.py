@@ -42,7 +42,7 @@ for step in range(pressed.sizes["step"]):
     (line,) = right.loglog(one.box_length * 1e3, one.lacunarity, label=label)
     right.loglog(one.box_length * 1e3, one.null_lacunarity, "--", color=line.get_color())
 right.set(xlabel="box edge (mm)", ylabel="lacunarity")
-right.legend()
+right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 # %%
 # Islands: how many, and how large. Those of a few cells are not resolved at any load.
