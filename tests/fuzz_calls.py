@@ -239,6 +239,7 @@ CALLS = {
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
     "plotting.contact_domains": lambda: {"result": pressed()},
     "plotting.contact_area": lambda: {"result": closed()},
+    "plotting.curves": lambda: {"axes": fc.plotting.contact_area(closed())},
     "plotting.closure_fits": lambda: {"closure": closed(), "laws": laws()},
     "plotting.mean_gap": lambda: {"result": closed()},
     "plotting.stiffness": lambda: {"result": laws()},

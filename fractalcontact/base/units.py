@@ -16,7 +16,7 @@ PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
 }  # fmt: skip
 SMALLEST = 0.5  # the largest value is at least this many of the shown units
-PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3)$")
+PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -110,6 +110,8 @@ def named_scale(units: str, shown: str) -> Scale | None:
     unit, wanted = raise_exponents(units), raise_exponents(shown).replace("u", "µ", int(shown[:1] == "u"))
     if wanted == unit or (units == "degree" and shown == "°"):
         return Scale(1.0, "°" if units == "degree" else unit)
+    if (units, shown) == ("degree", "rad"):
+        return Scale(180 / np.pi, "rad")
     power = int(units[-1]) if units[-1].isdigit() else 1
     for exponent, prefix in PREFIXES.items():
         if PREFIXED.match(units) and prefix + unit == wanted:
@@ -118,7 +120,9 @@ def named_scale(units: str, shown: str) -> Scale | None:
 
 
 def raise_exponents(units: str) -> str:
-    """Return UDUNITS text with raised exponents: `Pa m-1` becomes `Pa m⁻¹`."""
+    """Return UDUNITS text with raised exponents: `Pa m-1` becomes `Pa m⁻¹`; `byte` becomes `B`."""
+    if units == "byte":
+        return "B"
     return re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda match: match.group().translate(SUPERSCRIPT), units)
 
 

@@ -10,6 +10,7 @@ from ._contact_curves import mean_gap as mean_gap
 from ._contact_curves import pressure_distribution as pressure_distribution
 from ._contact_curves import stiffness as stiffness
 from ._contact_maps import contact_domains as contact_domains
+from ._curves import curves as curves
 from ._datasheet import datasheet as datasheet
 from ._decorrelation import correlation as correlation
 from ._decorrelation import delta_dimension as delta_dimension
@@ -44,6 +45,7 @@ __all__ = [
     "contact_area",
     "contact_domains",
     "correlation",
+    "curves",
     "datasheet",
     "delta_dimension",
     "dimension_curves",

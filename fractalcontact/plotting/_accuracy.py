@@ -8,24 +8,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, require_variables, table, words
-from fractalcontact.plotting._units import label_axis, name_of
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
-MEGABYTE = 1e6
 NARROW = 2.0  # costs within this ratio are drawn on an axis of at least its width
 PLANE = ("method", "setting")
 
 
 @_style.checked
-def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArray:
+def error_against_time(measured: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
     Each point is one setting of a method. A filled point is on the Pareto front: no other method of the
@@ -36,6 +35,8 @@ def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArra
     measured : DataTree or Dataset
         From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
         on_pareto_front over (method, setting), benchmark and error_meaning over method.
+    units : mapping of str to str, optional
+        Unit of each variable by name, `{"run_time": "ms"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -69,17 +70,17 @@ def error_against_time(measured: Any, *, axes: Panels | None = None) -> AxesArra
     >>> print(time.get_xlabel(), "|", memory.get_xlabel())
     run time (ms) | peak memory (MB)
     """
-    benchmarks = _benchmarks(measured)
+    benchmarks = _benchmarks(shown_in(measured, units, "error_against_time"))
     shape = (len(benchmarks), 2)
     shown = _style.panels(axes, shape, (8.6, 2.7 * len(benchmarks)), sharey="row")
     for (left, right), (name, data) in zip(shown, benchmarks.items(), strict=True):
         run_time = table(data, "run_time", PLANE)
-        seconds = scale_for("s", run_time)
+        seconds, bytes_shown = scale_of(data["run_time"]), scale_of(data["memory"])
         _error_curves(left, data, seconds(run_time))
         label_axis(left.xaxis, name_of(data["run_time"]), seconds)
-        left.set_ylabel("true error")
-        entries = _error_curves(right, data, table(data, "memory", PLANE) / MEGABYTE)
-        right.set_xlabel("peak memory (MB)")
+        label_axis(left.yaxis, "true error", PLAIN)
+        entries = _error_curves(right, data, bytes_shown(table(data, "memory", PLANE)))
+        label_axis(right.xaxis, "peak memory", bytes_shown)
         right.tick_params(labelleft=False)
         _style.side_legend(right, entries)
         meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
@@ -111,9 +112,11 @@ def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
         finite = np.isfinite(errors[row]) & np.isfinite(cost[row])
         best = finite & on_front[row]
         style = _method_style(row)
-        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor=ax.get_facecolor())
-        ax.plot(cost[row][best], errors[row][best], **style, ls="")
-        entries.append(_style.legend_line(name.replace("_", " "), **style))
+        label = name.replace("_", " ")
+        face = ax.get_facecolor()
+        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor=face, label=label)
+        ax.plot(cost[row][best], errors[row][best], **style, ls="", label=f"{label}, Pareto front")
+        entries.append(_style.legend_line(label, **style))
     _style.log_scale(ax, x=cost, y=errors)
     least, most = np.nanmin(cost), np.nanmax(cost)
     if least > 0 and most < NARROW * least:  # nearly equal costs must not style different
@@ -178,15 +181,15 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     for (upper, lower), (family, size) in zip(shown.T, cases, strict=True):
         case = data.sel(family=family, size=size)
         for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
-            _curves_against_hurst(ax, case, quantity, styles)
+            _curves_against_hurst(ax, case, quantity, dict(zip(names, styles, strict=True)))
         upper.set_yscale("log")
         upper.axhline(1.0, color=_style.ink(), lw=0.9, ls=":")
         lower.axhline(0.95, color=_style.ink(), lw=0.9, ls=":")
         _style.plain_ticks(upper)
         upper.set_title(f"{family}, n = {size}")
-        lower.set_xlabel("true Hurst exponent")
-    shown[0, 0].set_ylabel("rms error / Cramér-Rao bound")
-    shown[1, 0].set_ylabel("interval coverage")
+        label_axis(lower.xaxis, "true Hurst exponent", PLAIN)
+    label_axis(shown[0, 0].yaxis, "rms error / Cramér-Rao bound", PLAIN)
+    label_axis(shown[1, 0].yaxis, "interval coverage", PLAIN)
     entries = [
         _style.legend_line(name.replace("_", " "), **style) for name, style in zip(names, styles, strict=True)
     ]
@@ -194,15 +197,16 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     return shown
 
 
-def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: list[dict[str, Any]]) -> None:
+def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: dict[str, Any]) -> None:
     dims = ("method", "hurst")
     hurst = np.asarray(case["hurst"].values, float)
     values = table(case, quantity, dims)
-    for row, style in enumerate(styles):
+    for row, (name, style) in enumerate(styles.items()):
         finite = np.isfinite(values[row])
         if not finite.any():
             continue
-        ax.plot(hurst[finite], values[row][finite], **style)
+        ax.plot(hurst[finite], values[row][finite], **style, label=name.replace("_", " "))
         if f"{quantity}_low" in case:
             low, high = (table(case, f"{quantity}_{end}", dims)[row][finite] for end in ("low", "high"))
-            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8)
+            label = f"{name.replace('_', ' ')}, interval"
+            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8, label=label)

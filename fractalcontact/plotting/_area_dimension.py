@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._paths import at_shear, load_words, shear_text
+from fractalcontact.plotting._paths import at_shear, curve_name, load_words, shear_text
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -64,9 +64,11 @@ def area_dimension(
     counted, corrected = (table(data, name, ("step", "resolution")) for name in names[:2])
     colours = _style.sequence_colours(len(counted))
     spacing = along(data["resolution"].values)
+    loads = load_words(data)
     for i, colour in enumerate(colours):
-        ax.plot(spacing, across(counted[i]), color=colour, marker="o")
-        ax.plot(spacing, across(corrected[i]), color=colour, **CORRECTED)
+        labels = [curve_name(what, loads, i) for what in ("cells", "corrected for the perimeter")]
+        ax.plot(spacing, across(counted[i]), color=colour, marker="o", label=labels[0])
+        ax.plot(spacing, across(corrected[i]), color=colour, label=labels[1], **CORRECTED)
     _style.log_scale(ax, x=spacing, y=counted)
     _style.plain_ticks(ax)
     ax.set_xticks(spacing, [f"{value:g}" for value in spacing])
@@ -74,7 +76,7 @@ def area_dimension(
     label_axis(ax.xaxis, "spacing", along)
     label_axis(ax.yaxis, name_of(data["contact_fraction"]), across)
     ax.set_title(shear_text(data))
-    _style.sequence_legend(ax, *load_words(data), colours)
+    _style.sequence_legend(ax, *loads, colours)
     entries = [
         _style.legend_line("cells", marker="o"),
         _style.legend_line("perimeter-\ncorrected", **CORRECTED),

@@ -12,7 +12,7 @@ from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import at_force, load_of, load_text, shear_words
+from fractalcontact.plotting._paths import at_force, curve_name, load_of, load_text, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -72,22 +72,24 @@ def box_dimension(
     data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
     name = present[0]
     shown = path_panels(axes, data)
-    colours = _style.sequence_colours(data.sizes["shear"])
+    colours, shears = _style.sequence_colours(data.sizes["shear"]), shear_words(data)
     for dim, ax in shown.items():
         if dim == "step":
             for i, colour in enumerate(colours):
-                _dimension_curve(ax, data.isel(shear=i), name, dim, colour, band=len(colours) == 1)
+                place = curve_name("", shears, i)
+                _dimension_curve(ax, data.isel(shear=i), name, dim, (colour, place), band=len(colours) == 1)
         else:
             path = at_force(data, normal_force)
-            _dimension_curve(ax, path, name, dim, _style.ink(), band=True)
-            ax.set_title(load_text(path, data))
+            load = load_text(path, data)
+            _dimension_curve(ax, path, name, dim, (_style.ink(), f", {load}" if load else ""), band=True)
+            ax.set_title(load)
         ax.set_ylim(-0.05, 2.05)
         if not bool(data[name].notnull().any()):
             _style.write_in_empty_axes(ax, "no contact")
     first, *_, last = (*shown.values(), *shown.values())
     first.set_ylabel(name_of(data[name]))
     if data.sizes["step"] > 1:
-        _style.sequence_legend(last, *shear_words(data), colours)
+        _style.sequence_legend(last, *shears, colours)
     _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
     return as_array(shown)
 
@@ -108,8 +110,11 @@ def _line_legend(data: xr.Dataset, name: str) -> list[Any]:
     return entries
 
 
-def _dimension_curve(ax: Axes, path: xr.Dataset, name: str, dim: str, colour: Any, *, band: bool) -> None:
-    """Draw one curve with its random null, intervals and points, against shear or load."""
+def _dimension_curve(
+    ax: Axes, path: xr.Dataset, name: str, dim: str, style: tuple[Any, str], *, band: bool
+) -> None:
+    """Draw one curve in its colour, with its random null, intervals and points, against shear or load."""
+    colour, place = style
     load = load_of(path) or ("coverage" if "coverage" in path else dim)
     against = "shear" if dim == "shear" else load
     labelled = against in path.variables
@@ -121,13 +126,14 @@ def _dimension_curve(ax: Axes, path: xr.Dataset, name: str, dim: str, colour: An
         low, high = (table(path, end, (dim,)) for end in ("ci_low", "ci_high"))
         certain = high - low <= WIDE_INTERVAL
         if band:
-            ax.fill_between(scale(x), low, high, color=colour, alpha=0.14, lw=0)
-    ax.plot(scale(x), values, color=colour)
+            ax.fill_between(scale(x), low, high, color=colour, alpha=0.14, lw=0, label=f"interval{place}")
+    ax.plot(scale(x), values, color=colour, label=f"contact domain{place}")
     if values.size <= _style.MAX_MARKED_POINTS:
         ax.plot(scale(x)[certain], values[certain], "o", color=colour)
         ax.plot(scale(x)[~certain], values[~certain], "o", mec=colour, mfc=ax.get_facecolor())
     if "null_dimension" in path:
-        ax.plot(scale(x), table(path, "null_dimension", (dim,)), color=colour, **_style.NULL_LINE)
+        null = table(path, "null_dimension", (dim,))
+        ax.plot(scale(x), null, color=colour, label=f"random null{place}", **_style.NULL_LINE)
     _style.log_x_if_wide(ax, x)
     if labelled:
         label_axis(ax.xaxis, name_of(path[against]), scale)

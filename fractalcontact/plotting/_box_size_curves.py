@@ -13,6 +13,7 @@ from fractalcontact.plotting._inputs import table
 from fractalcontact.plotting._paths import (
     at_force,
     at_shear,
+    curve_name,
     load_text,
     load_words,
     loaded_steps,
@@ -49,7 +50,8 @@ def draw_size_curves(
             ax.set_title(load_text(path, data))
             title, labels = shear_words(path)
         colours = _style.sequence_colours(path.sizes[dim])
-        _draw_curves(ax, path, dim, colours, name, null_name)
+        names = [curve_name("", (title, labels), i) for i in range(len(colours))]
+        _draw_curves(ax, path, dim, colours, names, name, null_name)
         _style.sequence_legend(ax, title, labels, colours)
     if null_name in data:
         note = _style.legend_line("random null,\nequal coverage", **_style.NULL_LINE)
@@ -69,7 +71,15 @@ def as_array(panels: dict[str, Axes]) -> AxesArray:
     return np.array(list(panels.values()), dtype=object)
 
 
-def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name: str, null_name: str) -> None:
+def _draw_curves(
+    ax: Axes,
+    path: xr.Dataset,
+    dim: str,
+    colours: list[Any],
+    places: list[str],
+    name: str,
+    null_name: str,
+) -> None:
     over = next(str(last) for last in path[name].dims[::-1] if last not in ("shear", "step"))
     size = next((s for s in SIZES if s in path.variables and path[s].dims == (over,)), over)
     curves = table(path, name, (dim, over))
@@ -77,9 +87,10 @@ def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name:
     boxes = table(path, size, (over,)) if size in path.variables else np.arange(1.0, curves.shape[1] + 1)
     scale = scale_of(path[size]) if size in path.variables else scale_for("", 1.0)
     for i, colour in enumerate(colours):
-        ax.plot(scale(boxes), curves[i], color=colour, marker="o" if curves.shape[1] == 1 else "")
+        dot = "o" if curves.shape[1] == 1 else ""
+        ax.plot(scale(boxes), curves[i], color=colour, marker=dot, label=f"contact domain{places[i]}")
         if null is not None:
-            ax.plot(scale(boxes), null[i], color=colour, **_style.NULL_LINE)
+            ax.plot(scale(boxes), null[i], color=colour, label=f"random null{places[i]}", **_style.NULL_LINE)
     shown = curves[np.isfinite(curves)]
     steep = name == "lacunarity" and shown.size > 0 and shown.max() > STEEP * shown.min()
     _style.log_scale(ax, x=boxes, y=curves if steep else None)
@@ -88,8 +99,8 @@ def _draw_curves(ax: Axes, path: xr.Dataset, dim: str, colours: list[Any], name:
         beyond = shown[(shown < -TOLERANCE) | (shown > 2 + TOLERANCE)]
         if beyond.size:  # no dimension in a plane: the slope between counts of a few boxes
             ends = dict.fromkeys(f"{value:.2g}" for value in (beyond.min(), beyond.max()))
-            note = f"outside, of few boxes: {' to '.join(ends)}"
-            ax.text(0.98, 0.02, note, transform=ax.transAxes, ha="right", color=_style.grey(), size="small")
+            note = f"outside the axes, of few boxes: {' to '.join(ends)}"
+            ax.text(1.0, 1.01, note, transform=ax.transAxes, ha="right", color=_style.grey(), size="small")
     _style.plain_ticks(ax)
     size_name = "radius" if over == "radius" else "box size"
     ax.set_xlabel(scale.label(size_name) if size.endswith("_length") else f"{size_name} (cells)")

@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import nearest, result_of, table, words
-from fractalcontact.plotting._paths import loads_of, shear_words
+from fractalcontact.plotting._paths import curve_name, loads_of, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
 LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
+LAWS = ("exponential", "hyperbolic")
 LAW_LINES: tuple[Any, ...] = ((0, (4, 2)), (0, (1, 1.5)))  # exponential, hyperbolic
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 
@@ -88,12 +89,14 @@ def closure_laws(
     total = table(data, "closure", ("shear", "step"))
     inner = table(data, inner_name, ("shear", "step"))
     length, newton = scale_of(data["closure"]), scale_of(data["normal_force"])
-    colours = _style.sequence_colours(len(force))
+    colours, shears = _style.sequence_colours(len(force)), shear_words(data)
     dot = "o" if force.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
         if inner_name != "closure":
-            ax.plot(length(total[i]), newton(force[i]), color=colour, marker=dot, **TOTAL_LINE)
-        ax.plot(length(inner[i]), newton(force[i]), color=colour, marker=dot)
+            name = curve_name("total closure", shears, i)
+            ax.plot(length(total[i]), newton(force[i]), color=colour, marker=dot, label=name, **TOTAL_LINE)
+        name = curve_name(inner_name.replace("_", " "), shears, i)
+        ax.plot(length(inner[i]), newton(force[i]), color=colour, marker=dot, label=name)
     with Problems("fc.plotting.closure_laws") as problems:
         last = force.shape[1] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
@@ -105,7 +108,7 @@ def closure_laws(
     label_axis(ax.xaxis, "closure", length)
     label_axis(ax.yaxis, name_of(data["normal_force"]), newton)
     if key:
-        _style.sequence_legend(ax, *shear_words(data), colours)
+        _style.sequence_legend(ax, *shears, colours)
     if inner_name != "closure":
         _style.side_legend(
             ax,
@@ -174,9 +177,10 @@ def closure_fits(closure: Any, laws: Any, *, units: Units | None = None, ax: Axe
     constants = {name: table(fitted, name, ("shear",)) for name in LAW_CONSTANTS}
     preferred = table(fitted, "preferred_law", ("shear",)).astype(int)
     along, up = scale_of(data["nominal_pressure"]), scale_of(data["interface_closure"])
-    colours = _style.sequence_colours(len(points))
+    colours, shears = _style.sequence_colours(len(points)), shear_words(data)
     for i, colour in enumerate(colours):
-        ax.plot(along(pressure[i]), up(points[i]), "o", color=colour, ms=3.5)
+        steps = curve_name("steps", shears, i)
+        ax.plot(along(pressure[i]), up(points[i]), "o", color=colour, ms=3.5, label=steps)
         shown = pressure[i][np.isfinite(points[i]) & (pressure[i] > seat)]
         if shown.size < 2:
             continue
@@ -186,14 +190,15 @@ def closure_fits(closure: Any, laws: Any, *, units: Units | None = None, ax: Axe
             curves = (_exponential(p, law), _hyperbola(p - seat, law))
         for number, (style, curve) in enumerate(zip(LAW_LINES, curves, strict=True), 1):
             line = {"lw": 1.8} if number == preferred[i] else {"lw": 0.9, "ls": style}
-            ax.plot(along(p), up(curve), color=colour, **line)
+            name = curve_name(f"{LAWS[number - 1]} law", shears, i)
+            ax.plot(along(p), up(curve), color=colour, label=name, **line)
     _style.log_scale(ax, x=pressure)
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data["nominal_pressure"]), along)
     label_axis(ax.yaxis, name_of(data["interface_closure"]), up)
-    _style.sequence_legend(ax, *shear_words(data), colours)
+    _style.sequence_legend(ax, *shears, colours)
     entries = [_style.legend_line(f"{name},\nnot preferred", lw=0.9, ls=style)
-               for name, style in zip(("exponential", "hyperbolic"), LAW_LINES, strict=True)]  # fmt: skip
+               for name, style in zip(LAWS, LAW_LINES, strict=True)]  # fmt: skip
     _style.side_legend(ax, [_style.legend_line("preferred", lw=1.8), *entries], title="law", low=True)
     return ax
 
@@ -267,12 +272,14 @@ def contact_area(
     scale, percent = scale_of(data[against]), scale_of(data["contact_fraction"])
     corrected = "corrected_contact_fraction" in data
     fraction = table(data, "corrected_contact_fraction", ("shear", "step")) if corrected else raw
-    colours = _style.sequence_colours(len(loads))
+    colours, shears = _style.sequence_colours(len(loads)), shear_words(data)
     dot = "o" if loads.shape[1] == 1 else ""
     for i, colour in enumerate(colours):
         if corrected:
-            ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, **RAW_LINE)
-        ax.plot(scale(loads[i]), percent(fraction[i]), color=colour, marker=dot)
+            name = curve_name("cell count", shears, i)
+            ax.plot(scale(loads[i]), percent(raw[i]), color=colour, marker=dot, label=name, **RAW_LINE)
+        name = curve_name("corrected for the perimeter" if corrected else "cell count", shears, i)
+        ax.plot(scale(loads[i]), percent(fraction[i]), color=colour, marker=dot, label=name)
     label_axis(ax.xaxis, name_of(data[against]), scale)
     label_axis(ax.yaxis, "real / nominal contact area", percent)
     entries: list[Any] = []
@@ -281,7 +288,7 @@ def contact_area(
     _set_scales(ax, scale(loads), percent(raw), log=log)
     if log and against != "closure":
         entries += _proportional_line(ax, scale(loads), percent(raw))
-    _style.sequence_legend(ax, *shear_words(data), colours)
+    _style.sequence_legend(ax, *shears, colours)
     if corrected:
         lines = [
             _style.legend_line("corrected for\nthe perimeter"),
@@ -305,8 +312,8 @@ def draw_theories(
         if not np.isfinite(values[i]).any():
             continue
         style: dict[str, Any] = {"ls": "-.", "lw": 1.0, "color": colours[(i + 1) % len(colours)]}
-        ax.plot(scale(loads), up(values[i]), **style)
         authors = ",\n".join(part.capitalize() for part in word.split("_"))
+        ax.plot(scale(loads), up(values[i]), label=authors, **style)
         entries.append(_style.legend_line(authors, **style))
     return entries
 
@@ -347,8 +354,9 @@ def _proportional_line(ax: Axes, x: Any, y: Any) -> list[Any]:
         return []
     ends = np.array([x[used].min(), x[used].max()])
     style: dict[str, Any] = {"ls": ":", "lw": 1.0, "color": _style.grey()}
-    ax.plot(ends, ends * np.exp(np.median(np.log(y[used] / x[used]))), **style)
-    return [_style.legend_line("proportional\nto the load", **style)]
+    name = "proportional\nto the load"
+    ax.plot(ends, ends * np.exp(np.median(np.log(y[used] / x[used]))), label=name, **style)
+    return [_style.legend_line(name, **style)]
 
 
 def _set_scales(ax: Axes, x: Any, y: Any, *, log: bool) -> None:

@@ -11,7 +11,7 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import draw_theories
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import load_words, loads_of, shear_words
+from fractalcontact.plotting._paths import curve_name, load_words, loads_of, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -183,20 +183,21 @@ def pressure_distribution(
             result_of(theory, "pressure_distribution", ("pressure_spread",), ())["pressure_spread"]
         )
     colours = _style.sequence_colours(len(share))
+    words = load_words(data.drop_vars("normal_force", errors="ignore"))
     for i, colour in enumerate(colours):
         if not greatest[i] > 0:
             continue
         pressure, width = scale(classes * greatest[i]), float(scale(greatest[i])) / classes.size
-        ax.step(pressure, share[i] / width, where="mid", color=colour, lw=1.0)
+        name = curve_name("this surface", words, i)
+        ax.step(pressure, share[i] / width, where="mid", color=colour, lw=1.0, label=name)
         if spread:
             beside = np.linspace(0.0, float(pressure[-1]), 400)
             density = _persson(beside, float(scale(nominal[i])), float(scale(spread)))
-            ax.plot(beside, density, color=colour, **THEORY)
+            ax.plot(beside, density, color=colour, label=curve_name("Persson", words, i), **THEORY)
     label_axis(ax.xaxis, "pressure", scale)
     ax.set_ylabel(f"nominal area per pressure (1/{scale.unit})")
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
-    words = load_words(data.drop_vars("normal_force", errors="ignore"))
     _style.sequence_legend(ax, *words, colours)
     if spread:
         _style.side_legend(ax, [_style.legend_line("Persson", **THEORY)], title="theory", low=True)
@@ -216,10 +217,16 @@ def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axe
     loads, values = loads_of(data, against, where), table(data, name, ("shear", "step"))
     scale = scale_of(data[against])
     up = PER_LENGTH if name in STIFFNESSES else scale_of(data[name])
-    colours = _style.sequence_colours(len(loads))
+    colours, shears = _style.sequence_colours(len(loads)), shear_words(data)
     for i, colour in enumerate(colours):
         marker: dict[str, Any] = {"marker": "o", "ms": 3.0} if np.isfinite(values[i]).sum() <= 30 else {}
-        ax.plot(scale(loads[i]), up(values[i]), color=colour, **marker)
+        ax.plot(
+            scale(loads[i]),
+            up(values[i]),
+            color=colour,
+            label=curve_name("this surface", shears, i),
+            **marker,
+        )
     _style.log_scale(ax, x=loads, y=values)
     entries = []
     if theory is not None:
@@ -228,6 +235,6 @@ def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axe
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data[against]), scale)
     label_axis(ax.yaxis, "normal stiffness" if name in STIFFNESSES else name_of(data[name]), up)
-    _style.sequence_legend(ax, *shear_words(data), colours)
+    _style.sequence_legend(ax, *shears, colours)
     _style.side_legend(ax, entries, title="theory", low=True)
     return ax

@@ -16,7 +16,7 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._contact_curves import PER_LENGTH
 from fractalcontact.plotting._inputs import table, words
 from fractalcontact.plotting._paper import group
-from fractalcontact.plotting._paths import shear_words
+from fractalcontact.plotting._paths import curve_name, shear_words
 from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
 from fractalcontact.plotting._transmissivity import FLOW_LINES
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 A4 = (8.27, 11.69)  # inches
 ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
+SHEAR_ROW, EMPTY = 2, 0.05  # a page without a shear test leaves no room for one
 COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
 FLOW = Scale(1.0, "m³")
 # what a consultant has to answer for, with its symbol and its unit
@@ -109,7 +110,10 @@ def _draw_page(
 ) -> dict[str, Axes]:
     """Draw the rows of the page; return its panels."""
     panels: dict[str, Axes] = {}
-    parts: Any = page.subfigures(len(ROWS), 1, height_ratios=ROWS)
+    tests, curve = found["direct_shear"], found["shear_curve"]
+    is_sheared = tests is not None or curve is not None
+    ratios = [EMPTY if i == SHEAR_ROW and not is_sheared else row for i, row in enumerate(ROWS)]
+    parts: Any = page.subfigures(len(ROWS), 1, height_ratios=ratios)
     title = str(tree.attrs.get("title") or tree.name or "joint")
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
     facts = "\n".join([_source(tree), *_input_lines(found)])
@@ -121,8 +125,7 @@ def _draw_page(
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])
         strength_envelope(found["strength_envelope"], tests=found["direct_shear"], ax=panels["strength"])
-    tests, curve = found["direct_shear"], found["shear_curve"]
-    if tests is not None or curve is not None:
+    if is_sheared:
         beside = curve if tests is not None else None
         curves = shear_curve(curve if tests is None else tests, beside=beside, axes=parts[2])
         panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
@@ -276,6 +279,8 @@ def _flow_panels(
 ) -> AxesArray:
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
     axes: AxesArray = _style.panel_row(figure, 3, A4)
+    shown = closure if closure is not None else flow
+    shears = shear_words(_with_dims(shown)) if shown is not None else ("", [])
     if closure is not None:
         pressure = table(_with_dims(closure), "nominal_pressure", ("shear", "step"))
         if laws is not None:
@@ -283,23 +288,18 @@ def _flow_panels(
         else:
             closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
             stiffness = secant_stiffness(pressure, closed)
-        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", PER_LENGTH)
+        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", PER_LENGTH, shears)
         gap = table(_with_dims(closure), "mean_gap", ("shear", "step"))
-        _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap))
+        _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap), shears)
     if flow is not None and "nominal_pressure" in flow.variables:
         data = _with_dims(flow, "axis")
         pressure = table(data, "nominal_pressure", ("shear", "step"))
         flows = table(data, "transmissivity", ("shear", "step", "axis"))
-        _draw(axes[2], pressure, flows, "transmissivity", FLOW)
-        axis_words = words(data["axis"]) if "axis" in data.coords else []
-        entries = [_style.legend_line(f"along {w}", ls=FLOW_LINES[i % 2]) for i, w in enumerate(axis_words)]
+        names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
+        _draw(axes[2], pressure, flows, "transmissivity", FLOW, shears, names)
+        entries = [_style.legend_line(name, ls=FLOW_LINES[i % 2]) for i, name in enumerate(names)]
         _style.side_legend(axes[2], entries, low=True)
-    shown = closure if closure is not None else flow
-    if shown is not None:
-        title, labels = shear_words(_with_dims(shown))
-        colours = _style.sequence_colours(len(labels))
-        entries = [_style.legend_line(text, color=c) for text, c in zip(labels, colours, strict=True)]
-        _style.side_legend(axes[2], entries[: _style.MAX_LEGEND_ENTRIES], title=title)
+    _style.sequence_legend(axes[2], *shears, _style.sequence_colours(len(shears[1])))
     return axes
 
 
@@ -316,11 +316,24 @@ def secant_stiffness(pressure: Any, closure: Any) -> Any:
     return result
 
 
-def _draw(ax: Any, pressure: Any, values: Any, name: str, across: Scale) -> None:
+def _draw(
+    ax: Any,
+    pressure: Any,
+    values: Any,
+    name: str,
+    across: Scale,
+    shears: tuple[str, list[str]],
+    flows: Sequence[str] = (),
+) -> None:
     along = scale_for("Pa", pressure)
     for i, colour in enumerate(_style.sequence_colours(len(pressure))):
         for j in range(values.shape[2]):
-            style = {"color": colour, "ls": FLOW_LINES[j % 2], "marker": "."}
+            style = {
+                "color": colour,
+                "ls": FLOW_LINES[j % 2],
+                "marker": ".",
+                "label": curve_name(flows[j] if flows else name, shears, i),
+            }
             ax.plot(along(pressure[i]), across(values[i, :, j]), **style)
     _style.log_scale(ax, x=pressure, y=values)
     _style.plain_ticks(ax)

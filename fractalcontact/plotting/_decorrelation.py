@@ -63,7 +63,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     ends = [table(data.isel(shear=0), name, ("direction",)) for name in lengths]
     entries = []
     for i, (name, style) in enumerate(direction_styles(data)):
-        ax.plot(along(data["shear"].values), values[i], **style)
+        ax.plot(along(data["shear"].values), values[i], label=name or "correlation", **style)
         low, length, high = (float(end[i]) for end in ends)
         if np.isfinite(length):
             ax.axvline(float(along(length)), color=style["color"], lw=0.7, ls=":")
@@ -117,8 +117,9 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
     entries = []
     for i, name in enumerate(DIMENSIONS):
         style: dict[str, Any] = {"color": _style.cycle()[i], "marker": "osD"[i], "ms": 3.5}
-        ax.plot(along(data["shear"].values), table(data, name, ("shear",)), **style)
-        entries.append(_style.legend_line(name.split("_")[0], **style))
+        method = name.split("_")[0]
+        ax.plot(along(data["shear"].values), table(data, name, ("shear",)), label=method, **style)
+        entries.append(_style.legend_line(method, **style))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
         ax.set_xscale("log")
     label_axis(ax.xaxis, name_of(data["shear"]), along)

@@ -11,7 +11,7 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._directions import direction_styles, limit_shear, select_direction
 from fractalcontact.plotting._inputs import nearest, result_of, table
-from fractalcontact.plotting._paths import load_words
+from fractalcontact.plotting._paths import curve_name, load_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -69,11 +69,12 @@ def rigid_dilatancy(dilatancy: Any, *, units: Units | None = None, ax: Axes | No
     dot = "o" if shear.size == 1 else ""
     slopes = table(data, "mean_slope", ("direction",)) if "mean_slope" in data else None
     for i, (name, style) in enumerate(styles):
-        ax.plot(along(shear), across(opening[i]), marker=dot, **style)
+        ax.plot(along(shear), across(opening[i]), marker=dot, label=name or "rigid dilatancy", **style)
         entries.append(_style.legend_line(name, **style))
         if slopes is not None:
             ends = np.array([0.0, np.nanmax(shear)])
-            ax.plot(along(ends), across(slopes[i] * ends), color=style["color"], **MEAN_SLOPE_LINE)
+            line = {"color": style["color"], "label": f"mean slope {name}".rstrip(), **MEAN_SLOPE_LINE}
+            ax.plot(along(ends), across(slopes[i] * ends), **line)
     label_axis(ax.xaxis, name_of(data["shear"]), along)
     label_axis(ax.yaxis, name_of(data["rigid_dilatancy"]), across)
     if any(name for name, _ in styles):
@@ -145,16 +146,17 @@ def elastic_dilatancy(
     marker = "o" if shear.size <= _style.MAX_MARKED_POINTS else ""
     entries = []
     if rigid is not None:
-        ax.plot(along(shear), across(rigid), color=_style.ink(), lw=1.0, marker=marker)
+        ax.plot(along(shear), across(rigid), color=_style.ink(), lw=1.0, marker=marker, label="rigid")
         entries.append(_style.legend_line("0 (rigid)", color=_style.ink(), lw=1.0))
+    title, labels = load_words(data)
     for j, colour in enumerate(colours):
-        ax.plot(along(shear), across(opening[:, j]), color=colour, marker=marker)
+        name = curve_name("dilatancy", (title, labels), j)
+        ax.plot(along(shear), across(opening[:, j]), color=colour, marker=marker, label=name)
     for number, target in enumerate(marked):
         index = nearest(shear, target)
         if np.isclose(shear[index], target, rtol=1e-6, atol=0.0):
             point = slice(index, index + 1)
             mark_points(ax, along(shear[point]), across(opening[point, -1]), colours[-1], number)
-    title, labels = load_words(data)
     entries += [_style.legend_line(text, color=colour) for text, colour in zip(labels, colours, strict=True)]
     label_axis(ax.xaxis, name_of(data["shear"]), along)
     label_axis(ax.yaxis, r"dilatancy $\delta$", across)

@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -150,10 +150,10 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     x, y = np.asarray(curve[scale].values, float), table(curve, value, (dim,))
     along, across = scale_of(curve[scale]), scale_of(curve[value])
     marker = "." if x.size <= 60 else ""
-    upper.plot(along(x), across(y), color=_style.BLUE, marker=marker, lw=1.2)
+    upper.plot(along(x), across(y), color=_style.BLUE, marker=marker, lw=1.2, label="curve")
     if "local_slope" in curve:
         slopes = table(curve, "local_slope", (dim,))
-        lower.plot(along(x), slopes, color=_style.BLUE, lw=1.0, marker=marker)
+        lower.plot(along(x), slopes, color=_style.BLUE, lw=1.0, marker=marker, label="local slope")
         _slope_limits(lower, slopes)
     for ax in (upper, lower):
         _style.log_scale(ax, x=x)
@@ -165,7 +165,7 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     upper.tick_params(labelbottom=False)
     lower.set_xlim(upper.get_xlim())
     label_axis(lower.xaxis, name_of(curve[scale]), along)
-    lower.set_ylabel("local slope")
+    label_axis(lower.yaxis, "local slope", PLAIN)
     for ax in (upper, lower):
         _style.plain_ticks(ax)
     if not np.isfinite(y).any():
@@ -206,8 +206,9 @@ def _draw_fit(
     slope = a * float(fit.get("fitted_hurst", hurst)) + b * (hurst + dimension) + c
     level = np.mean(np.log(y[inside]) - slope * np.log(x[inside]))
     ends = np.array([x[inside].min(), x[inside].max()])
-    upper.plot(shown[0](ends), shown[1](np.exp(level + slope * np.log(ends))), color=_style.RED, lw=1.4)
-    lower.plot(shown[0](ends), [slope] * 2, color=_style.RED, lw=1.2)
+    fitted = shown[1](np.exp(level + slope * np.log(ends)))
+    upper.plot(shown[0](ends), fitted, color=_style.RED, lw=1.4, label="fit")
+    lower.plot(shown[0](ends), [slope] * 2, color=_style.RED, lw=1.2, label="fit")
     text = f"slope {slope:.2f}\n" + rf"$\Delta$ = {dimension:.2f}"
     right = slope < 0
     upper.text(0.96 if right else 0.04, 0.96, text, transform=upper.transAxes, va="top", color=_style.RED,
@@ -274,23 +275,25 @@ def dimensions(
     high = embedding - table(data, "ci_low", ("method",)) if "ci_low" in data else missing
     rows = np.arange(len(names))[::-1]
     has_interval = np.isfinite(low) & np.isfinite(high)
-    ax.hlines(rows[has_interval], low[has_interval], high[has_interval], color=_style.BLUE, lw=2.2)
+    ends = low[has_interval], high[has_interval]
+    ax.hlines(rows[has_interval], *ends, color=_style.BLUE, lw=2.2, label="95 % interval")
     fitted = table(data, "fitted_hurst", ("method",)) if "fitted_hurst" in data else hurst
     beyond = (hurst >= 1) | (fitted > 1), (hurst <= 0) | (fitted < 0)
     smooth, rough = (np.isfinite(value) & side for side in beyond)
     inside = ~(smooth | rough)
     hollow: dict[str, Any] = {"ls": "", "mfc": _style.tone(0.0), "mec": _style.BLUE, "ms": 6}
     closed = has_interval & inside
-    ax.plot(value[closed], rows[closed], "o", color=_style.BLUE, ms=6)
-    ax.plot(value[~has_interval & inside], rows[~has_interval & inside], marker="o", **hollow)
+    ax.plot(value[closed], rows[closed], "o", color=_style.BLUE, ms=6, label="estimate")
+    bare = ~has_interval & inside
+    ax.plot(value[bare], rows[bare], marker="o", label="estimate without interval", **hollow)
     for side, marker in ((smooth, "<"), (rough, ">")):
-        ax.plot(value[side], rows[side], marker=marker, **hollow)
+        ax.plot(value[side], rows[side], marker=marker, label="at the limit: no dimension", **hollow)
     entries = (
         [_style.legend_line("95 % interval", color=_style.BLUE, lw=2.2, marker="o")]
         if has_interval.any()
         else []
     )
-    if (~has_interval & inside).any():
+    if bare.any():
         entries.append(_style.legend_line("no interval", marker="o", **hollow))
     if not inside.all():
         marker = "<" if smooth.any() else ">"
@@ -304,6 +307,6 @@ def dimensions(
     ax.set_yticks(rows, [name.replace("_", " ") for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.grid(False, axis="y")
-    ax.set_xlabel(name_of(data["fractal_dimension"]))
+    label_axis(ax.xaxis, name_of(data["fractal_dimension"]), PLAIN)
     _style.side_legend(ax, entries)
     return ax

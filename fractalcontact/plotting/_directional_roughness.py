@@ -9,9 +9,12 @@ import numpy as np
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import require_dims, result_of
+from fractalcontact.plotting._units import scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fractalcontact.plotting._units import Units
 
 SIZE = (5.0, 4.0)  # inches
 COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
@@ -22,7 +25,7 @@ CURVES: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 @_style.checked
-def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
+def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     r"""Draw the directional roughness over the azimuth of the shear, in polar coordinates.
 
     The distance from the centre is an angle: the metric theta_max/(C+1), and dashed the mean apparent dip
@@ -32,6 +35,8 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.directional_roughness`.
+    units : mapping of str to str, optional
+        `{"roughness_metric": "rad"}` for both curves. Default: degrees.
     ax : Axes, optional
         Polar axes to draw on; otherwise a new figure is made.
 
@@ -53,6 +58,7 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['$\\theta^*_{max}/(C+1)$', 'mean dip']
     """
+    result = shown_in(result, units, "directional_roughness")
     data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
     require_dims(data, "directional_roughness", dict.fromkeys(CURVES, "azimuth"))
     polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
@@ -62,12 +68,14 @@ def directional_roughness(result: Any, *, ax: Axes | None = None) -> Axes:
     order = np.argsort(azimuth % 360.0)
     if _is_full_circle(azimuth):
         order = np.append(order, order[0])
+    angle = scale_of(data[next(iter(CURVES))])
     for name, (label, style) in CURVES.items():
-        polar.plot(np.radians(azimuth[order]), data[name].values[order], label=label, **style)
-    greatest = float(np.nan_to_num([float(data[name].max()) for name in CURVES]).max())
+        polar.plot(np.radians(azimuth[order]), angle(data[name].values[order]), label=label, **style)
+    greatest = float(np.nan_to_num([float(angle(data[name].max())) for name in CURVES]).max())
     polar.set_ylim(0.0, 1.12 * greatest or 1.0)
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
-    polar.yaxis.set_major_formatter("{x:g}°")
+    polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))
+    polar.yaxis.set_units(angle.unit)
     polar.set_rlabel_position(22.5)
     for tick_label in polar.get_yticklabels():
         tick_label.set_path_effects(_style.halo())

@@ -20,6 +20,7 @@ from fractalcontact.plotting._area_dimension import area_dimension
 from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
 from fractalcontact.plotting._closure import closure_laws, contact_area
 from fractalcontact.plotting._contact_maps import contact_domains
+from fractalcontact.plotting._curves import curves
 from fractalcontact.plotting._decorrelation import correlation, delta_dimension
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directional_roughness import directional_roughness
@@ -42,15 +43,18 @@ from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
 from fractalcontact.plotting._style import drawn_for_files, figure_of, needs_log_axis
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
+from fractalcontact.plotting._units import shown_in
 from fractalcontact.plotting._uplift import uplift
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from fractalcontact.plotting._units import Units
+
 Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
-FORMATS = ("png", "svg", "pdf")
+FORMATS = ("png", "svg", "pdf", "csv")
 LARGE = 1 << 26  # bytes of a study whose figures are drawn one after the other: two at once take more memory
 PAPER_BAND = (2.15, 2.29)  # fractal dimensions that the paper gives for its surface
 # names of the same figures in a study that is not compared with the paper
@@ -70,6 +74,7 @@ def draw(
     progress: bool = False,
     paper: bool = True,
     formats: Sequence[str] = ("png",),
+    units: Units | None = None,
 ) -> list[Path]:
     """Draw every figure that a study has data for and write each one as a file.
 
@@ -86,7 +91,9 @@ def draw(
     paper : bool
         Name the figures of a joint after those of the 1998 paper.
     formats : sequence of str
-        Any of png, svg and pdf.
+        Any of png, svg, pdf and csv: the numbers of the curves (`curves`), of the figures that have any.
+    units : mapping of str to str, optional
+        Unit of each variable by name, `{"normal_force": "kN"}`, in all figures. Default: a suitable prefix.
 
     Returns
     -------
@@ -114,6 +121,7 @@ def draw(
         ):
             for word in formats:
                 problems.choice("formats", word, FORMATS)
+    tree = shown_in(tree, units, "draw")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     drawings = _all_drawings(tree, paper)
@@ -130,7 +138,7 @@ def draw(
     drawn = calls_in_two_processes(draw_one, len(drawings)) if small else map(draw_one, range(len(drawings)))
     for _ in track(drawn, progress, "figures", unit="figure", total=len(drawings)):
         pass
-    return [file for each in files for file in each]
+    return [file for each in files for file in each if file.suffix != ".csv" or file.exists()]
 
 
 def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Drawing]]:
@@ -154,9 +162,9 @@ def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
     if estimates is not None and "method" in estimates.dims:
         band = PAPER_BAND if paper else None
         yield "dimensions", functools.partial(dimensions, estimates, band=band, band_name="1998 paper")
-    curves = _scaling_curves(tree)
-    if curves:
-        yield "dimension_curves", _later(dimension_curves, curves, estimates)
+    scaling_curves = _scaling_curves(tree)
+    if scaling_curves:
+        yield "dimension_curves", _later(dimension_curves, scaling_curves, estimates)
     for path, name, drawing in (
         ("joints/friction", "friction", _friction),
         ("domains/box_dimension", "box_dimension", box_dimension),
@@ -254,8 +262,16 @@ def _local_slopes(data: xr.Dataset) -> Any:
     return local_slopes(data, shear=shown_shear(data))
 
 
-def _write(figure: Figure, target: Path) -> Path:
-    """Write a figure under a temporary name, then rename it."""
+def _write(figure: Figure, target: Path) -> None:
+    """Write a figure, or its curves if it has any, under a temporary name, then rename it."""
+    if target.suffix == ".csv":
+        numbers = curves(figure.axes)
+        if numbers.empty:
+            target.unlink(missing_ok=True)  # of an earlier study
+            return
+        with written_whole(target) as temporary:
+            numbers.to_csv(temporary, index=False)
+        return
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas = FigureCanvasAgg(figure)
@@ -270,4 +286,3 @@ def _write(figure: Figure, target: Path) -> Path:
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})
-    return target

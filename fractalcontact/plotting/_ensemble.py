@@ -96,7 +96,9 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         finite = np.isfinite(x_low + y_low + x_high + y_high)
         x = np.concatenate([x_low[finite], x_high[finite][::-1]])
         y = np.concatenate([y_low[finite], y_high[finite][::-1]])
-        ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5)
+        name = str(line.get_label())
+        label = name if name.startswith("_") else f"{name}, central 68 %"
+        ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5, label=label)
         limits = _widened(limits[0], x), _widened(limits[1], y)
         count += 1
     if count:

@@ -51,6 +51,8 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     wavelength (mm) | Hurst exponent
     """
+    from matplotlib.patches import Patch
+
     result = shown_in(result, units, "scaling")
     ax = _style.axes_or_new(ax)
     window = ("window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max")
@@ -60,17 +62,20 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     x = along(data["wavelength"].values)
     hurst, low, high = (table(data, name, ("wavelength",)) for name in ("hurst", "ci_low", "ci_high"))
     bars = [hurst - low, high - hurst]
-    ax.errorbar(x, hurst, bars, fmt="o", ms=3.5, lw=1.0, color=_style.ink(), label="octave, 95 %")
+    points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
+    ax.errorbar(x, hurst, bars, ls="", elinewidth=1.0, label="octave, 95 %", **points)
+    entries = [_style.legend_line("octave, 95 %", **points)]
     if np.isfinite(float(data["window_hurst"])):
         ends = [float(along(float(data[name]))) for name in ("scale_min", "scale_max")]
         bottom, top = (float(data[f"window_ci_{end}"]) for end in ("low", "high"))
-        ax.fill_between(ends, bottom, top, color="C0", alpha=0.35, lw=0, label="one exponent")
-        ax.plot(ends, 2 * [float(data["window_hurst"])], color="C0", lw=1.2)
+        ax.fill_between(ends, bottom, top, color=_style.BLUE, alpha=0.35, lw=0, label="one exponent, 95 %")
+        ax.plot(ends, 2 * [float(data["window_hurst"])], color=_style.BLUE, lw=1.2, label="one exponent")
+        entries.append(Patch(facecolor=_style.BLUE, alpha=0.35, lw=0, label="one exponent"))
     for limit in (0.0, 1.0):
         ax.axhline(limit, color=_style.grey(), lw=0.7, ls=":")
     ax.set_xscale("log")
     ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
     label_axis(ax.xaxis, name_of(data["wavelength"]), along)
     ax.set_ylabel("Hurst exponent")
-    ax.legend()
+    _style.side_legend(ax, entries)
     return ax

@@ -16,7 +16,7 @@ from fractalcontact.plotting._directions import (
     select_direction,
 )
 from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
-from fractalcontact.plotting._paths import load_words
+from fractalcontact.plotting._paths import curve_name, load_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -85,11 +85,11 @@ def friction(
     shown = _style.panel_row(axes, len(names), size, sharex=True)
     entries, title = _curve_legend(data, over)
     for ax, name in zip(shown, names, strict=True):
-        _draw_curves(ax, data, name, over, entries)
+        _draw_curves(ax, data, name, over, entries, title)
     if "basic_friction_angle" in data:
         basic_angle = float(np.asarray(data["basic_friction_angle"].values, dtype=float).ravel()[0])
         style: dict[str, Any] = {"color": _style.ink(), "lw": 0.8, "ls": ":"}
-        shown[0].axhline(basic_angle, **style)
+        shown[0].axhline(basic_angle, label="_basic angle", **style)
         entries = [*entries, _style.legend_line("basic angle", **style)]
     remarks = []
     if over == "step" and "direction" in data.coords:
@@ -112,13 +112,14 @@ def _slope_lengths(data: xr.Dataset) -> str:
     return "slopes over " + " to ".join(dict.fromkeys(ends)) if ends else ""
 
 
-def _draw_curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any]) -> None:
+def _draw_curves(ax: Axes, data: xr.Dataset, name: str, over: str, entries: list[Any], title: str) -> None:
     """Draw one variable against shear, with the line styles of the legend entries."""
     values, shear = table(data, name, ("shear", over)), np.atleast_1d(data["shear"].values).astype(float)
     along, across = scale_of(data["shear"]), scale_of(data[name])
     for j, entry in enumerate(entries):
+        what = curve_name(name.replace("_", " "), (title, [each.get_label() for each in entries]), j)
         ax.plot(along(shear), across(values[:, j]), color=entry.get_color(), ls=entry.get_linestyle(),
-                marker="o" if shear.size <= _style.MAX_MARKED_POINTS else "")  # fmt: skip
+                marker="o" if shear.size <= _style.MAX_MARKED_POINTS else "", label=what)  # fmt: skip
     if name == "shear_strength" and _style.needs_log_axis(values):
         ax.set_yscale("log")
         _style.plain_ticks(ax)

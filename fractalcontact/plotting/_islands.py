@@ -16,7 +16,7 @@ from fractalcontact.plotting._inputs import (
     require_known_dims,
     require_variables,
 )
-from fractalcontact.plotting._paths import load_words, shear_words
+from fractalcontact.plotting._paths import curve_name, load_words, shear_words
 from fractalcontact.plotting._surface import label_axes, plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
@@ -158,14 +158,16 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
     title, groups = _island_groups(data, areas)
     groups = [groups[i] for i in _style.spread_indices(len(groups), MAX_CURVES)]
     colours = _style.sequence_colours(len(groups))
-    for (_, group), colour in zip(groups, colours, strict=True):
+    labels = [label for label, _ in groups] if title else []
+    for i, ((_, group), colour) in enumerate(zip(groups, colours, strict=True)):
         ordered = np.sort(group[np.isfinite(group)])[::-1]
         ax.step(scale(ordered), np.arange(1, ordered.size + 1), where="pre", color=colour,
-                marker="." if ordered.size < 40 else None)  # fmt: skip
+                marker="." if ordered.size < 40 else None,
+                label=curve_name("islands", (title, labels), i))  # fmt: skip
     _style.log_scale(ax, x=areas, y=np.ones(1))
     _style.plain_ticks(ax)
     if title:
-        _style.sequence_legend(ax, title, [name for name, _ in groups], colours)
+        _style.sequence_legend(ax, title, labels, colours)
 
 
 def _island_groups(data: xr.Dataset, areas: Any) -> tuple[str, list[tuple[str, Any]]]:

@@ -18,11 +18,13 @@ from fractalcontact.plotting._inputs import extent_of, nearest, result_of, words
 from fractalcontact.plotting._paths import at_shear, loaded_steps, select_path
 from fractalcontact.plotting._shear_scheme import shear_step_of, sliding_scheme
 from fractalcontact.plotting._surface import SIZE, surface
+from fractalcontact.plotting._units import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from fractalcontact.plotting._style import AxesArray, Panels
+    from fractalcontact.plotting._units import Units
 
 PANELS = 6
 SHOWN_SHEAR = 1 / 50  # of the block edge: 0.4 mm of 2 cm, the shear of the maps in the paper
@@ -57,7 +59,9 @@ def has_figure(tree: xr.DataTree, number: int) -> bool:
 
 
 @_style.checked
-def paper_figure(tree: xr.DataTree, number: int, *, axes: Panels | None = None) -> AxesArray:
+def paper_figure(
+    tree: xr.DataTree, number: int, *, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
     """Draw one of the five figures of the 1998 paper from the data of a study.
 
     Parameters
@@ -68,6 +72,8 @@ def paper_figure(tree: xr.DataTree, number: int, *, axes: Panels | None = None) 
         1: crack surface and delta-surface; 2: scheme of the simulation; 3: closure laws and real contact
         area; 4: contact domains for increasing force; 5: rigid and elastic dilatancy, with the contact
         domains for increasing shear.
+    units : mapping of str to str, optional
+        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
     axes : array of Axes, Figure or SubFigure, optional
         The Axes of the panels, or a figure to make them in. Default: a new figure.
 
@@ -101,7 +107,7 @@ def paper_figure(tree: xr.DataTree, number: int, *, axes: Panels | None = None) 
             groups = " and ".join(GROUPS[number])
             problems.require(has_figure(tree, number), "tree", f"data for figure {number} in {groups}", NONE)
     drawing = {1: _surfaces, 2: _scheme, 3: _closure, 4: _domains, 5: _dilatancy}[number]
-    return drawing(tree, axes)
+    return drawing(shown_in(tree, units, "paper_figure"), axes)
 
 
 def _surfaces(tree: xr.DataTree, axes: Panels | None) -> AxesArray:

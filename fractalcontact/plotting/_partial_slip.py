@@ -10,7 +10,7 @@ import xarray as xr
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._contact_maps import maps_height
 from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of, table
-from fractalcontact.plotting._paths import shear_words
+from fractalcontact.plotting._paths import curve_name, shear_words
 from fractalcontact.plotting._surface import plane_scale
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
@@ -138,8 +138,10 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     along, up = scale_of(data["tangential_displacement"]), scale_of(data["tangential_force"])
     colours = _style.sequence_colours(len(displacement))
     marker = "o" if displacement.shape[1] <= _style.MAX_MARKED_POINTS else ""
+    shears = shear_words(data)
     for row, colour in enumerate(colours):
-        line: dict[str, Any] = {"color": colour, "marker": marker}
+        name = curve_name("loading path", shears, row)
+        line: dict[str, Any] = {"color": colour, "marker": marker, "label": name}
         left.plot(along(displacement[row]), up(force[row]), **line)
         share = 100 * stuck[row] / np.where(contact[row] > 0, contact[row], np.nan)
         right.plot(up(force[row]), share, **line)
@@ -148,7 +150,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     label_axis(right.xaxis, name_of(data["tangential_force"]), up)
     right.set_ylabel("part of the contact that sticks (%)")
     right.set_ylim(0, 105)
-    _style.sequence_legend(right, *shear_words(data), colours)
+    _style.sequence_legend(right, *shears, colours)
     return shown
 
 

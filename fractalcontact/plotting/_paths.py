@@ -46,6 +46,15 @@ def shear_words(data: xr.Dataset) -> tuple[str, list[str]]:
     return scale.label("shear $v$"), _numbers(scale(np.atleast_1d(data["shear"].values)), 4)
 
 
+def curve_name(what: str, words: tuple[str, list[str]] = ("", []), number: int = 0) -> str:
+    """Return the name of a curve: what it shows, and its load or shear out of the words of a legend."""
+    title, labels = words
+    if not labels:
+        return what
+    name, _, unit = title.partition(" (")
+    return f"{what}, {name} = {labels[number]} {unit.rstrip(')')}".rstrip()
+
+
 def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
     """Return the load of a state, `F = 30 kN`, in the unit of the path; empty if it is not uniform."""
     for name, symbol in LOADS.items():

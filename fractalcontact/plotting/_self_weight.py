@@ -9,7 +9,7 @@ import numpy as np
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._directions import direction_styles
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._paths import shear_words
+from fractalcontact.plotting._paths import curve_name, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -64,19 +64,21 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     strength = table(data, "shear_strength", ("direction", "shear", "structure_size"))
     sizes = along(data["structure_size"].values)
     directions = [(name, style | {"ls": "-"}) for name, style in direction_styles(data)]
-    for i, (_, style) in enumerate(directions):
+    shears = shear_words(data)
+    for i, (direction, style) in enumerate(directions):
         for j in range(strength.shape[1]):
-            line = style | {"ls": SHEAR_LINES[j % len(SHEAR_LINES)]}
+            name = curve_name(direction or "shear strength", shears, j)
+            line = style | {"ls": SHEAR_LINES[j % len(SHEAR_LINES)], "label": name}
             ax.plot(sizes, across(strength[i, j]), **line)
     basic = data["nominal_pressure"].values * np.tan(np.radians(float(data["basic_friction_angle"])))
-    ax.plot(sizes, across(basic), **CONSTANT)
+    ax.plot(sizes, across(basic), label="basic angle alone", **CONSTANT)
     _style.log_scale(ax, x=sizes, y=basic)
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, "size of the structure", along)
     label_axis(ax.yaxis, name_of(data["shear_strength"]), across)
     entries = [_style.legend_line(name, **style) for name, style in directions]
     _style.side_legend(ax, entries, title="block slides")
-    title, labels = shear_words(data)
+    title, labels = shears
     shown = [
         _style.legend_line(label, ls=SHEAR_LINES[j % len(SHEAR_LINES)]) for j, label in enumerate(labels)
     ]

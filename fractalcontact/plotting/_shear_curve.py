@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
@@ -68,7 +69,8 @@ def shear_curve(
         for each, style in zip(data, ({}, BESIDE), strict=False):
             for i, pressure in enumerate(each["nominal_pressure"].values.tolist()):
                 x = np.broadcast_to(each["shear_displacement"].values, each[name].shape)[i]
-                ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], **style)
+                label = f"{each.attrs.get('title', name)}, normal stress {quantity_text(pressure, 'Pa')}"
+                ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], label=label, **style)
         label_axis(ax.yaxis, name_of(data[0][name]), across)
         label_axis(ax.xaxis, name_of(data[0]["shear_displacement"]), along)
     stress = scale_of(data[0]["nominal_pressure"], pressures)

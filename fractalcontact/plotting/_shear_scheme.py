@@ -185,10 +185,10 @@ def _draw_section(
     low = top - length / times / SECTION_SHAPE
     along, up = scale_of(lower["x"], position), scale_of(lower, (low, top))
     ax.fill_between(along(position), float(up(low)), up(lower_height), color=LOWER, lw=0)
-    ax.plot(along(position), up(lower_height), color=_style.ink(), lw=0.9)
+    ax.plot(along(position), up(lower_height), color=_style.ink(), lw=0.9, label="lower face")
     block_bottom = up(upper_height + step.lift)
     ax.fill_between(along(upper_position), block_bottom, float(up(block_top)), color=UPPER, lw=0)
-    ax.plot(along(upper_position), block_bottom, color=_style.ink(), lw=0.9)
+    ax.plot(along(upper_position), block_bottom, color=_style.ink(), lw=0.9, label="upper face")
     ax.set_xlim(float(along(position[0])), float(along(position[-1])))
     ax.set_ylim(float(up(low)), float(up(top)))
     ax.set_aspect(times * up.factor / along.factor)

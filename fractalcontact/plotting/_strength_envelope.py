@@ -72,9 +72,9 @@ def strength_envelope(
     for i, name in enumerate(words(data["criterion"])):
         colour = _style.cycle()[i % len(_style.cycle())]
         y = scale(strength.values[i])
-        ax.plot(x, y, color=colour, **OUTSIDE_LINE)
-        ax.plot(x, np.where(in_range[i], y, np.nan), color=colour)
         authors = " and ".join(part.capitalize() for part in name.split("_"))
+        ax.plot(x, y, color=colour, label=authors, **OUTSIDE_LINE)
+        ax.plot(x, np.where(in_range[i], y, np.nan), color=colour, label=f"{authors}, in range")
         entries.append(_style.legend_line(authors, color=colour))
     if not in_range.all():
         entries.append(_style.legend_line("out of range", **OUTSIDE_LINE))
@@ -83,8 +83,9 @@ def strength_envelope(
         found = result_of(tests, "strength_envelope", names, ("nominal_pressure",), "tests")
         for name, marker in (("peak_shear_strength", "o"), ("residual_shear_strength", "x")):
             style: dict[str, Any] = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
-            ax.plot(scale(found["nominal_pressure"]), scale(found[name]), clip_on=False, **style)
-            entries.append(_style.legend_line(f"direct shear, {name.partition('_')[0]}", **style))
+            label = f"direct shear, {name.partition('_')[0]}"
+            ax.plot(scale(found["nominal_pressure"]), scale(found[name]), clip_on=False, label=label, **style)
+            entries.append(_style.legend_line(label, **style))
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
     label_axis(ax.xaxis, name_of(pressure), scale)

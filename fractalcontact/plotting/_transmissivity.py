@@ -9,7 +9,7 @@ import numpy as np
 from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table, words
-from fractalcontact.plotting._paths import load_of, shear_words
+from fractalcontact.plotting._paths import curve_name, load_of, shear_words
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -73,12 +73,16 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     across = scale_of(data["hydraulic_aperture"])
     mean_gap = table(data, "aperture", (over, dim)) if "aperture" in data else None
     colours = _style.sequence_colours(len(aperture))
+    flows = words(data["axis"]) if "axis" in data.coords else []
+    shears = ("", []) if by_shear else shear_words(data)
     for i, colour in enumerate(colours):
         for j in range(aperture.shape[2]):
             ax.plot(along(x[i]), across(aperture[i, :, j]), color=colour, ls=FLOW_LINES[j % 2],
-                    marker="o" if aperture.shape[1] <= _style.MAX_MARKED_POINTS else "")  # fmt: skip
+                    marker="o" if aperture.shape[1] <= _style.MAX_MARKED_POINTS else "",
+                    label=curve_name(f"along {flows[j]}" if flows else "flow", shears, i))  # fmt: skip
         if mean_gap is not None:
-            ax.plot(along(x[i]), across(mean_gap[i]), color=colour, **MEAN_LINE)
+            name = curve_name("mean gap", shears, i)
+            ax.plot(along(x[i]), across(mean_gap[i]), color=colour, label=name, **MEAN_LINE)
     _style.log_x_if_wide(ax, x)
     if np.nanmax(aperture, initial=0.0) > 0:
         ax.set_ylim(bottom=0)
@@ -87,9 +91,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     else:
         ax.set_xlabel(against)
     label_axis(ax.yaxis, name_of(data["hydraulic_aperture"]), across)
-    if not by_shear:
-        _style.sequence_legend(ax, *shear_words(data), colours)
-    flows = words(data["axis"]) if "axis" in data.coords else []
+    _style.sequence_legend(ax, *shears, colours)
     if flows:
         entries = [_style.legend_line(f"along {word}", ls=FLOW_LINES[j % 2]) for j, word in enumerate(flows)]
         if mean_gap is not None:

@@ -54,6 +54,7 @@ SHORT = {
     "covering_area": "area of the covering triangles",
     "covering_length": "length of the covering polygon",
 }
+PLAIN = Scale(1.0, "")  # of a number without a unit
 PERCENT = frozenset({"contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage"})
 
 

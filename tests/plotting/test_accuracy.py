@@ -18,7 +18,8 @@ def test_error_against_time_curves():
         for row, method in enumerate(part.method.values):
             expected = part.to_dataset().sel({"method": method}).dropna("setting")
             best = expected.isel(setting=expected.on_pareto_front.values)
-            for ax, cost, scale in ((left, "run_time", unit), (right, "memory", 1e6)):
+            size = {"kB": 1e3, "MB": 1e6}[re.search(r"\((.*)\)", right.get_xlabel()).group(1)]
+            for ax, cost, scale in ((left, "run_time", unit), (right, "memory", size)):
                 line, filled = ax.lines[2 * row : 2 * row + 2]
                 assert np.asarray(line.get_xdata()) * scale == pytest.approx(expected[cost].values)
                 assert np.array_equal(line.get_ydata(), expected.error.values)

@@ -1,6 +1,7 @@
 """Units of axes: as wanted, readable from the axes, and the shown number times the unit is the value."""
 
 import numpy as np
+import plotting_synthetic
 import pytest
 from matplotlib.figure import Figure
 from plotting_figures import drawn, factor
@@ -101,3 +102,24 @@ def test_formats_of_files(study, tmp_path, suffix):
     assert all(file.suffix == f".{suffix}" and file.read_bytes().startswith(start) for file in files)
     with pytest.raises(InvalidInput, match="formats"):
         plotting.draw(tree, tmp_path, formats=["gif"])
+
+
+def test_units_of_the_accuracy_figures():
+    measured = plotting_synthetic.accuracy()["contact"].to_dataset()
+    units = {"run_time": "us", "memory": "kB"}
+    time, memory = plotting.error_against_time(measured, units=units)[0]
+    assert (time.get_xlabel(), time.xaxis.get_units()) == ("run time (µs)", "µs")
+    assert (memory.get_xlabel(), memory.xaxis.get_units()) == ("peak memory (kB)", "kB")
+    first = measured.isel(method=0).dropna("setting")
+    assert time.lines[0].get_xdata() == pytest.approx(1e6 * first["run_time"].values)
+    assert memory.lines[0].get_xdata() == pytest.approx(first["memory"].values / 1e3)
+
+
+def test_units_of_a_figure_of_the_paper(study):
+    left, right = plotting.paper_figure(study, 3, units={"normal_force": "N", "closure": "mm"})[:2]
+    assert (left.xaxis.get_units(), left.yaxis.get_units()) == ("mm", "N")
+    assert right.xaxis.get_units() == "N"
+
+
+def test_numbers_without_a_unit_say_so(study):
+    assert plotting.dimensions(study["dimensions"]).xaxis.get_units() == ""

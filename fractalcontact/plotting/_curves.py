@@ -1,0 +1,131 @@
+"""The numbers of the curves of a figure, as a table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.validation import Problems
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLUMNS = ("panel", "curve", "x", "y", "x_axis", "y_axis")
+NUMBER = re.compile(r"[-\N{MINUS SIGN}.\d$]")  # how the label of a number begins
+SYMBOLS = {
+    "delta": "δ", "Delta": "Δ", "Lambda": "Λ", "sigma": "σ", "tau": "τ", "theta": "θ", "mathrm": "", "bf": ""
+}  # fmt: skip
+
+
+def curves(axes: Any) -> Any:
+    """Return the numbers of the curves drawn in a figure, as a table that can be written as CSV.
+
+    Parameters
+    ----------
+    axes : Axes, or array, sequence or mapping of Axes
+        As any function of `fractalcontact.plotting` returns them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each point. The columns are the `panel` (its title, or its number), the `curve`, `x`
+        and `y` as drawn, and the labels of both axes with their units. Azimuths are in degrees. A band is
+        given by its outline, an interval by its ends. Maps are left out: their numbers are in the result.
+
+    Raises
+    ------
+    InvalidInput
+        `axes` are no Axes.
+
+    See Also
+    --------
+    fractalcontact.scenes.tables : Every number of a result, not only those of one figure, in SI units.
+    fractalcontact.plotting.draw : The figures of a study, with `formats=["png", "csv"]` also these tables.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    >>> numbers = fc.plotting.curves(fc.plotting.mean_gap(pressed))
+    >>> numbers.to_csv(index=False).splitlines()[0]
+    'panel,curve,x,y,x_axis,y_axis'
+    >>> numbers[["curve", "x", "x_axis"]]
+              curve     x                  x_axis
+    0  this surface   1.0  nominal pressure (MPa)
+    1  this surface  10.0  nominal pressure (MPa)
+    """
+    from matplotlib.axes import Axes
+
+    panels = (
+        axes if isinstance(axes, Mapping) else dict(enumerate(np.ravel(np.asarray(axes, dtype=object)), 1))
+    )
+    with Problems("fractalcontact.plotting.curves") as problems:
+        are_axes = bool(panels) and all(isinstance(ax, Axes) for ax in panels.values())
+        problems.require(
+            are_axes, "axes", "Axes, or an array, sequence or mapping of them", type(axes).__name__
+        )
+    rows = [row for name, ax in panels.items() for row in _of_panel(name, ax)]
+    columns = {name: ("point", [row[i] for row in rows]) for i, name in enumerate(COLUMNS)}
+    return xr.Dataset(columns).to_dataframe().reset_index(drop=True)
+
+
+def _of_panel(name: Any, ax: Axes) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of one panel."""
+    titles = (ax.get_title(loc=place) for place in ("left", "center", "right"))
+    panel = name if isinstance(name, str) else next(filter(None, map(_plain, titles)), name)
+    is_polar = ax.name == "polar"
+    labels = "azimuth (°)" if is_polar else _plain(ax.get_xlabel()), _plain(ax.get_ylabel())
+    rows = _names_of_rows(ax)
+    for curve, points in _labelled_points(ax):
+        if curve.startswith("_"):
+            continue
+        x, y = np.asarray(points, dtype=np.float64).reshape(-1, 2).T
+        for one, other in zip(np.degrees(x) if is_polar else x, y, strict=True):
+            if np.isfinite(one) and np.isfinite(other):
+                yield panel, _plain(curve), float(one), rows.get(float(other), float(other)), *labels
+
+
+def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the points of every curve, interval and band that has a name."""
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.container import ErrorbarContainer
+    from matplotlib.patches import Polygon
+
+    for line in ax.lines:
+        yield str(line.get_label()), line.get_xydata()
+    for container in ax.containers:
+        if isinstance(container, ErrorbarContainer):
+            name = str(container.get_label())
+            yield name, container.lines[0].get_xydata()
+            for bars in container.lines[2]:
+                yield f"{name}, interval", np.concatenate(bars.get_segments() or [np.empty((0, 2))])
+    for collection in ax.collections:
+        if isinstance(collection, LineCollection):
+            yield str(collection.get_label()), np.concatenate(collection.get_segments() or [np.empty((0, 2))])
+        elif isinstance(collection, PolyCollection):
+            for path in collection.get_paths():
+                yield f"{collection.get_label()}", path.vertices
+    for patch in ax.patches:
+        if isinstance(patch, Polygon):
+            yield str(patch.get_label()), patch.get_xy()
+
+
+def _names_of_rows(ax: Axes) -> dict[float, str]:
+    """Return what stands at the ticks of the vertical axis where those are words, by the place."""
+    from matplotlib.ticker import FixedLocator
+
+    texts = [label.get_text() for label in ax.get_yticklabels()]
+    if not isinstance(ax.yaxis.get_major_locator(), FixedLocator) or any(map(NUMBER.match, texts)):
+        return {}
+    return dict(zip(map(float, ax.get_yticks()), texts, strict=False))
+
+
+def _plain(text: str) -> str:
+    """Return the text of a label without the signs of mathematical typesetting, on one line."""
+    text = re.sub(r"\\([A-Za-z]+)", lambda match: SYMBOLS.get(match[1], match[1]), text)
+    return " ".join(re.sub(r"[${}]", "", text).split())
