@@ -315,9 +315,15 @@ def _stop(*_):
 
 
 def fault_of(call, *, seconds=20, names=()):
-    """Return what is wrong with a call: None for a clear error or a result without infinite numbers."""
-    before = signal.signal(signal.SIGALRM, _stop)
-    signal.alarm(seconds)
+    """Return what is wrong with a call: None for a clear error or a result without infinite numbers.
+
+    `seconds` are those of the processors, because others may use the machine; a call that waits, for a pipe
+    for example, is stopped after ten times as long.
+    """
+    alarms = {signal.SIGPROF: signal.ITIMER_PROF, signal.SIGALRM: signal.ITIMER_REAL}
+    before = {number: signal.signal(number, _stop) for number in alarms}
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_REAL, 10 * seconds)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -333,8 +339,9 @@ def fault_of(call, *, seconds=20, names=()):
     except Exception as error:
         return f"{type(error).__name__}: {str(error)[:200]}"
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        for number, timer in alarms.items():
+            signal.setitimer(timer, 0)
+            signal.signal(number, before[number])
     return _infinite(result)
 
 
@@ -359,6 +366,21 @@ def _infinite(result):
     if isinstance(result, float) and np.isinf(result):
         return "infinite"
     return None
+
+
+def unexplained(result):
+    """Return the names of the variables that have NaN and no reason; missing heights have none."""
+    if not isinstance(result, (xr.Dataset, xr.DataArray)):
+        return set()
+    dataset = result.to_dataset(name=result.name or "values") if isinstance(result, xr.DataArray) else result
+    return {
+        str(name)
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "f"
+        and name != "height"
+        and np.isnan(variable.values).any()
+        and not ("reason" in variable.attrs or "NaN" in variable.attrs.get("comment", ""))
+    }
 
 
 def silently_accepted(done, arguments):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import test_labels as labels
 import xarray as xr
-from fuzz_calls import CALLS, function_of
+from fuzz_calls import CALLS, function_of, unexplained
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError
@@ -33,7 +33,7 @@ HEIGHTS = {
     "flat profile": np.zeros(24),
     "short profile": NOISE[0, :4],
 }
-SHAPES = ((1, 1), (2, 2), (3, 3), (1, 50), (7, 11), (24, 24))
+SHAPES = ((1, 1), (2, 2), (3, 3), (1, 50), (7, 11), (24, 24), (40, 40))
 
 
 def surfaces():
@@ -124,21 +124,6 @@ FUNCTIONS = {
 }
 
 
-def unexplained(result):
-    """Return the names of the variables that have NaN and no reason; missing heights have none."""
-    if not isinstance(result, (xr.Dataset, xr.DataArray)):
-        return set()
-    dataset = result.to_dataset(name=result.name or "values") if isinstance(result, xr.DataArray) else result
-    return {
-        str(name)
-        for name, variable in dataset.variables.items()
-        if variable.dtype.kind == "f"
-        and name != "height"
-        and np.isnan(variable.values).any()
-        and not ("reason" in variable.attrs or "NaN" in variable.attrs.get("comment", ""))
-    }
-
-
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_missing_number_has_a_reason(name):
     arguments, faults = FUNCTIONS[name](), {}
@@ -163,6 +148,32 @@ def test_every_method_gives_its_reasons(method):
         except FractalContactError:
             continue
         assert unexplained(result) == set(), case
+
+
+def test_sizes_of_boxes_that_only_other_measures_have_are_named():
+    mask = masks()["noise"].isel(x=[*range(24)] * 2, y=[*range(24)] * 2)
+    found = fc.domains.evolution(xr.concat([mask, mask], "step"))
+    missing = np.isnan(found["box_count"]).all("step")
+    assert missing.any()
+    assert found["box_count"].attrs["reason"] == "NaN at sizes of boxes that only the other measures have"
+    measured = fc.domains.box_dimension(mask)["box_size"]
+    assert not missing.sel(box_size=measured).any()
+    assert missing.drop_sel(box_size=measured).all()
+
+
+def test_reason_of_an_interpolation_error_that_cannot_be_measured():
+    delta = fc.joints.delta_surface(cracks()["small"], shear=[0.0, 0.5e-4], direction=30)
+    assert np.isnan(delta["interpolation_error"][1])
+    assert "no line without gaps" in delta["interpolation_error"].attrs["reason"]
+    whole = fc.joints.delta_surface(cracks()["small"], shear=[1e-4], direction="E")
+    assert "reason" not in whole["interpolation_error"].attrs
+
+
+def test_reason_of_a_roughness_coefficient_below_its_scale():
+    surface = surfaces()["ramp"] * 1e-3
+    found = fc.joints.roughness_coefficient(surface, length=0.5)
+    assert np.isnan(found["scaled_roughness_coefficient"]).any()
+    assert "negative or missing" in found["scaled_roughness_coefficient"].attrs["reason"]
 
 
 def test_reason_of_the_decorrelation_length_is_that_of_its_direction():

@@ -212,7 +212,7 @@ def surface_faults(
             yield from _missing_faults(surface.values, argument)
         if surface.chunks is None:
             yield from _size_faults(surface.values, argument, decades)
-        if surface.chunks is None and not finite and np.isinf(surface.values).any():
+        if surface.chunks is None and not finite and np.isinf(distinct(surface.values)).any():
             yield argument, "heights that are finite or NaN", "infinite heights"
     if surface.dims[-len(dims) :] == dims:
         for dim in dims:

@@ -45,13 +45,16 @@ REASONS = {
     **dict.fromkeys(("null_lacunarity_slope", "null_lacunarity_area"), _EMPTY),
     **dict.fromkeys(("box_local_slope", "minkowski_local_slope", "correlation_local_slope"), _SLOPE),
     "correlation": "NaN where the heights of a face do not vary",
+    "tangential_stiffness": "NaN where periodic bodies stick everywhere: they move together as rigid bodies",
+    "interpolation_error": "NaN where a face has no line without gaps that is long enough to measure it",
+    "scaled_roughness_coefficient": "NaN where the joint roughness coefficient is negative or missing",
     "uplift_arm": "NaN where there is no uplift",
 }
 
 
-def give_reasons(dataset: xr.Dataset) -> None:
-    """Set the attribute `reason` of every variable with NaN that states none, in place."""
-    variables = dataset.variables
+def give_reasons(result: xr.Dataset | xr.DataArray) -> None:
+    """Set the attribute `reason` of every variable or coordinate with NaN that states none, in place."""
+    variables = result.variables if isinstance(result, xr.Dataset) else result.coords.variables
     for name in variables.keys() & REASONS.keys():
         variable = variables[name]
         stated = "reason" in variable.attrs or "NaN" in variable.attrs.get("comment", "")

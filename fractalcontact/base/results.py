@@ -138,8 +138,7 @@ def public_result(
                 _set_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
             result = label(result, keep_notes=True)
-            if isinstance(result, xr.Dataset):
-                give_reasons(result)
+            give_reasons(result)
             result = stamp(result, name, parameters, **entries)
             if notes:
                 result.attrs["history"] += f" (surface: {notes})"
@@ -174,7 +173,10 @@ def _size_of(arguments: Mapping[str, Any]) -> str:
     shape, plane = arguments.get("shape"), plane_in(arguments)
     if shape is None and plane is not None:
         shape = plane.shape if plane.planes == 1 else (plane.planes, *plane.shape)
-    return "this call" if shape is None else f"{' x '.join(map(str, np.ravel(shape)))} points"
+    if shape is None:
+        return "this call"
+    members = f"{arguments['members']} members of " if arguments.get("members") else ""
+    return f"{members}a shape of {' x '.join(map(str, np.ravel(shape)))} points"
 
 
 @contextmanager

@@ -196,6 +196,7 @@ class Problems:
             low = -LARGEST_INTEGER if at_least is None else at_least
             high = LARGEST_INTEGER if at_most is None else at_most
             inside = low <= int(value) <= high
+            at_most = high if int(value) > high else at_most
         return self.require(inside, argument, _interval(None, at_least, None, at_most, "an integer"), value)
 
     def boolean(self, argument: str, value: Any, *, optional: bool = False) -> bool:

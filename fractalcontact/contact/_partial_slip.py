@@ -188,7 +188,8 @@ def partial_slip(
     superposition is exact for poisson = 0, otherwise within a few per cent: slip across the force is
     neglected. So is, always, the change of the pressure between dissimilar bodies. A change of the force
     below `tolerance` times the normal force is not resolved. The stiffness is that of a further step in the
-    same direction, zero where all slides. Displacements of periodic bodies are without those of the bulk.
+    same direction, zero where all slides. Displacements of periodic bodies are without those of the bulk: in
+    full contact their stiffness has no bound, and is NaN.
 
     Examples
     --------
@@ -238,6 +239,8 @@ def partial_slip(
     result = result.assign(
         contact_modulus=modulus, poisson=float(poisson), friction_coefficient=friction
     ).assign_coords(tangential_force=("step", forces), azimuth=float(azimuth))
+    stiffness = result["tangential_stiffness"]
+    result["tangential_stiffness"] = stiffness.where(np.isfinite(stiffness))
     _warn(result)
     result.attrs = {
         "method": method,

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
+from fractalcontact.base.missing_numbers import REASONS
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -34,6 +35,7 @@ ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
 MEASURES = ("islands", "percolation", *ANALYSES)
 MEASURES_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension", "lacunarity")
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time")
+OTHER_SIZES = "NaN at sizes of boxes that only the other measures have"
 LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 
 _SOURCES = {
@@ -175,11 +177,13 @@ def _add_analysis(result: Measurements, name: str, dataset: xr.Dataset, all_size
         if key in dataset.coords or key in NOT_COLLECTED:
             continue
         new, dims, values = _unique_name(name, str(key)), tuple(map(str, variable.dims)), variable.values
-        if "box_size" in dims:
-            values = _on_sizes(all_sizes, dataset["box_size"].values, values)
-        result.variables[new] = dims, values
         if "comment" in variable.attrs:
             result.notes[new] = {"comment": variable.attrs["comment"]}
+        if "box_size" in dims and values.shape[-1] < all_sizes.size:
+            own = f"; {REASONS[new]}" if new in REASONS and np.isnan(values).any() else ""
+            result.notes.setdefault(new, {})["reason"] = OTHER_SIZES + own
+            values = _on_sizes(all_sizes, dataset["box_size"].values, values)
+        result.variables[new] = dims, values
     if "radius" in dataset.coords:
         result.coords["radius"] = ("radius", dataset["radius"].values)
         result.coords["radius_length"] = ("radius", dataset["radius_length"].values)

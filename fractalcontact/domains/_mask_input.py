@@ -153,7 +153,8 @@ def _check_cells(problems: Problems, mask: Any, argument: str, *, profiles: bool
     elif set(RESULT_DIMS) & set(mask.dims):
         problems.add(f"{argument}.dims", f"leading dims other than {', '.join(RESULT_DIMS)}", mask.dims)
     else:
-        return True
+        units = mask.attrs.get("units", "1")
+        return problems.require(isinstance(units, str), f"{argument}.units", "a string, or none", units)
     return False
 
 

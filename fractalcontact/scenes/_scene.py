@@ -151,8 +151,9 @@ class Scene:
         return [(key, _short(value)) for key, value in self.tables.items()]
 
     def table(self, name: str) -> Table:
-        """Return one table as parsed; empty if the scene has none."""
-        return self.tables.get(name) or {}
+        """Return one table as parsed; empty if the scene has none, or a value in its place."""
+        table = self.tables.get(name)
+        return table if isinstance(table, Mapping) else {}
 
     @cached_property
     def surface(self) -> SurfaceTable:

@@ -59,7 +59,8 @@ def check_plane(problems: Problems, shape: Any, spacing: Any, *, profile: bool =
 def check_memory(where: str, sizes: Sequence[int]) -> None:
     """Raise `TooLittleMemory` unless heights of these sizes, and a work array like them, may be taken."""
     shape = " x ".join(f"{size:g}" for size in sizes if size != 1)
-    require_memory(where, COPIES * 8.0 * math.prod(float(size) for size in sizes), f"{shape} points")
+    needed = COPIES * 8.0 * math.prod(float(size) for size in sizes)
+    require_memory(where, needed, f"a shape of {shape} points")
 
 
 def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:

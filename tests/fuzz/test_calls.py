@@ -23,12 +23,13 @@ from fuzz_calls import (
     rough,
     silently_accepted,
     slid,
+    unexplained,
 )
 from fuzz_values import VALUES
 from hypothesis import HealthCheck, given, settings, strategies
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 
 QUICK, LONG = 400, 60_000
 SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
@@ -36,6 +37,8 @@ SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "datab
 
 # errors of these name what the argument stands for, or the first argument, which is refused as it stands
 UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure")
+# these return what a file holds
+AS_GIVEN = ("open", "scenes.reproduce")
 
 
 def check(pick):
@@ -51,6 +54,8 @@ def check(pick):
     plt.close("all")
     if answers and fault is None:
         fault = silently_accepted(done, arguments)
+        if fault is None and name not in AS_GIVEN and (missing := unexplained(answers[0])):
+            fault = f"NaN without a reason in {', '.join(sorted(missing))}"
     assert fault is None, f"{name}({done}): {fault}"
 
 
@@ -116,6 +121,8 @@ KEPT = {
     "a surface beyond memory": ("surfaces.spectral", "shape", lambda: (10**7, 10**7), "memory"),
     "an array beyond memory": ("surfaces.from_array", "heights", lambda: np.broadcast_to(1.0, (10**6, 10**6)),
                                "memory"),
+    "a mask with a number as units": ("domains.islands", "mask", lambda: with_attribute(
+        pressed()["state"], None, "units", 3), "mask.units"),
     "a word as a flag": ("contact.press", "progress", lambda: "no", "progress"),
     "a number as a path": ("open", "path", lambda: 3, "path"),
     "a long name": ("save", "path", lambda: "x" * 300 + ".nc", "path"),
@@ -149,6 +156,16 @@ def test_transposed_field_is_drawn_like_the_field():
 def test_small_numpy_types_do_not_overflow():
     surface = rough().where(rough().x > 2e-4)
     assert np.array_equal(fc.surfaces.fill(surface, at_most=np.int8(1)), fc.surfaces.fill(surface, at_most=1))
+
+
+@pytest.mark.parametrize("generator", ["fbm", "spectral", "midpoint", "weierstrass"])
+def test_surface_beyond_memory_does_not_hide_other_problems(generator):
+    call = CALLS[f"surfaces.{generator}"]() | {"shape": (10**6, 10**6)}
+    with pytest.raises(TooLittleMemory, match=r"memory: .* a shape of (1000000|1e\+06) x "):
+        function_of(f"surfaces.{generator}")(**call)
+    with pytest.raises(InvalidInput, match="hurst") as caught:
+        function_of(f"surfaces.{generator}")(**call | {"hurst": 10**400})
+    assert "memory" not in str(caught.value)
 
 
 def test_several_wrong_arguments_are_all_listed():

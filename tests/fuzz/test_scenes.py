@@ -87,6 +87,8 @@ def refused(name, tmp_path, *replacements, **changes):
         ("roughness", {"surface": {"rng": [[1, 2], [3]]}}, "surface: rng"),
         ("file", {"surface": {"read": "x" * 300}}, "surface.read"),
         ("roughness", {"title": 3}, "title"),
+        ("roughness", {"": [1, 2]}, ""),
+        ("joint", {"surface": {"shape": [200_000, 200_000]}, "want": {"joints": "rough"}}, "want.joints"),
     ],
 )
 def test_kept_scene_gives_a_clear_error(tmp_path, name, changes, named):
