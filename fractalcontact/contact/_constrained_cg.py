@@ -91,7 +91,8 @@ ADMIT_RATIO = 0.4  # error outside over error inside from which nodes are admitt
 FEW = 0.003  # share of the free set that is always admitted
 SLIGHT_CHANGE = 0.001  # share of the free set that may change without loss of the conjugacy
 MAX_ITERATIONS = 2000
-MAX_TRANSFORMS = 1500  # pairs of one run: ten times those of hard problems, a minute at n = 512
+MAX_TRANSFORMS = 1500  # pairs of one run from 512 x 512 nodes on: ten times those of hard problems, a minute
+SMALLER_PLANES = 4.0  # times as many at most on smaller planes: spikes that yield took up to 1900 at n = 160
 PATIENCE = 40  # iterations without progress
 SMALLEST_FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 MAX_HALVINGS = 20
@@ -215,13 +216,14 @@ class ConstrainedCG:
         self.halvings = 0  # of the last step
         self.last_objective = np.inf
         self.preconditioned = True
+        self.max_transforms = MAX_TRANSFORMS * min(max(512**2 / self.h.size, 1.0), SMALLER_PLANES)
         np.clip(start, 0, self.p_max, out=self.p, casting="same_kind")
 
     def solve(self, tolerance: float, *, certify: bool = True) -> Solution:
         """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement."""
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
-        while iteration <= MAX_ITERATIONS and self.transforms() <= MAX_TRANSFORMS:
+        while iteration <= MAX_ITERATIONS and self.transforms() <= self.max_transforms:
             evaluation = self.evaluate()  # (1)
             if self.overshot(evaluation, progress):
                 self.backtrack()
