@@ -13,6 +13,7 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions import _spectral_sectors as sectors
 from fractalcontact.dimensions._anisotropy import (
     LEAST_LAGS,
@@ -22,6 +23,9 @@ from fractalcontact.dimensions._anisotropy import (
     directional_fit,
     fit_anisotropy,
 )
+from fractalcontact.dimensions._blur import fit_blurred
+from fractalcontact.dimensions._exponent_by_scale import frame_blocks, several_exponents
+from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
 from fractalcontact.dimensions._records import (
     CONSTANT,
@@ -47,6 +51,7 @@ from fractalcontact.dimensions._surface_input import (
     read_scales,
     read_surfaces,
 )
+from fractalcontact.dimensions._transfer_functions import NONE, Window
 from fractalcontact.dimensions._whittle import LEAST_MODES, fit_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -65,6 +70,9 @@ _NAMES = (*_BY_DIRECTION, *_OF_SURFACE, "topothesy", "run_time", "azimuth", "inc
 _IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
 _SHARE_COMPARED = 1 / 3  # of the surface, which a second difference may span in a test
 _ROUNDING = 1e-22  # of the largest mean square: the heights do not vary along that direction
+_BENT = 2.0  # standard deviations of the curvature from which on blur and noise are looked for
+_GAIN = 4.0  # decrease of the penalised deviance by which they are seen, as in `estimate`
+_LEFT = 0.1  # of a mean square difference, which noise must leave
 _NO_VARIATION = "the heights do not vary along this direction"
 _NO_MODEL = "the surface is not an anisotropic fractional Brownian one, and no model gives the scatter"
 _FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
@@ -118,8 +126,9 @@ def directions(
 
     Notes
     -----
-    Free edges: second differences over equal lengths along lattice directions. Periodic: sectors of the
-    spectrum. Models, tests, and their measured size, power and coverage: page `theory_dimensions`.
+    Free edges: second differences over equal lengths along lattice directions, without the blur and noise
+    that the modes of a complete surface show. Periodic: sectors of the spectrum. Models, tests, and their
+    measured size, power and coverage: page `theory_dimensions`.
 
     References
     ----------
@@ -218,13 +227,19 @@ def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scal
     varied = compared.part(compared.means > limit)
     has_constant_direction = bool((compared.means <= limit).any())
     anisotropy, is_beyond_model = None, False
+    instrument = None
     if np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > LEAST_LAGS:
         anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
         # where the power law bends, the waves decide: the lags of the lattice differ in length
         is_bent = abs(anisotropy.curvature_z) > SIGNIFICANT
+        if abs(anisotropy.curvature_z) > _BENT and surface.is_complete and scales is None:
+            instrument = _Instrument.of(surface)
+        if instrument is not None:
+            varied, differences = instrument.removed(varied), instrument.removed(differences)
+            anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
         by_lags = anisotropy.anisotropy_p_value
         if surface.is_complete:
-            anisotropy = _tested_by_waves(surface, anisotropy, scales)
+            anisotropy = _tested_by_waves(surface, anisotropy, scales, is_straight=not is_bent)
         is_beyond_model = not is_bent and by_lags < _IMPROBABLE
         is_beyond_model = is_beyond_model or anisotropy.reason in (RIDGES, SMOOTH)
         if has_constant_direction:
@@ -240,7 +255,7 @@ def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scal
             estimates.append(undefined(_FEW_LAGS))
         else:
             reason = _NO_MODEL if is_beyond_model else ""
-            estimates.append(_along(surface, part, weights, anisotropy, reason))
+            estimates.append(_along(surface, part, weights, anisotropy, reason, instrument))
     if anisotropy is None:
         return _Directional(estimates, None, "too few lags fit into the surface to compare directions")
     return _Directional.of(estimates, anisotropy)
@@ -256,7 +271,59 @@ def _middle_pairs(surface: Surface, differences: SecondDifferences) -> MiddlePai
     return MiddlePairs.of(surface.heights, surface.is_complete, differences.vectors, differences.numbers)
 
 
-def _tested_by_waves(surface: Surface, anisotropy: Anisotropy, scales: Scales) -> Anisotropy:
+@dataclass(frozen=True)
+class _Instrument:
+    """Blur and noise of a surface, as the likelihood of its modes finds them.
+
+    Attributes
+    ----------
+    frame : Frame
+        Blocks of modes.
+    sharp, blurred : ndarray, shape (blocks,)
+        Their expected power without blur and with it.
+    noise : float
+        Mean square of white noise.
+    standard_error : float
+        Of the exponent of the likelihood: most of it is that blur and noise are not known exactly.
+    """
+
+    frame: Frame
+    sharp: Array
+    blurred: Array
+    noise: float
+    standard_error: float
+
+    @classmethod
+    def of(cls, surface: Surface) -> _Instrument | None:
+        """Return blur and noise of a complete surface; None where they do not explain its modes."""
+        frame = _mode_blocks.frame(surface.heights.shape, surface.plane_spacing)
+        power = _cosine_modes.mode_power(surface.heights)
+        fit = fit_blurred(power, frame)
+        if fit is None or not (fit.is_good and fit.gain > _GAIN and fit.hurst < 1.0):
+            return None
+        if several_exponents(fit, frame_blocks(power, frame), surface) is not None:
+            return None
+        every = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
+        sharp, blurred = (every.signal(form, fit.hurst, fit.spread**2)[0] for form in (NONE, fit.form))
+        return cls(frame, sharp, blurred, float(np.nan_to_num(fit.noise)), fit.standard_error)
+
+    def removed(self, differences: SecondDifferences) -> SecondDifferences:
+        """Return the mean squares that the surface has without blur and noise."""
+        frame = self.frame
+        images = [frame.waves, frame.waves[::-1]] if frame.is_mirrored else [frame.waves]
+        ratios = []
+        for y, x in differences.lags:
+            phases = [along_y * y + sign * along_x * x for along_y, along_x in images for sign in (-1, 1)]
+            weights = frame.count * np.sum([(1.0 - np.cos(phase)) ** 2 for phase in phases], axis=0)
+            ratios.append(np.sum(weights * self.blurred) / np.sum(weights * self.sharp))
+        without_noise = differences.means - 6.0 * self.noise  # 1 + 4 + 1 heights with independent noise
+        means = np.maximum(without_noise, _LEFT * differences.means) / np.array(ratios)
+        return replace(differences, means=means)
+
+
+def _tested_by_waves(
+    surface: Surface, anisotropy: Anisotropy, scales: Scales, *, is_straight: bool
+) -> Anisotropy:
     """Take the p values from the waves of a complete surface that is large enough: they need no family.
 
     Where the power law of the lags is straight, the smaller of both p values counts, doubled: second
@@ -270,7 +337,6 @@ def _tested_by_waves(surface: Surface, anisotropy: Anisotropy, scales: Scales) -
         by_waves = waves.test(metric, anisotropy.hurst, fitted=fitted)
         if not np.isfinite(by_waves):
             return by_lags
-        is_straight = abs(anisotropy.curvature_z) < SIGNIFICANT
         return min(2.0 * min(by_waves, by_lags), 1.0) if is_straight else by_waves
 
     return replace(
@@ -286,6 +352,7 @@ def _along(
     weights: Array,
     anisotropy: Anisotropy | None,
     reason: str,
+    instrument: _Instrument | None,
 ) -> Estimate:
     """Return the estimate of one direction; `weights` interpolate its lags.
 
@@ -295,8 +362,11 @@ def _along(
     hurst, metric = (None, np.eye(2)) if anisotropy is None else (anisotropy.hurst, anisotropy.metric)
     pairs = _middle_pairs(surface, differences)
     exponent, error, second = directional_fit(differences, pairs, weights, hurst, metric)
-    low, high = normal_interval(exponent, error)
     note = ""
+    if instrument is not None:
+        error = float(np.hypot(error, instrument.standard_error))
+        note = "blur and noise of the surface are taken out, as `estimate` finds them"
+    low, high = normal_interval(exponent, error)
     if anisotropy is not None and abs(anisotropy.curvature_z) > SIGNIFICANT:
         for start in range(len(weights) - 1):
             fit = directional_fit(differences, pairs, weights[start : start + 2], hurst, metric)

@@ -216,10 +216,21 @@ def test_noise_and_blur_give_one_exponent_in_all_directions(hurst, noise, blur):
     mean = np.mean([result["fitted_hurst"].values for result in results], axis=0)
     assert np.ptp(mean) < 0.045
     for result in results:
+        assert np.isfinite(result["isotropy_p_value"])
         assert float(result["isotropy_p_value"]) > 1e-4
         assert np.isfinite(result["ci_low"].values).all()
         common = float(result["hurst"].median())
         assert bool(((result["ci_low"] <= common) & (result["ci_high"] >= common)).all())
+
+
+@pytest.mark.parametrize(("noise", "blur"), [(0.3, 0.0), (0.0, 0.5), (0.05, 1.0)])
+def test_blur_and_noise_are_taken_out(noise, blur):
+    """The exponent is that of the surface: with them it was .65 (noise of 0.3), .88 (blur of 0.5)."""
+    results = [fc.dimensions.directions(measured(128, 0.7, seed, noise, blur)) for seed in range(20, 28)]
+    assert np.mean([result["fitted_hurst"].mean() for result in results]) == pytest.approx(0.7, abs=0.045)
+    inside = [((r["ci_low"] <= 0.7) & (r["ci_high"] >= 0.7)).mean() for r in results]
+    assert np.mean(inside) > 0.85
+    assert sum("taken out" in result["hurst"].attrs["reason"] for result in results) >= 6
 
 
 @pytest.mark.slow
