@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur import BlurredFit
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
-from fractalcontact.dimensions._records import NORMAL, Estimate
+from fractalcontact.dimensions._records import NORMAL, Estimate, joined
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -30,7 +30,13 @@ _RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
 _SHORTENED = 12.0  # its increase up to which they do so where blur leaves the longest waves out
+_FLAT = 1.2  # times the standard errors of two exponents: the likelihood is flatter than a parabola
+_POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
+_ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
+_TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two exponents
+_WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
 _LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
+_OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 _NAMES = (
     "hurst",
     "ci_low",
@@ -317,7 +323,7 @@ def fit_two_exponents(blocks: Blocks, inside: Array) -> TwoExponents | None:
     deviance, (rough, smooth, crossing), information = best
     if not (waves.min() < crossing < waves.max() and np.linalg.cond(information) < 1e12):
         return None
-    errors = NORMAL * np.sqrt(_CORRELATION * np.diag(np.linalg.inv(information)))
+    errors = _FLAT * NORMAL * np.sqrt(_CORRELATION * np.diag(np.linalg.inv(information)))
     laws = [
         PowerLaw(float(hurst), float(hurst - error), float(hurst + error), modes, deviance)
         for hurst, error in zip((rough, smooth), errors[:2], strict=True)
@@ -420,17 +426,47 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
     """
     record = octaves(blocks)
     run = longest_run(record)
-    is_shortened = float(blocks.wavelength[fit.inside].max()) < 0.99 * float(blocks.wavelength.max())
+    is_shortened = _is_shortened(fit, blocks)
     if not is_shortened:
         two = fit_two_exponents(blocks, fit.inside)
         # the deviance of the blur does not count the amplitude as a parameter
         gain = np.inf if two is None else two.penalised - 2.0 - fit.penalised
         if two is not None and gain < -_DECISIVE and two.rough.hurst > _LEAST_EXPONENT:
-            return _two_estimate(two, record[0], blocks, surface)
+            estimate = _two_estimate(two, record[0], blocks, surface)
+            if gain < -_TWO_ALONE or not fit.is_good:
+                return estimate
+            low, high = min(estimate.ci_low, fit.low), max(estimate.ci_high, fit.high)
+            return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OR_NOISE))
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
     gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
     return run_estimate(run, surface) if gain < (_SHORTENED if is_shortened else -_DECISIVE) else None
+
+
+def alternatives(fit: BlurredFit, blocks: Blocks, *, is_bent: bool) -> tuple[float, float]:
+    """Return the range of exponents of explanations that are nearly as likely; (inf, -inf) if there are none.
+
+    They are blur and noise, two exponents, and, unless a single exponent is excluded (`is_bent`), that of the
+    shortest octave. In a small surface noise and a second exponent of the shorter waves are much alike.
+    """
+    ranges: list[tuple[float, float]] = []
+    if fit.is_good and fit.gain > _POSSIBLE:
+        ranges.append((fit.low, fit.high))
+    two = None if _is_shortened(fit, blocks) else fit_two_exponents(blocks, fit.inside)
+    has_second = two is not None and two.penalised - 2.0 - fit.penalised < _ALIKE
+    if two is not None and has_second:
+        half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
+        ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
+    if has_second or not is_bent:
+        shortest = octaves(blocks)[0].fit
+        ranges.append((shortest.low, shortest.high))
+    lows, highs = zip(*ranges, strict=True) if ranges else ((np.inf,), (-np.inf,))
+    return max(min(lows), 0.0), min(max(highs), 1.0)
+
+
+def _is_shortened(fit: BlurredFit, blocks: Blocks) -> bool:
+    """Return whether the longest waves do not belong to a fit."""
+    return float(blocks.wavelength[fit.inside].max()) < 0.99 * float(blocks.wavelength.max())
 
 
 def _two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: Surface) -> Estimate:

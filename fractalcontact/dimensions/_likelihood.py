@@ -15,6 +15,7 @@ from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_mod
 from fractalcontact.dimensions._blur import BlurredFit, fit_blurred
 from fractalcontact.dimensions._exponent_by_scale import (
     Blocks,
+    alternatives,
     frame_blocks,
     longest_run,
     octaves,
@@ -44,6 +45,7 @@ from fractalcontact.dimensions._whittle import (
     WhittleFit,
     allowing_noise,
     fit_interval,
+    holding_sectors,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -53,7 +55,11 @@ _CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur 
 _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 _WEAK = 2.0  # the same from which the interval of a profile allows for blur and noise
 _WEAK_NOISE = 0.05  # of the rms increment: noise that the interval of a surface allows for
+# misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
+# and a rougher second surface make it positive, and are seen later than a blur
+_SLIGHT = -2.5, 1.5
 _VAGUE = 1.0  # width of an interval that says nothing
+_VAGUE_RUN = 0.7  # the same of the longest run of octaves
 _LEAST_POINTS = 64  # of a profile whose blur is looked for
 _LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
 _SINGLE = 0.9  # share of the power beyond the longest that these may hold
@@ -69,12 +75,21 @@ _LINEAR = (
     "are those of the interpolation; grid the points with fractalcontact.surfaces.from_points, or give "
     "`scales` from eight distances of the points on"
 )
+_FEW_GAPS = 0.002  # share of the heights that may be filled without an effect on the waves
 _SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
 _PERIODIC_FAMILY = "periodic family: power law between cut-offs"
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
     "another family than its own: see fractalcontact.surfaces.fill"
+)
+_OF_SECTORS = (
+    "a few waves hold more than their share: a lay, a step or a pattern; the interval holds the exponents of "
+    "sectors of azimuth, each fitted alone"
+)
+_OR_SECOND = (
+    "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
+    "give `noise=True` where it is noise"
 )
 _CUT_OFF_BELOW_NOISE = (
     "a cut-off that is below the noise looks like another exponent: give `scales` inside the power law of a "
@@ -159,8 +174,10 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
         frame = _mode_blocks.frame(heights.shape, surface.plane_spacing)
         power = _cosine_modes.mode_power(heights)
         other, is_even = _with_blur(power, frame, surface, scales, noise, spread)
-        if other is None and is_even and is_bent and scales is None:
-            other = _longest_run(modes, frame_blocks(power, frame), surface)
+        if other is None and is_bent and scales is None:
+            other = _longest_run(modes, heights, frame_blocks(power, frame), surface, is_even=is_even)
+    elif is_bent and scales is None and spread is None and not noise:
+        other = _run_beside_gaps(heights, surface)
     if other is not None:
         estimate, stride, hurst = *other, other[0].hurst
         blocks = heterogeneity(_moments(levelled, stride), surface.plane_spacing, hurst)
@@ -180,6 +197,10 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
         )
         if not noise and modes.gapped is None and abs(fit.misfit) <= SIGNIFICANT:
             estimate = _allowing_noise(estimate, modes, fit)
+            is_slight = not _SLIGHT[0] < fit.misfit < _SLIGHT[1]
+            is_slight &= not blocks.note and heights.size <= _LARGE
+            if is_slight and scales is None and not surface.finest_scale and fit.hurst < 1.0:
+                estimate = _allowing_scales(estimate, heights, surface, fit.misfit)
     low, high = blocks.widened(hurst, estimate.ci_low, estimate.ci_high)
     rounding_note = "" if noise else _quantisation_note(heights, estimate.standard_error)
     if rounding_note and other is None:
@@ -215,6 +236,22 @@ def _allowing_noise(estimate: Estimate, modes: SurfaceModes, fit: WhittleFit) ->
     return replace(estimate, ci_low=low, ci_high=high)
 
 
+def _allowing_scales(estimate: Estimate, heights: Array, surface: Surface, misfit: float) -> Estimate:
+    """Widen the interval by what blur, noise or a second exponent would give that cannot be excluded."""
+    frame = _mode_blocks.frame(heights.shape, surface.plane_spacing)
+    power = _cosine_modes.mode_power(heights)
+    fit = fit_blurred(power, frame)
+    if fit is None:
+        return estimate
+    low, high = alternatives(fit, frame_blocks(power, frame), is_bent=False)
+    note = (
+        f"the exponent may change with scale ({misfit:+.1f} standard deviations): the interval holds those "
+        "that blur, noise or a second exponent would give"
+    )
+    low, high = min(estimate.ci_low, low), max(estimate.ci_high, high)
+    return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, note))
+
+
 def _with_blur(
     power: Array,
     frame: _mode_blocks.Frame,
@@ -235,8 +272,19 @@ def _with_blur(
         if several is not None:
             return (several, max(1, round(0.5 * several.scale_min / max(surface.spacing)))), True
     estimate = _blurred_estimate(fit, surface, fit.amplitude / max(1.0 - fit.hurst, 1e-9))
+    if scales is None and spread is None and not noise:
+        estimate = _allowing_second(estimate, fit, frame_blocks(power, frame))
     stride = max(_stride(scales, max(surface.spacing)), round(_BEYOND * fit.spread))
     return (replace(estimate, window=_BLURRED_WINDOW if scales is None else _ASKED), stride), True
+
+
+def _allowing_second(estimate: Estimate, fit: BlurredFit, blocks: Blocks) -> Estimate:
+    """Widen the interval of a fit of blur and noise by a second exponent that cannot be excluded."""
+    low, high = alternatives(fit, blocks, is_bent=True)
+    if low >= estimate.ci_low and high <= estimate.ci_high:
+        return estimate
+    low, high = min(estimate.ci_low, low), max(estimate.ci_high, high)
+    return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OR_SECOND))
 
 
 def _chosen(frame: _mode_blocks.Frame, surface: Surface, scales: Scales) -> Array:
@@ -273,10 +321,13 @@ def _blurred_estimate(fit: BlurredFit, surface: Surface, amplitude: float) -> Es
     )
 
 
-def _longest_run(modes: SurfaceModes, blocks: Blocks, surface: Surface) -> tuple[Estimate, int] | None:
+def _longest_run(
+    modes: SurfaceModes, heights: Array, blocks: Blocks, surface: Surface, *, is_even: bool
+) -> tuple[Estimate, int] | None:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
-    None if there is no run, or if few waves dominate it.
+    None if there is no run, or if few waves dominate it. Where they dominate the surface (`is_even` is False)
+    the interval also holds the exponents of sectors of azimuth.
     """
     run = longest_run(octaves(blocks))
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
@@ -284,7 +335,29 @@ def _longest_run(modes: SurfaceModes, blocks: Blocks, surface: Surface) -> tuple
     inside = between(modes.order, (run.low, run.high))
     if modes.is_uneven(inside, run.fit.hurst):
         return None
-    return run_estimate(run, surface), max(1, round(0.5 * run.low))
+    estimate, stride = run_estimate(run, surface), max(1, round(0.5 * run.low))
+    if is_even:
+        return estimate, stride
+    part = _modes(heights, surface.plane_spacing, (run.low, run.high), run.fit.hurst)
+    low, high = holding_sectors((estimate.ci_low, estimate.ci_high), part, run.fit.hurst)
+    if not high - low < _VAGUE_RUN:
+        return None
+    return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OF_SECTORS)), stride
+
+
+def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate, int] | None:
+    """Return `_longest_run` of a surface with few gaps, which are filled; None if they are many."""
+    if surface.finest_scale:
+        return None
+    filled = _without_small_gaps(heights, surface.plane_spacing, _FEW_GAPS)
+    if np.isnan(filled).any():
+        return None
+    frame = _mode_blocks.frame(filled.shape, surface.plane_spacing)
+    power = _cosine_modes.mode_power(filled)
+    fit = fit_blurred(power, frame)
+    is_even = fit is not None and fit.is_even
+    modes = _modes(filled, surface.plane_spacing, None, _pilot(filled, surface.plane_spacing))
+    return _longest_run(modes, filled, frame_blocks(power, frame), surface, is_even=is_even)
 
 
 def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
@@ -474,7 +547,7 @@ def _rms_increment(fit: WhittleFit) -> float:
     return float(np.sqrt(2.0 * fit.amplitude / (1.0 - fit.hurst))) if fit.hurst < 1.0 else float("nan")
 
 
-def _without_small_gaps(heights: Array, spacing: tuple[float, float]) -> Array:
+def _without_small_gaps(heights: Array, spacing: tuple[float, float], most: float = _SMALL_GAPS) -> Array:
     """Fill the gaps of a gridded surface by harmonic interpolation, unless they are many.
 
     The model of the gaps has the short waves that gridding has removed; with it one fit in six of surfaces
@@ -483,7 +556,7 @@ def _without_small_gaps(heights: Array, spacing: tuple[float, float]) -> Array:
     from 0.9 to 0.84.
     """
     observed = np.isfinite(heights)
-    if not 0 < np.count_nonzero(~observed) <= _SMALL_GAPS * heights.size:
+    if not 0 < np.count_nonzero(~observed) <= most * heights.size:
         return heights
     values = heights[observed]
     return _cosine_modes.Filling(observed, spacing)(values - values.mean())

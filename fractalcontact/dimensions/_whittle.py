@@ -117,6 +117,11 @@ def allowing_noise(
     return float(np.min([*hurst - half, interval[0]])), float(np.max([*hurst + half, interval[1]]))
 
 
+def holding_sectors(interval: tuple[float, float], modes: Modes, start: float) -> tuple[float, float]:
+    """Widen an interval until it holds those of sectors of azimuth, each fitted alone."""
+    return _holding_groups(interval, modes, modes.sector, start, False)
+
+
 def _holding_groups(
     interval: tuple[float, float], modes: Modes, groups: Array, start: float, noise: bool
 ) -> tuple[float, float]:
