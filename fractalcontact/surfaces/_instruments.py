@@ -25,8 +25,9 @@ WHERE = "fractalcontact.surfaces.read"
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
 ARRAYS = ("h5", "mat", "npz")  # arrays of (row, column), in metres as those of an npy file
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
-# formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map
-FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "xyz")
+# formats whose rows ascend with y, or plain arrays; the first row of all others is the top of the map. The
+# rows of X3P (ISO 25178-72) have the coordinate y = offset + row * increment
+FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "x3p", "xyz")
 POINTS = "xyz"
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 

@@ -316,6 +316,18 @@ def test_first_row_of_an_instrument_file_is_the_top(tmp_path):
     assert (provenance(default)["first_row"], provenance(bottom)["first_row"]) == ("top", "bottom")
 
 
+@pytest.mark.parametrize(("suffix", "row_of_largest_y"), [("gwy", [5.0, 1.0, 1.0]), ("x3p", [2.0, 2.0, 3.0])])
+def test_first_row_by_format(tmp_path, suffix, row_of_largest_y):
+    """Gwyddion has the top of the map first; rows of X3P (ISO 25178-72) ascend with y."""
+    topography = pytest.importorskip("SurfaceTopography").Topography
+    rows = np.array([[5.0, 1.0, 1.0], [2.0, 2.0, 3.0]])
+    heights = topography(np.ascontiguousarray(1e-7 * rows.T), (3e-6, 2e-6), unit="m", info={})
+    getattr(heights, f"to_{suffix}")(str(tmp_path / f"a.{suffix}"))
+    surface = fc.surfaces.read(tmp_path / f"a.{suffix}", units="m")
+    assert 1e7 * surface[-1].values == pytest.approx(row_of_largest_y)
+    assert surface.y[-1] > surface.y[0]
+
+
 def test_azimuth_of_grooves_in_an_instrument_file(tmp_path):
     pytest.importorskip("SurfaceTopography")
     y, x = np.indices((48, 48))
