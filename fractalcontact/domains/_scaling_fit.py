@@ -198,14 +198,16 @@ def dimension_variables(
 ) -> dict[str, Any]:
     """Return a dimension, its interval and its window of scales; NaN in planes without a dimension.
 
-    A set in the plane has a dimension from 0 to 2, on a line from 0 to 1: both are limited to it. `windows`
-    are the scales used in each plane, all by default.
+    A set in the plane has a dimension from 0 to 2, on a line from 0 to 1. A value beyond is limited to it
+    before its interval is, which then still has a width. `windows` are the scales used in each plane, all by
+    default.
     """
     has_value = np.isfinite(dimension)
+    dimension = np.clip(dimension, 0.0, planes.rank)
     used = [scales[window] for window in windows or [slice(0, scales.size)] * planes.count]
     smallest, largest = (np.array([end(scale) for scale in used]) for end in (np.min, np.max))
     return {
-        name: planes.variable(np.clip(dimension, 0.0, planes.rank)),
+        name: planes.variable(dimension),
         "ci_low": planes.variable(np.clip(dimension - half_width, 0.0, planes.rank)),
         "ci_high": planes.variable(np.clip(dimension + half_width, 0.0, planes.rank)),
         "scale_min": planes.variable(np.where(has_value, smallest, np.nan)),
