@@ -84,9 +84,10 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
 
     Notes
     -----
-    Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent. The
-    default method of `estimate` removes these waves. Detection, false alarms and accuracy: page
-    `theory_dimensions`.
+    Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent. At
+    128 x 128 points waves of one rms increment are always found, of 0.3 in a third to two thirds of the
+    surfaces, of 0.1 never. The default method of `estimate` removes what is found. Detection, false alarms
+    and accuracy: page `theory_dimensions`.
 
     References
     ----------
