@@ -93,11 +93,18 @@ def worker_processes(count: int) -> Iterator[Executor | None]:
     if "forkserver" in methods:
         context.set_forkserver_preload(["fractalcontact.scenes._worker"])
     executor = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
-    try:
+
+    def start() -> None:
         for _ in range(count):
-            executor.submit(os.getpid)  # starts a process, while the caller validates the scene
+            executor.submit(os.getpid)  # starts a process; the first waits for the imports of the server
+
+    # in a thread, so that the caller validates the scene meanwhile
+    starting = threading.Thread(target=start, daemon=True)
+    starting.start()
+    try:
         yield executor
     finally:
+        starting.join()
         executor.shutdown(cancel_futures=True)
 
 
