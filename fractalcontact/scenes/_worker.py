@@ -1,8 +1,8 @@
 """Start of the worker processes: the server that forks them imports this module, and nothing else does.
 
 The workers then share the libraries that every study needs. dask stays out, as in the command itself. The
-linear algebra has one thread in each worker: with more they wait for each other, and an estimate took twice as
-long on two processors.
+linear algebra has one thread in each worker: with more they wait for each other, and an estimate took twice
+as long on two processors.
 """
 
 import importlib
