@@ -46,27 +46,41 @@ dimensions = ["default"]
 domains = ["box_dimension"]
 """
 CODE = """
-import sys
+import sys, time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 import fractalcontact as fc
+
 if __name__ == "__main__":
-    scene, workers, out = sys.argv[1:]
-    fc.scenes.run(scene, workers=int(workers), out=out or None, progress=False)
+    scene, few, workers, out, ready = sys.argv[1:]
+    options = {"out": out or None, "progress": False}
+    if ready:
+        workers = int(workers)
+        client = ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) if workers else None
+        for _ in range(2):
+            fc.scenes.run(few, client=client, progress=False)
+        start = time.perf_counter()
+        fc.scenes.run(scene, client=client, **options)
+        print(time.perf_counter() - start)
+    else:
+        fc.scenes.run(scene, workers=int(workers), **options)
 """
 WAYS = {"one thread": (0, 1), "threads": (0, 0), "workers": (2, 0)}  # workers and threads of a process
 
 
-def seconds(scene: Path, workers: int, threads: int, out: bool) -> float:
-    """Return the wall time of a study in a process of its own."""
-    environment = dict(os.environ)
-    if threads:
-        environment["FRACTALCONTACT_THREADS"] = str(threads)
+def seconds(scene: Path, few: Path, workers: int, threads: int, *, out: bool, ready: bool) -> float:
+    """Return the wall time of a study in a process of its own, or its time where all has started."""
+    environment = os.environ | ({"FRACTALCONTACT_THREADS": str(threads)} if threads else {})
+    if ready:
+        environment["OPENBLAS_NUM_THREADS"] = "1"  # of workers that the user starts
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "study.py"
         script.write_text(CODE)
         target = str(Path(folder) / "out") if out else ""
+        arguments = [sys.executable, script, scene, few, str(workers), target, "ready" if ready else ""]
         start = time.perf_counter()
-        subprocess.run([sys.executable, script, scene, str(workers), target], env=environment, check=True)
-        return time.perf_counter() - start
+        done = subprocess.run(arguments, env=environment, check=True, capture_output=True, text=True)
+        return float(done.stdout) if ready else time.perf_counter() - start
 
 
 def main() -> None:
@@ -76,6 +90,7 @@ def main() -> None:
     parser.add_argument("--members", type=int, default=16)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--only", default="memory,files", help="of memory, files")
+    parser.add_argument("--ready", action="store_true", help="the second study of processes that go on")
     parser.add_argument("--out", default="sweeps")
     options = parser.parse_args()
     rows: list[dict[str, Any]] = []
@@ -86,16 +101,20 @@ def main() -> None:
         scene.write_text(SCENE.format(n=n, members=options.members, block=n * 1e-4 / 2))
         few = folder / "few.toml"
         few.write_text(SCENE.format(n=n, members=2, block=n * 1e-4 / 2))
-        seconds(few, 0, 0, out=True)  # compiles the kernels
+        seconds(few, few, 0, 0, out=True, ready=False)  # compiles the kernels
         for kept in options.only.split(","):
             rounds = [
-                {way: seconds(scene, *how, out=kept == "files") for way, how in WAYS.items()}
+                {
+                    way: seconds(scene, few, *how, out=kept == "files", ready=options.ready)
+                    for way, how in WAYS.items()
+                }
                 for _ in range(options.rounds)
             ]
             for way in WAYS:
                 times = [lap[way] for lap in rounds]
                 speedup = [lap["one thread"] / lap[way] for lap in rounds]
                 row = {"n": n, "members": options.members, "kept": kept, "way": way}
+                row["start"] = "not counted" if options.ready else "counted"
                 row |= {"time": min(times), "time_median": statistics.median(times)}
                 row |= {"ratio": statistics.median(speedup), "ratio_min": min(speedup)}
                 rows.append(row | {"load_average": os.getloadavg()[0]})

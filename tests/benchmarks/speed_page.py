@@ -146,6 +146,7 @@ def sweep_table(rows: list[Row]) -> Table:
         [
             str(row["n"]),
             str(row["members"]),
+            row["start"],
             row["kept"],
             row["way"],
             f"{row['time']:.3g}",
@@ -153,7 +154,7 @@ def sweep_table(rows: list[Row]) -> Table:
         ]
         for row in rows
     ]
-    return ["n", "members", "results", "run", "s", "times one thread"], lines
+    return ["n", "members", "start", "results", "run", "s", "times one thread"], lines
 
 
 def _rounded(ratio: float) -> str:
