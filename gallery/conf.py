@@ -77,6 +77,7 @@ PAGES = (
     "howto",
     "faq",
     "validation",
+    "speed",
     "scene_files",
     "data_model",
     "conventions",

@@ -108,7 +108,7 @@ def large_table(rows: list[Row]) -> Table:
             str(row["n"]),
             f"{row['seconds']:.3g}",
             str(row["pairs"]),
-            f"{row['residual']:.1e}",
+            f"{row['residual']:.1e}" if row["residual"] else NONE,
             f"{row['peak_bytes'] / 1e9:.2f}",
             f"{1e9 * row['seconds'] / row['pairs'] / row['n'] ** 2:.1f}",
             str(row["date"]),
@@ -253,7 +253,8 @@ def draw_large(rows: list[Row], target: Path) -> None:
                 ax.loglog(n, fit, color=colour, lw=1, label=f"{boundary}: $n^{{{power:.2f}}}$")
         ax.set(xlabel="points along each axis", ylabel=label)
         _size_axis(ax, [64, 256, 1024, 4096, 16384])
-    axes[0].set_yticks([20, 50, 100], ["20", "50", "100"])
+    axes[0].set_yticks([20, 30, 50, 100], ["20", "30", "50", "100"])
+    axes[0].yaxis.minorticks_off()
     axes[0].legend()
     axes[1].legend()
     figure.savefig(target, dpi=130)
