@@ -126,3 +126,19 @@ def test_aliased_density_of_a_lattice():
     offsets = 2 * np.pi * np.arange(-300, 301)
     near = np.sum(((1.0 + offsets[:, None]) ** 2 + (-2.0 + offsets) ** 2) ** (-1 - 0.6))
     assert spectra.aliased_power_law((1.0, -2.0), 0.6) == pytest.approx(near, rel=2e-4)
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (9, 12), (12, 9), (7, 7)])
+def test_radial_average_is_the_mean_over_the_whole_plane(shape):
+    spacing = (0.5, 0.4)
+    power = np.abs(np.fft.fft2(np.random.default_rng(4).normal(size=shape))) ** 2
+    edges = np.array([0.5, 2.0, 3.5, 5.0])
+    q, mean, counts = spectra.radial_average(power[:, : shape[1] // 2 + 1], shape, spacing, edges)
+    waves = [2 * np.pi * np.fft.fftfreq(n, step) for n, step in zip(shape, spacing, strict=True)]
+    radius = np.hypot(waves[0][:, None], waves[1])
+    rings = [
+        (radius >= low) & (radius < high) & (radius <= np.pi / 0.5) for low, high in zip(edges, edges[1:])
+    ]
+    np.testing.assert_array_equal(counts, [ring.sum() for ring in rings])
+    np.testing.assert_allclose(mean, [power[ring].mean() for ring in rings], rtol=1e-12)
+    np.testing.assert_allclose(q, [radius[ring].mean() for ring in rings], rtol=1e-12)

@@ -80,7 +80,7 @@ def solver_table(rows: list[Row]) -> Table:
         milliseconds = 1e3 * statistics.fmean(least_time(runs, THIS).values()) / steps
         pairs = statistics.fmean(run["pairs"] for run in own) / steps
         ratios = [_rounded(total_ratio(runs, package)) for package in RIVALS]
-        lines.append([start, boundary, str(threads), str(n), f"{milliseconds:.3g}", f"{pairs:.0f}", *ratios])
+        lines.append([start, boundary, str(threads), str(n), _time(milliseconds), f"{pairs:.0f}", *ratios])
     return head, lines
 
 
@@ -125,8 +125,8 @@ def peer_table(rows: list[Row]) -> Table:
             row["question"],
             row["peer"],
             str(row["n"]),
-            f"{1e3 * row['time']:.3g}",
-            f"{1e3 * row['peer_time']:.3g}",
+            _time(1e3 * row["time"]),
+            _time(1e3 * row["peer_time"]),
             _rounded(row["ratio_median"]),
             f"{row['difference']:.0e}",
         ]
@@ -155,6 +155,10 @@ def sweep_table(rows: list[Row]) -> Table:
         for row in rows
     ]
     return ["n", "members", "start", "results", "run", "s", "times one thread"], lines
+
+
+def _time(milliseconds: float) -> str:
+    return f"{milliseconds:.0f}" if milliseconds >= 100 else f"{milliseconds:.3g}"
 
 
 def _rounded(ratio: float) -> str:

@@ -127,3 +127,25 @@ def test_second_variogram_ignores_plane(rough):
     tilted.attrs = rough.attrs
     first, second = fc.dimensions.second_variogram(rough), fc.dimensions.second_variogram(tilted)
     np.testing.assert_allclose(second.second_variogram, first.second_variogram, rtol=1e-8)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("n", [200, 201])
+def test_many_complete_profiles_against_sums_over_pairs(periodic, n):
+    lines = np.random.default_rng(1).normal(size=(3, n)).cumsum(axis=1) * [[1e-6], [1.0], [1e3]] + 7.0
+    single = fc.surfaces.from_array(lines[0], 0.5, periodic=periodic)
+    stack = single.expand_dims(line=3).copy(data=lines)
+    curve = fc.dimensions.variogram(stack)
+    steps = np.arange(1, n // 2 + 1)
+    np.testing.assert_allclose(curve.lag, 0.5 * steps, rtol=1e-14)
+    for line, values in zip(lines, curve.variogram.values, strict=True):
+        for h, value in zip(steps, values, strict=True):
+            ahead = np.roll(line, -h) if periodic else line[h:]
+            expected = 0.5 * np.mean((ahead - (line if periodic else line[:-h])) ** 2)
+            assert value == pytest.approx(expected, rel=1e-9)
+    pairs = np.full(steps.size, n) if periodic else n - steps
+    pairs = np.where(periodic & (2 * steps == n), n // 2, pairs)
+    np.testing.assert_array_equal(curve.pair_count.values, np.broadcast_to(pairs, curve.pair_count.shape))
+    gap = stack.copy(data=np.where(np.arange(n) == 5, np.nan, lines))
+    alone = [fc.dimensions.variogram(gap.isel(line=k)).variogram.values for k in range(3)]
+    np.testing.assert_allclose(fc.dimensions.variogram(gap).variogram.values, alone, rtol=1e-12)

@@ -215,3 +215,11 @@ def test_all_invalid_arguments_are_reported():
         fc.domains.islands(as_mask(np.ones((5, 5))).astype(float), connectivity=3)
     assert "connectivity" in str(caught.value)
     assert "compare numbers first" in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5])
+def test_sizes_are_those_of_the_map(share):
+    """Few runs of equal labels, and as many as white noise has."""
+    cells = np.random.default_rng(2).random((150, 170)) < share
+    found = fc.domains.islands(as_mask(cells), periodic=False)
+    np.testing.assert_array_equal(found.cells.values, np.bincount(found.label.values.ravel())[1:])

@@ -133,6 +133,23 @@ def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
 
 
+def test_workers_have_one_thread_of_linear_algebra():
+    """NumPy reads its number of threads when it is imported, so it must be set before."""
+    code = """
+import os, sys
+class Watch:
+    def find_spec(self, name, path, target=None):
+        if name == "numpy":
+            print(os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("MKL_NUM_THREADS"))
+sys.meta_path.insert(0, Watch())
+import fractalcontact.scenes._worker
+"""
+    names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    environment = {name: value for name, value in os.environ.items() if name not in names}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == ["1", "1"], done.stderr
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_stopped_worker_processes_end_and_the_study_resumes(uninterrupted, tmp_path, number):
     words = [

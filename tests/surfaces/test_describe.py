@@ -217,3 +217,31 @@ def test_stack_with_its_own_dim_name():
     statistics = fc.surfaces.describe(named)
     assert statistics.rms_height.dims == ("specimen",)
     np.testing.assert_array_equal(statistics.rms_height, fc.surfaces.describe(stack).rms_height)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("gaps", [False, True])
+def test_large_surface_against_whole_arrays(periodic, gaps):
+    """More points than a block of the differences; the reference takes whole arrays."""
+    rng, (dy, dx) = np.random.default_rng(3), (0.5, 0.25)
+    heights = rng.normal(size=(301, 170)).cumsum(axis=1)
+    if gaps:
+        heights[rng.random(heights.shape) < 0.01] = np.nan
+    found = fc.surfaces.describe(fc.surfaces.from_array(heights, (dy, dx), periodic=periodic))
+    padded = np.pad(heights, 1, mode="wrap") if periodic else np.pad(heights, 1, constant_values=np.nan)
+    here, right, left = padded[1:-1, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]
+    below, above, corner = padded[2:, 1:-1], padded[:-2, 1:-1], padded[2:, 2:]
+    along_x, along_y = ((right - here) / dx) ** 2, ((below - here) / dy) ** 2
+    along_x_below, along_y_right = ((corner - below) / dx) ** 2, ((corner - right) / dy) ** 2
+    laplacian = (right - 2 * here + left) / dx**2 + (below - 2 * here + above) / dy**2
+    area = sum(np.sqrt(1 + x + y) for x in (along_x, along_x_below) for y in (along_y, along_y_right)) / 4
+    assert found.developed_area_ratio.item() == pytest.approx(np.nanmean(area), rel=1e-12)
+    assert found.peak_to_valley.item() == pytest.approx(np.nanmax(heights) - np.nanmin(heights), rel=1e-14)
+    centred = heights - np.nanmean(heights)
+    for name, power in (("skewness", 3), ("kurtosis", 4)):
+        expected = np.nanmean(centred**power) / np.nanmean(centred**2) ** (power / 2)
+        assert found[name].item() == pytest.approx(expected, rel=1e-11, abs=1e-12)
+    if gaps or not periodic:  # a complete periodic surface is differentiated by its modes
+        assert found.rms_slope_x.item() == pytest.approx(np.sqrt(np.nanmean(along_x)), rel=1e-12)
+        assert found.rms_slope_y.item() == pytest.approx(np.sqrt(np.nanmean(along_y)), rel=1e-12)
+        assert found.rms_curvature.item() == pytest.approx(np.sqrt(np.nanmean(laplacian**2)) / 2, rel=1e-12)
