@@ -137,7 +137,7 @@ def test_radial_average_is_the_mean_over_the_whole_plane(shape):
     waves = [2 * np.pi * np.fft.fftfreq(n, step) for n, step in zip(shape, spacing, strict=True)]
     radius = np.hypot(waves[0][:, None], waves[1])
     rings = [
-        (radius >= low) & (radius < high) & (radius <= np.pi / 0.5) for low, high in zip(edges, edges[1:])
+        (radius >= low) & (radius < high) & (radius <= np.pi / 0.5) for low, high in itertools.pairwise(edges)
     ]
     np.testing.assert_array_equal(counts, [ring.sum() for ring in rings])
     np.testing.assert_allclose(mean, [power[ring].mean() for ring in rings], rtol=1e-12)
