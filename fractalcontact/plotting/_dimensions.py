@@ -37,6 +37,7 @@ CURVES = {
     "covering_area": (1.0, 0.0, -1.0),
     "covering_length": (1.0, 0.0, -1.0),
 }
+NARROW = 0.1  # the axis of dimensions is at least this long: nearly equal ones must not look different
 CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
@@ -304,6 +305,9 @@ def dimensions(
     if truth is not None:
         ax.axvline(truth, color=_style.ink(), lw=0.9, ls=":")
         entries.append(_style.legend_line("true", color=_style.ink(), lw=0.9, ls=":"))
+    low_end, high_end = ax.get_xlim()
+    wider = max(NARROW - (high_end - low_end), 0.0) / 2
+    ax.set_xlim(low_end - wider, high_end + wider)
     ax.set_yticks(rows, [name.replace("_", " ") for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.grid(False, axis="y")

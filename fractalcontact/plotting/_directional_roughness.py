@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from fractalcontact.plotting._units import Units
 
 SIZE = (5.0, 4.0)  # inches
+RINGS = 4  # at most, so that their labels stay apart
 COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
 CURVES: dict[str, tuple[str, dict[str, Any]]] = {
     "roughness_metric": ("$\\theta^*_{max}/(C+1)$", {"color": _style.BLUE, "ls": "-"}),
@@ -58,6 +59,8 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     >>> [line.get_label() for line in ax.lines]
     ['$\\theta^*_{max}/(C+1)$', 'mean dip']
     """
+    from matplotlib.ticker import MaxNLocator
+
     result = shown_in(result, units, "directional_roughness")
     data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
     require_dims(data, "directional_roughness", dict.fromkeys(CURVES, "azimuth"))
@@ -73,9 +76,11 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
         polar.plot(np.radians(azimuth[order]), angle(data[name].values[order]), label=label, **style)
     greatest = float(np.nan_to_num([float(angle(data[name].max())) for name in CURVES]).max())
     polar.set_ylim(0.0, 1.12 * greatest or 1.0)
+    rings = MaxNLocator(RINGS).tick_values(0.0, polar.get_ylim()[1])
+    polar.set_rticks(rings[(rings > 0) & (rings <= polar.get_ylim()[1])])
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
     polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))
-    polar.yaxis.set_units(angle.unit)
+    polar.yaxis.units = angle.unit
     polar.set_rlabel_position(22.5)
     for tick_label in polar.get_yticklabels():
         tick_label.set_path_effects(_style.halo())

@@ -164,7 +164,8 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
         ax.step(scale(ordered), np.arange(1, ordered.size + 1), where="pre", color=colour,
                 marker="." if ordered.size < 40 else None,
                 label=curve_name("islands", (title, labels), i))  # fmt: skip
-    _style.log_scale(ax, x=areas, y=np.ones(1))
+    most = max(np.count_nonzero(np.isfinite(group)) for _, group in groups)
+    _style.log_scale(ax, x=areas, y=np.arange(1, most + 1))
     _style.plain_ticks(ax)
     if title:
         _style.sequence_legend(ax, title, labels, colours)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 AZIMUTHS = {"E": 0.0, "N": 90.0, "W": 180.0, "S": 270.0}
 LOWER, UPPER = "#BDB8AB", "#8C9DAE"
 SECTION_SHAPE = 1.9  # width over height
-LABEL_WIDTH = 0.18  # of the width of the section, needed by the label of the lift
+LABEL_WIDTH = 0.24  # of the width of the section, needed by the label of the lift
 Array = np.ndarray[Any, np.dtype[Any]]
 
 

@@ -130,7 +130,12 @@ def scale_of(data: xr.DataArray, values: Any = None) -> Scale:
 def label_axis(axis: Any, text: str, scale: Scale) -> None:
     """Label an axis; its unit can be read with `axis.get_units()`."""
     axis.set_label_text(scale.label(text))
-    axis.set_units(scale.unit)
+    name = axis.axis_name
+    shared = axis.axes.get_shared_x_axes() if name == "x" else axis.axes.get_shared_y_axes()
+    for ax in shared.get_siblings(axis.axes):
+        getattr(
+            ax, f"{name}axis"
+        ).units = scale.unit  # `set_units` would leave bands and intervals out of view
 
 
 def name_of(data: xr.DataArray) -> str:

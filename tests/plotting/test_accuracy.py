@@ -5,6 +5,7 @@ import re
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
+import xarray as xr
 
 from fractalcontact import plotting
 
@@ -35,3 +36,16 @@ def test_distinct_styles_and_narrow_cost_axis():
     assert len(styles) == 10
     low, high = right.get_xlim()
     assert high > 2 * low
+
+
+def test_intervals_lie_within_the_axes():
+    dims = ("method", "family", "hurst", "size")
+    ends = {"error_ratio": (0.5, 1.2, 4.0), "interval_coverage": (0.7, 0.94, 1.0)}
+    values = {f"{name}{end}": value for name, three in ends.items()
+              for end, value in zip(("_low", "", "_high"), three, strict=True)}  # fmt: skip
+    coords = {"method": ["default"], "family": ["fbm"], "hurst": [0.3, 0.8], "size": [128]}
+    bench = xr.Dataset({name: (dims, np.full((1, 1, 2, 1), value)) for name, value in values.items()}, coords)
+    (upper,), (lower,) = plotting.estimator_errors(bench)
+    for ax, (first, _, last) in zip((upper, lower), ends.values(), strict=True):
+        low, high = ax.get_ylim()
+        assert low < first < last < high

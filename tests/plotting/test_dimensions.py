@@ -116,3 +116,24 @@ def test_an_estimate_at_its_limit_is_no_point_and_the_band_is_named(study):
     words = [text.get_text() for text in ax.artists[0].get_texts()]
     assert "at the limit:\nno dimension" in words
     assert "1998 paper" in words
+
+
+def test_nearly_equal_dimensions_do_not_look_different(study):
+    estimates = study["dimensions"].to_dataset().isel(method=[0, 0])
+    ax = plotting.dimensions(estimates.assign(fractal_dimension=("method", [2.2, 2.21])))
+    low, high = ax.get_xlim()
+    assert high - low >= 0.1
+
+
+def test_intervals_lie_within_the_axis(study):
+    one = study["dimensions"].to_dataset().isel(method=[0, 0])
+    values = {
+        "hurst": [0.8, 0.8],
+        "fractal_dimension": [2.2, 2.2],
+        "ci_low": [0.5, 0.7],
+        "ci_high": [0.9, 0.95],
+    }
+    ax = plotting.dimensions(one.assign({name: ("method", list(ends)) for name, ends in values.items()}))
+    low, high = ax.get_xlim()
+    assert low < 2.05
+    assert high > 2.5

@@ -1,5 +1,7 @@
 """Polar figure of the directional roughness."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,15 @@ def test_curves_are_closed_and_hold_the_values(surface):
         assert (angle[-1], radius[-1]) == (angle[0], radius[0])
     assert [tick.get_text() for tick in ax.get_xticklabels()][::2] == ["E", "N", "W", "S"]
     assert ax.get_ylim()[0] == 0
+
+
+@pytest.mark.parametrize("factor", [0.2, 1.0, 7.0])
+def test_labels_of_the_rings_stay_apart(surface, factor):
+    ax = plotting.directional_roughness(fc.joints.directional_roughness(factor * surface))
+    ax.figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in ax.get_yticklabels() if label.get_text()]
+    assert 2 <= len(boxes) <= 5
+    assert not any(one.overlaps(other) for one, other in itertools.pairwise(boxes))
 
 
 def test_a_sector_stays_open_and_is_drawn_in_order(surface):

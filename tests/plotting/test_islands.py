@@ -20,6 +20,8 @@ def test_map_and_area_distribution():
     shown = np.asarray(areas.lines[0].get_xdata()) * 1e-6
     assert shown == pytest.approx(np.sort(result.area.values)[::-1])
     assert np.array_equal(areas.lines[0].get_ydata(), np.arange(1, result.sizes["island"] + 1))
+    assert areas.get_xscale() == "log" or np.unique(result.area).size == 1
+    assert areas.get_yscale() == "log"
 
 
 def test_several_masks():
