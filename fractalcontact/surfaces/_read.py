@@ -236,6 +236,8 @@ def file_content(
         return _archive_content(path, channel, units, spacing, first_row)
     with open_bytes(path) as file:
         head = file.read(8)
+    if not head:
+        raise UnreadableFile(WHERE, [f"path: expected data, got the empty file {path.name!r}"])
     if head.startswith(RASTERS):
         return _reading_content(read_raster(path, channel, units, spacing), "bottom")
     if head.startswith(IMAGES):

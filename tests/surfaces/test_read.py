@@ -48,6 +48,13 @@ def test_tables_of_numbers(tmp_path, mark, name):
     )
 
 
+@pytest.mark.parametrize("name", ["scan.csv", "scan.xyz", "scan.opd"])
+def test_an_empty_file_is_called_empty(tmp_path, name):
+    (tmp_path / name).write_bytes(b"")
+    with pytest.raises(UnreadableFile, match=f"empty file '{name}'"):
+        fc.surfaces.read(tmp_path / name, units="mm")
+
+
 def test_empty_cells_are_missing(tmp_path):
     (tmp_path / "a.csv").write_text("1,,3\n4,5,\n")
     surface = fc.surfaces.read(tmp_path / "a.csv", spacing=1.0)
