@@ -60,6 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def command_help() -> dict[str, str]:
+    """Return what `--help` prints for every command, by its name."""
+    (commands,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
+    return {str(name): parser.format_help() for name, parser in commands.choices.items()}
+
+
 def _parser() -> argparse.ArgumentParser:
     from fractalcontact import __version__
 

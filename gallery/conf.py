@@ -70,6 +70,7 @@ PAGES = (
     "first_scan",
     "tutorials",
     "scene_reference",
+    "command_line",
     "measured_surfaces",
     "contributing",
     "changelog",

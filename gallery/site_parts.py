@@ -11,6 +11,7 @@ def setup(app):
     """Register the directives and hooks of this file."""
     app.add_directive("names", Names)
     app.add_directive("extremes", Extremes)
+    app.add_directive("commands", Commands)
     app.add_directive("extras", Extras)
     app.add_directive("scene-tables", SceneTables)
     app.connect("autodoc-process-docstring", prepare_docstring)
@@ -54,6 +55,22 @@ class Extras(Directive):
             if purpose:
                 rows.append((nodes.literal(text=name), ", ".join(packages), purpose[1]))
         return [table((10, 34, 56), ("extra", "installs", "for"), rows)]
+
+
+class Commands(Directive):
+    """What each command of the command line takes, as its `--help` says."""
+
+    def run(self):
+        from fractalcontact.cli import command_help
+
+        sections = []
+        for name, words in command_help().items():
+            title = f"fractalcontact {name}"
+            section = nodes.section(ids=[nodes.make_id(title)], names=[nodes.fully_normalize_name(title)])
+            section += nodes.title("", title)
+            section += nodes.literal_block(words, words, language="none")
+            sections.append(section)
+        return sections
 
 
 class SceneTables(Directive):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.cli import command_help, main
 
 SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints", "accuracy", "scenes", "plotting")
 ROOT = Path(__file__).resolve().parent.parent
@@ -102,6 +103,18 @@ def test_examples_of_a_page_run(page):
     result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(test)
     assert result.attempted > 0
     assert result.failed == 0
+
+
+def test_page_of_commands_says_what_their_help_says(capsys):
+    shown = command_help()
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    listed = re.findall(r"^    ([a-z]+)\b", capsys.readouterr().out, flags=re.MULTILINE)
+    assert list(shown) == listed
+    for name, words in shown.items():
+        with pytest.raises(SystemExit):
+            main([name, "--help"])
+        assert capsys.readouterr().out == words
 
 
 def test_scene_of_the_first_scan_runs():
