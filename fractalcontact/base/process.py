@@ -9,16 +9,28 @@ import gc
 import os
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from fractalcontact.base import threads
+from fractalcontact.base.memory import free_memory
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+R = TypeVar("R")
 
 # allocations between two garbage collections: with Python's 700 they take 5 % of the run time of a study
 GC_THRESHOLD = 10_000
-PATIENCE = 60.0  # seconds without a sign of the copy, after which its calls are made here
+# seconds without a sign of the copy, beyond those of ten calls, after which its calls are made here
+PATIENCE = 60.0
+COPY_MEMORY = 1e9  # bytes that have to be free before this process is copied
+TOKEN, MOST_CALLS = 2, 1 << 15  # bytes of a number, and numbers that a pipe of 64 kB holds
 
 
 def peak_memory() -> int:
@@ -53,81 +65,121 @@ def collect_garbage_less_often() -> None:
     gc.set_threshold(GC_THRESHOLD)
 
 
-def calls_in_two_processes(function: Callable[[int], None], count: int) -> Iterator[int]:
-    """Call ``function(n)`` for the numbers below `count` (at most 255), and yield each as its call ends.
+def calls_in_two_processes(function: Callable[[int], R], count: int) -> Iterator[tuple[int, R]]:
+    """Call ``function(n)`` for the numbers below `count`; yield n and result as a call ends.
 
-    For calls that hold the interpreter lock and have an effect outside this process, such as a file. A forked
-    copy of this process shares them: it needs no imports, no pickled data and no guard in a script. Calls
-    that it does not end, for whatever reason, are made here.
+    For calls that hold the interpreter lock. A forked copy of this process shares them: it needs no imports,
+    no pickled arguments and no guard in a script. Its results and warnings come back pickled. Calls that it
+    does not end, for whatever reason, are made here.
     """
-    if count < 2 or not _can_fork():
+    if not 2 <= count <= MOST_CALLS or not can_fork():
         for number in range(count):
-            function(number)
-            yield number
+            yield number, function(number)
         return
     from multiprocessing import get_context
 
-    (waiting, to_do), (done, ended) = os.pipe(), os.pipe()
-    os.write(to_do, bytes(range(count)))
+    context = get_context("fork")
+    waiting, to_do = os.pipe()
+    os.write(to_do, b"".join(number.to_bytes(TOKEN) for number in range(count)))
     os.close(to_do)
-    copy = get_context("fork").Process(target=_call_in_copy, args=(function, waiting, ended), daemon=True)
-    left = set(range(count))
+    receiver, sender = context.Pipe(duplex=False)
+    copy = context.Process(target=_call_in_copy, args=(function, waiting, sender), daemon=True)
+    left, longest = set(range(count)), 0.0
     try:
         with suppress(OSError), warnings.catch_warnings():  # a limit of the system
-            warnings.simplefilter("ignore", DeprecationWarning)  # of threads: `_can_fork` looks at them
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads: `can_fork` looks at them
             copy.start()
-        os.close(ended)
-        for number in _bytes_of(waiting):
-            function(number)
+        sender.close()  # now the receiver sees the end of the copy
+        for number in _numbers_in(waiting):
+            start = time.perf_counter()
+            result = function(number)
+            longest = max(longest, time.perf_counter() - start)
             left.discard(number)
-            yield number
-        for number in _bytes_of(done, PATIENCE):
+            yield number, result
+            for number, result in _received(receiver, 0.0):
+                left.discard(number)
+                yield number, result
+        for number, result in _received(receiver, PATIENCE + 10.0 * longest):
             left.discard(number)
-            yield number
+            yield number, result
         for number in sorted(left):
-            function(number)
-            yield number
+            yield number, function(number)
     finally:
-        for _ in _bytes_of(waiting):  # after an error: the copy ends its call, and finds no other
+        for _ in _numbers_in(waiting):  # after an error: the copy ends its call, and finds no other
             pass
+        os.close(waiting)
+        receiver.close()
         if copy.pid is not None:
             copy.join(PATIENCE)
             copy.kill()
             copy.join()
-        os.close(waiting)
-        os.close(done)
 
 
-def _can_fork() -> bool:
-    """Whether a copy of this process has a processor of its own, and no lock that another thread held.
+def can_fork() -> bool:
+    """Whether a copy of this process has a processor and memory, and no lock that another thread held.
 
     Threads of this package that wait for bands, and that of a progress bar, hold none that the copy needs.
     """
+    from multiprocessing import parent_process
+
     own = threading.main_thread()
     if sys.platform != "linux" or threading.current_thread() is not own or threads.thread_count() < 2:
         return False
+    if parent_process() is not None:  # a worker: the others use the processors
+        return False
     others = (each for each in threading.enumerate() if each is not own and each.name != threads.NAME)
-    return all(type(each).__name__ == "TMonitor" for each in others)
+    is_alone = all(type(each).__name__ == "TMonitor" for each in others)
+    return is_alone and free_memory().size > COPY_MEMORY
 
 
-def _call_in_copy(function: Callable[[int], None], waiting: int, ended: int) -> None:
+def end_with_parent() -> None:
+    """Wait for the end of the process that started this one, then end this one at once."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _call_in_copy(function: Callable[[int], Any], waiting: int, sender: Connection) -> None:
     """Make calls in the copy until none waits or one fails; it is made again, and reported, by the parent."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # that of the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    ended: SimpleQueue[Any] = SimpleQueue()
+    # the pipe holds little: without a thread of its own a result would wait until the parent reads it
+    thread = threading.Thread(target=_send, args=(ended, sender))
+    thread.start()
     with suppress(Exception):
-        for number in _bytes_of(waiting):
-            function(number)
-            os.write(ended, bytes([number]))
+        for number in _numbers_in(waiting):
+            with warnings.catch_warnings(record=True) as caught:
+                result = function(number)
+            said = [(each.message, each.category, each.filename, each.lineno) for each in caught]
+            ended.put((number, result, said))
+    ended.put(None)
+    thread.join()
 
 
-def _bytes_of(pipe: int, patience: float | None = None) -> Iterator[int]:
-    """Yield the bytes in a pipe, until all its writers have closed it or, with patience, none comes."""
-    from select import select
+def _send(ended: SimpleQueue[Any], sender: Connection) -> None:
+    with suppress(OSError):  # the parent reads no more
+        while (message := ended.get()) is not None:
+            sender.send(message)
 
-    while patience is None or select([pipe], [], [], patience)[0]:
-        content = os.read(pipe, 1)
-        if not content:
-            return
-        yield content[0]
+
+def _received(receiver: Connection, patience: float) -> Iterator[tuple[int, Any]]:
+    """Yield numbers and results of the copy until none comes in this time; show its warnings again."""
+    with suppress(EOFError, OSError):
+        while receiver.poll(patience):
+            number, result, said = receiver.recv()
+            for message in said:
+                warnings.warn_explicit(*message)
+            yield number, result
+
+
+def _numbers_in(pipe: int) -> Iterator[int]:
+    """Yield the numbers that wait in a pipe; each is taken by one process."""
+    while content := os.read(pipe, TOKEN):
+        yield int.from_bytes(content)

@@ -5,6 +5,7 @@ The surface of a member comes from its own random stream, so that it can be gene
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.schema import encoded, label
 from fractalcontact.scenes._checkpoint import PartStore
 from fractalcontact.scenes._executor import Workers, run_tasks
+from fractalcontact.scenes._inputs import surface_grid
 from fractalcontact.scenes._parts import concatenate
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._study import Study
@@ -74,7 +76,8 @@ class Ensemble:
         share_parts = self.workers is not None and self.workers.count > count
         of_parts, of_members = (self.workers, None) if share_parts else (None, self.workers)
         tasks = {member: _MemberTask(self.scene, member, of_parts) for member in range(count)}
-        finished = run_tasks(tasks, self.store, stop, of_members)
+        points = math.prod(surface_grid(self.scene)[0])
+        finished = run_tasks(tasks, self.store, stop, of_members, points=points)
         bar = track(finished, self.progress, self.scene.name, unit="member", total=count)
         results = [result for _, result in sorted(bar, key=lambda entry: entry[0])]
         if results:

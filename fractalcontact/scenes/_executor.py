@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import (
@@ -30,11 +31,14 @@ from typing import Any, TypeVar
 
 from fractalcontact.base import signals, threads
 from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.process import calls_in_two_processes, can_fork, end_with_parent
 from fractalcontact.scenes._checkpoint import MemoryStore, PartStore
 
 R = TypeVar("R")
 Task = Callable[[PartStore, signals.Stop], R | None]
 
+SMALL_SURFACE = 1 << 20  # points up to which a second process may press at the same time
+WORTH_A_COPY = 0.5  # seconds of work left, from which on a second process takes part of it
 PAUSE = 0.2  # seconds between two checks whether a stop was requested
 RUNNING, STOPPING = "running", "stopping"
 LOST = "the study on workers did not end; with a folder, finished parts are kept, and the same run resumes"
@@ -111,27 +115,44 @@ def worker_processes(count: int) -> Iterator[Executor | None]:
 def _start_worker() -> None:
     """Leave SIGINT to the process that runs the study, and end when it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def run_tasks(
-    tasks: Mapping[int, Task[R]], store: PartStore, stop: signals.Stop, workers: Workers | None = None
+    tasks: Mapping[int, Task[R]],
+    store: PartStore,
+    stop: signals.Stop,
+    workers: Workers | None = None,
+    *,
+    points: int,
 ) -> Iterator[tuple[int, R]]:
-    """Yield number and result of every task as it finishes; a task that a stop cut short is left out."""
+    """Yield number and result of every task as it finishes; a task that a stop cut short is left out.
+
+    Without workers a copy of this process shares the tasks of a surface of few `points`, where that is worth
+    it.
+    """
     if workers is not None:
         yield from _run_on_workers(tasks, store, stop, workers)
         return
+    left = dict(tasks)
     for number, task in tasks.items():
+        start = time.perf_counter()
         result = task(store, stop)
+        del left[number]
         if result is not None:
             yield number, result
+        rest = (time.perf_counter() - start) * len(left)
+        if points <= SMALL_SURFACE and rest > WORTH_A_COPY and can_fork():
+            break
+    numbers, half = list(left), threads.thread_count() // 2
+
+    def run_one(place: int) -> R | None:
+        with threads.limit(half):
+            return left[numbers[place]](store, stop)
+
+    for place, result in calls_in_two_processes(run_one, len(numbers)):
+        if result is not None:
+            yield numbers[place], result
 
 
 def _run_on_workers(

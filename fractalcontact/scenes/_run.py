@@ -62,9 +62,10 @@ def run(
     summary : bool, default False
         Print the summary at the end, see `fractalcontact.scenes.summary`.
     workers : int, default 0
-        Share the study between so many processes on this machine; 0 for none, at most 4 for each processor.
-        An ensemble is shared by members, any other study by the parts of a stage. A script needs an
-        ``if __name__ == "__main__"`` guard for it.
+        Share the study between so many processes on this machine, at most 4 for each processor. An ensemble
+        is shared by members, any other study by the parts of a stage. A script needs an
+        ``if __name__ == "__main__"`` guard for it. With 0, a copy of this process takes part of the work on
+        surfaces of up to 1024 x 1024 points and of the figures (on Linux, with two processors or more).
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
         is set on the worker. Workers need no access to `out`; a scene that reads files needs them there.

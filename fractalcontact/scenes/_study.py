@@ -88,7 +88,9 @@ class Study:
         missing = [n for n in range(len(work.parts)) if any(n not in self.parts[name] for name in names)]
         show_parts = self.progress and len(missing) > 1
         workers = self.workers if len(missing) > 1 else None
-        finished = run_tasks(self._tasks(stage, work, readers, missing), self.store, stop, workers)
+        tasks = self._tasks(stage, work, readers, missing)
+        points = self.results["surfaces"]["height"].size if "surfaces" in self.results else 0
+        finished = run_tasks(tasks, self.store, stop, workers, points=points)
         bar = track(finished, show_parts, stage.name, unit="part", total=len(missing))
         for number, (results, seconds) in bar:
             for name, result, spent in zip(names, results, seconds, strict=True):

@@ -449,6 +449,8 @@ def triangle_heights(flat: Array, z: Array, triangles: Array, y: Array, x: Array
 
 @kernel
 def _fill_triangles(flat: Array, z: Array, triangles: Array, y: Array, x: Array, heights: Array) -> None:
+    # `scipy.interpolate.LinearNDInterpolator` takes neither a mesh nor folds, and 9.2 s instead of 0.03 s for
+    # 512 x 512 cells among 200 000 points
     dx, dy = x[1] - x[0], y[1] - y[0]
     nx, ny = x.size, y.size
     for t in range(triangles.shape[0]):

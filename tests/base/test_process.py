@@ -6,6 +6,8 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
+from pathlib import Path
 
 import pytest
 
@@ -34,6 +36,7 @@ def test_dask_is_not_imported_to_save_a_result(tmp_path):
 
 
 COUNT = 12
+EVERY = [(number, number**2) for number in range(COUNT)]
 
 
 @pytest.fixture
@@ -45,6 +48,7 @@ def note(tmp_path, monkeypatch):
         time.sleep(0.02)
         with (tmp_path / str(number)).open("a") as file:
             file.write(f"{os.getpid()} ")
+        return number**2
 
     note.callers = lambda: [(tmp_path / str(number)).read_text().split() for number in range(COUNT)]
     return note
@@ -58,7 +62,7 @@ def alone():
 
 
 def test_every_call_is_made_once_by_one_of_two_processes(note):
-    assert sorted(calls_in_two_processes(note, COUNT)) == list(range(COUNT))
+    assert sorted(calls_in_two_processes(note, COUNT)) == EVERY
     callers = note.callers()
     assert all(len(each) == 1 for each in callers)
     assert len({each[0] for each in callers}) == (2 if alone() else 1)
@@ -71,9 +75,9 @@ def test_calls_that_the_copy_does_not_end_are_made_here(note, end):
     def call(number):
         if os.getpid() != own:
             end()
-        note(number)
+        return note(number)
 
-    assert sorted(calls_in_two_processes(call, COUNT)) == list(range(COUNT))
+    assert sorted(calls_in_two_processes(call, COUNT)) == EVERY
     assert note.callers() == [[str(own)]] * COUNT
 
 
@@ -88,11 +92,50 @@ def test_error_of_a_call_is_raised_and_ends_the_copy(note):
     assert multiprocessing.active_children() == []
 
 
-@pytest.mark.parametrize("reason", ["one processor", "another thread", "not the main thread"])
+def test_large_results_and_warnings_of_the_copy_come_back(note):
+    def call(number):
+        warnings.warn(f"number {number}", UserWarning, stacklevel=1)
+        return number, bytes(1 << 20), note(number)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        results = dict(calls_in_two_processes(call, COUNT))
+    assert results == {number: (number, bytes(1 << 20), number**2) for number in range(COUNT)}
+    assert sorted(str(each.message) for each in caught) == sorted(f"number {n}" for n in range(COUNT))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no process is copied")
+def test_copy_ends_with_a_process_that_is_killed(tmp_path):
+    code = (
+        "import os, signal, sys, time; from fractalcontact.base.process import calls_in_two_processes\n"
+        "own, folder = os.getpid(), sys.argv[1]\n"
+        "def call(number):\n"
+        "    if os.getpid() != own:\n"
+        "        open(f'{folder}/copy', 'w').write(str(os.getpid()))\n"
+        "    time.sleep(60 if os.path.exists(f'{folder}/copy') else 0.01)\n"
+        "for number, _ in calls_in_two_processes(call, 9999): pass\n"
+    )
+    environment = {**os.environ, "FRACTALCONTACT_THREADS": "2"}
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], env=environment) as process:
+        while not ((file := tmp_path / "copy").exists() and file.read_text()):
+            time.sleep(0.01)
+        process.kill()
+    number = int((tmp_path / "copy").read_text())
+    for _ in range(1000):
+        if not Path(f"/proc/{number}").exists():
+            return
+        time.sleep(0.01)
+    raise AssertionError("the copy goes on")
+
+
+@pytest.mark.parametrize("reason", ["one processor", "a worker", "another thread", "not the main thread"])
 def test_process_is_not_copied_where_that_is_unsafe_or_useless(note, monkeypatch, reason):
     numbers, done = [], threading.Event()
     if reason == "one processor":
         monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")
+        numbers = list(calls_in_two_processes(note, COUNT))
+    elif reason == "a worker":
+        monkeypatch.setattr("multiprocessing.parent_process", lambda: "the process that started this one")
         numbers = list(calls_in_two_processes(note, COUNT))
     elif reason == "another thread":
         other = threading.Thread(target=done.wait)
@@ -104,5 +147,5 @@ def test_process_is_not_copied_where_that_is_unsafe_or_useless(note, monkeypatch
         other = threading.Thread(target=lambda: numbers.extend(calls_in_two_processes(note, COUNT)))
         other.start()
         other.join()
-    assert numbers == list(range(COUNT))
+    assert numbers == EVERY
     assert note.callers() == [[str(os.getpid())]] * COUNT

@@ -314,6 +314,7 @@ def _in_process(folder, task, cache=None):
     folder.mkdir()
     (folder / TASK).write_bytes(pickle.dumps({"libraries": (), "scene": None, "traced": False} | task))
     environment = dict(os.environ) | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
+    environment["FRACTALCONTACT_THREADS"] = "1"  # no copy of the process takes part of the work
     # the child imports this very package, wherever the command was started
     paths = [str(Path(fc.__file__).parents[1]), environment.get("PYTHONPATH", "")]
     environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)

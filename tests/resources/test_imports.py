@@ -42,7 +42,7 @@ def command_report(*words, **environment):
         capture_output=True,
         text=True,
         check=False,
-        env=os.environ | environment,
+        env=os.environ | {"FRACTALCONTACT_THREADS": "1"} | environment,  # all of it in this one process
     )
     report = json.loads(done.stderr.splitlines()[-1])
     assert report["code"] == 0, done.stderr

@@ -1,5 +1,6 @@
 """Workers that are remote, lost, stopped or not available."""
 
+import functools
 import multiprocessing
 import os
 import pickle
@@ -13,6 +14,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
 from study import SOUND, command, watch_calls
 
 import fractalcontact as fc
@@ -214,3 +216,35 @@ def test_killed_worker_of_dask_changes_no_byte(uninterrupted, tmp_path, once_the
     assert killed
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "result.nc"]
+
+
+FIVE_SHEARS = SOUND.replace("[1e-4, 4e-4]", "[1e-4, 2e-4, 3e-4, 4e-4, 5e-4]")
+
+
+@pytest.mark.parametrize("text", [FIVE_SHEARS, SWEEP])
+def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, text):
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
+    shared = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    for name in ("joints/closure", "joints/rigid_dilatancy"):
+        for variable in set(serial[name].variables) - {"run_time"}:
+            xr.testing.assert_identical(serial[name][variable].variable, shared[name][variable].variable)
+
+
+def test_error_of_a_part_is_raised_with_a_copy(tmp_path, monkeypatch):
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
+    (tmp_path / "study.toml").write_text(FIVE_SHEARS, encoding="utf-8")
+    closure = fc.joints.closure
+
+    def fail_late(crack, *, shear, **options):
+        if shear[0] > 3.5e-4:
+            raise InvalidInput("fractalcontact.joints.closure", ["shear: too far"])
+        return closure(crack, shear=shear, **options)
+
+    monkeypatch.setattr(fc.joints, "closure", functools.update_wrapper(fail_late, closure))
+    with pytest.raises(InvalidInput, match="too far"):
+        fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert len(list((tmp_path / "out" / ".stages").glob("joints.closure.*"))) == 3
