@@ -352,10 +352,11 @@ def _proportional_line(ax: Axes, x: Any, y: Any) -> list[Any]:
     used = (x > 0) & (y > 0)
     if not used.any():
         return []
-    ends = np.array([x[used].min(), x[used].max()])
+    slope = np.exp(np.median(np.log(y[used] / x[used])))
+    ends = np.array([x[used].min(), min(x[used].max(), y[used].max() / slope)])  # within the curves
     style: dict[str, Any] = {"ls": ":", "lw": 1.0, "color": _style.grey()}
     name = "proportional\nto the load"
-    ax.plot(ends, ends * np.exp(np.median(np.log(y[used] / x[used]))), label=name, **style)
+    ax.plot(ends, ends * slope, label=name, **style)
     return [_style.legend_line(name, **style)]
 
 

@@ -122,6 +122,7 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
         entries.append(_style.legend_line(method, **style))
     if data.sizes["shear"] > 1 and float(data["shear"].min()) > 0:
         ax.set_xscale("log")
+    _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data["shear"]), along)
     ax.set_ylabel("dimension of the delta-surface")
     _style.side_legend(ax, entries, title="method")

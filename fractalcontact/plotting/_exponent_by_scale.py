@@ -74,6 +74,7 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     for limit in (0.0, 1.0):
         ax.axhline(limit, color=_style.grey(), lw=0.7, ls=":")
     ax.set_xscale("log")
+    _style.plain_ticks(ax)
     ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
     label_axis(ax.xaxis, name_of(data["wavelength"]), along)
     ax.set_ylabel("Hurst exponent")

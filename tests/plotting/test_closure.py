@@ -150,3 +150,14 @@ def test_letters_do_not_overlap(closed, factor):
     centres = np.array([[box.x0 + box.x1, box.y0 + box.y1] for box in boxes]) / 2
     apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[np.triu_indices(len(boxes), 1)]
     assert apart.min() > 0.7 * boxes[0].width
+
+
+def test_line_of_proportional_growth_ends_with_the_curves():
+    loads = np.geomspace(1.0, 1e4, 9)
+    fraction = np.minimum(1e-2 * loads, 1.0)
+    loading = {"nominal_pressure": ("step", 1e6 * loads)}
+    pressed = xr.Dataset({"contact_fraction": ("step", fraction)}, loading)
+    ax = plotting.contact_area(pressed, against="nominal_pressure", log=True)
+    (line,) = [line for line in ax.lines if line.get_label().startswith("proportional")]
+    assert line.get_ydata().max() == pytest.approx(100.0)
+    assert line.get_xdata().max() == pytest.approx(0.1)  # GPa

@@ -53,6 +53,17 @@ def test_delta_dimension_curves():
     assert ax.get_xscale() == "log"
 
 
+def test_labels_of_shears_stay_apart():
+    result = delta_dimensions()
+    shear = np.geomspace(3e-4, 6e-3, result.sizes["shear"])
+    ax = plotting.delta_dimension(result.assign_coords(shear=("shear", shear)))
+    ax.figure.draw_without_rendering()
+    labels = ax.get_xticklabels(which="both")
+    boxes = [label.get_window_extent() for label in labels if label.get_text()]
+    assert len(boxes) >= 2
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+
+
 def test_nan_and_single_shear():
     for result, draw in (
         (decorrelation(), plotting.correlation),

@@ -45,8 +45,8 @@ for name, result in results.items():
     angle = np.radians(np.concatenate([result.azimuth, result.azimuth + 180.0, result.azimuth[:1]]))
     for ax, quantity in ((left, result.rms_increment * 1e6), (right, result.hurst)):
         ax.plot(angle, np.concatenate([quantity, quantity, quantity[:1]]), marker="o", ms=3, label=name)
-left.set_title("rms increment over 40 µm (µm)", fontsize=9, pad=18)
-right.set_title("Hurst exponent", fontsize=9, pad=18)
+left.set_title("rms increment over 40 µm (µm)", fontsize=9, pad=28)
+right.set_title("Hurst exponent", fontsize=9, pad=28)
 left.set_yticks([1, 2, 3])
 right.set_yticks([0.5, 1])
 right.legend(frameon=False, bbox_to_anchor=(1.05, 1.0), loc="upper left")
