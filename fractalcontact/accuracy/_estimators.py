@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy.ndimage import gaussian_filter
+from scipy.special import zeta
 from scipy.stats import binomtest, chi2
 
 from fractalcontact import dimensions, surfaces
@@ -34,6 +35,8 @@ REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1
 SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
 FAMILIES = {
     "fbm": "exact fractional Brownian surface",
+    "crop": "free part of a periodic surface of twice the edge, power law down to the spacing, no aliases",
+    "profile": "exact fractional Brownian profile",
     "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
 }
 SPACING, HEIGHT = 1e-4, 1e-6  # m
@@ -118,14 +121,15 @@ def estimators(
         Points along an edge, at least 16.
     families : str or sequence of str
         "fbm": exact fractional Brownian surfaces; "spectral": periodic ones, a power law from the extent down
-        to 4 spacings. A method that is right on one of them may be wrong on the other.
+        to 4 spacings; "crop": a free quarter of periodic ones, a power law down to the spacing; "profile":
+        exact fractional Brownian profiles. A method that is right on one of them may be wrong on another.
     methods : str or sequence of str, optional
         Out of `fractalcontact.dimensions.methods()`. Default: all of them.
     members : int or sequence of int, optional
         Surfaces for each exponent and family, one number or one for each size. Default: 25600 over the size
         (400, 100 and 25), which gives a coverage of 95 % to within 1, 2 and 4 %.
     blur : float
-        Spread, in spacings, of a Gaussian filter of the "fbm" surfaces, which goes on beyond their edges.
+        Spread, in spacings, of a Gaussian filter of the free surfaces, which goes on beyond their edges.
     noise : float
         Rms height of white noise added to them, over the rms increment before the blur.
     marks : float
@@ -197,6 +201,10 @@ def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[i
 def _bound(family: str, hurst: float, n: int, blur: float = 0.0) -> float:
     if family == "fbm":
         return brownian_bound(hurst, n, blur)
+    if family == "crop":
+        return brownian_bound(hurst, n, blur, aliases=False)
+    if family == "profile":
+        return brownian_bound(hurst, n, blur, axes=1)
     return band_bound((n, n), SHORTEST, float(n))
 
 
@@ -204,23 +212,38 @@ def _surfaces(
     family: str, hurst: float, n: int, count: int, defects: dict[str, float], stream: np.random.Generator
 ) -> xr.DataArray:
     options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
-    if family == "fbm":
-        margin = int(np.ceil(5.0 * defects["blur"]))
-        wide = n + 2 * margin, n + 2 * margin
+    if family == "spectral":
+        cutoff = SHORTEST * SPACING
+        return surfaces.spectral((n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
+    margin = int(np.ceil(5.0 * defects["blur"]))
+    wide = (n + 2 * margin,) * (1 if family == "profile" else 2)
+    if family == "crop":
+        periodic = surfaces.spectral((2 * n + 2 * margin,) * 2, SPACING, rms_height=HEIGHT, **options)
+        steps = np.diff(periodic.values, axis=-1)
+        result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide[0]), x=slice(wide[1]))
+        result = surfaces.from_array(result.values, SPACING)
+    else:
         result = surfaces.fbm(wide, SPACING, rms_increment=HEIGHT, **options)
-        if margin:
-            spread = (0.0, defects["blur"], defects["blur"])
-            result = result.copy(data=gaussian_filter(result.values, spread))
-        result = result.isel(y=slice(margin, margin + n), x=slice(margin, margin + n))
-        if defects["noise"]:
-            scatter = stream.standard_normal(result.shape)
-            result = result + defects["noise"] * HEIGHT * scatter
-        if defects["marks"]:
-            waves = 2.0 * np.pi / MARK * (np.cos(MARK_ANGLE) * result.x + np.sin(MARK_ANGLE) * result.y)
-            result = result + defects["marks"] * HEIGHT * np.cos(waves / SPACING).transpose("y", "x")
-        return result
-    cutoff = SHORTEST * SPACING
-    return surfaces.spectral((n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
+    return _with_defects(result, n, margin, defects, stream)
+
+
+def _with_defects(
+    surface: xr.DataArray, n: int, margin: int, defects: dict[str, float], stream: np.random.Generator
+) -> xr.DataArray:
+    """Blur surfaces, remove their margin, and add noise and marks."""
+    result = surface
+    if margin:
+        spread = (0.0, *[defects["blur"]] * (result.ndim - 1))
+        result = result.copy(data=gaussian_filter(result.values, spread))
+    result = result.isel({axis: slice(margin, margin + n) for axis in result.dims[1:]})
+    if defects["noise"]:
+        scatter = stream.standard_normal(result.shape)
+        result = result + defects["noise"] * HEIGHT * scatter
+    if defects["marks"]:
+        along = np.cos(MARK_ANGLE) * result.x + (np.sin(MARK_ANGLE) * result.y if "y" in result.dims else 0.0)
+        waves = np.cos(2.0 * np.pi / MARK / SPACING * along).transpose(*result.dims[1:])
+        result = result + defects["marks"] * HEIGHT * waves
+    return result
 
 
 def _sample(
@@ -351,26 +374,37 @@ BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane
 BOUND_STEP = 1e-4  # of the derivative by H
 
 
-def brownian_bound(hurst: float, n: int, blur: float = 0.0) -> float:
-    """Return the bound for n x n points of a fractional Brownian surface of unknown amplitude.
+def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, aliases: bool = True) -> float:
+    """Return the bound for n points along each axis of fractional Brownian heights of unknown amplitude.
 
-    Whittle's information gives sqrt(2 / var(d ln f / dH)) / n for large n: f is the spectral density as
-    sampled, with all its aliases, and the variance is over all wavevectors of the grid. At H near 1 a small
-    surface does better by up to a fifth, because no exponent beyond 1 is allowed there. With a Gaussian blur
-    of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer function is
-    above one half.
+    Whittle's information gives sqrt(2 / var(d ln f / dH)) / n of a surface for large n: f is the spectral
+    density as sampled, with all its aliases, and the variance is over all wavevectors of the grid. At H near
+    1 a small surface does better by up to a fifth, because no exponent beyond 1 is allowed there. With a
+    Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer
+    function is above one half. Without `aliases` the density is the power law itself.
     """
+    density = aliased_density if axes == 2 else profile_density
     low, high = max(hurst - BOUND_STEP, 1e-6), hurst + BOUND_STEP
-    slope = (np.log(aliased_density(high)) - np.log(aliased_density(low))) / (high - low)
+    slope = (np.log(density(high)) - np.log(density(low))) / (high - low)
     w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
-    inside = blur**2 * (w[:, None] ** 2 + w**2) < np.log(2.0)
-    return float(np.sqrt(2.0 / (np.var(slope[inside]) * inside.mean())) / n)
+    squares = w[:, None] ** 2 + w**2 if axes == 2 else w**2
+    if not aliases:
+        slope = -np.log(squares)
+    inside = blur**2 * squares < np.log(2.0)
+    return float(np.sqrt(2.0 / (np.var(slope[inside]) * inside.mean() * n**axes)))
 
 
 def aliased_density(hurst: float) -> Array:
     """Return the spectral density of the sampled surface on a quarter of its wavevectors."""
     w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
     return aliased_power_law((w[:, None], w), hurst)
+
+
+def profile_density(hurst: float) -> Array:
+    """Return the spectral density of the sampled profile: the sum of |w + 2 pi k|^(-1 - 2 hurst)."""
+    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS / 2.0
+    power = 1.0 + 2.0 * hurst
+    return np.asarray(zeta(power, w) + zeta(power, 1.0 - w))
 
 
 def band_bound(shape: tuple[int, int], low: float, high: float) -> float:
