@@ -239,12 +239,12 @@ def free_blocks(heights: Array, spacing: tuple[float, ...]) -> Blocks:
     power = (
         _cosine_modes.mode_power(heights) if heights.ndim == 2 else _mode_blocks.profile_modes(heights) ** 2
     )
-    return frame_blocks(power, frame)
+    return frame_blocks(frame.mean(power), frame)
 
 
-def frame_blocks(power: Array, frame: Frame) -> Blocks:
-    """Return the blocks of squared modes."""
-    return Blocks(frame.mean(power), frame.count, 2.0 * np.pi / np.sqrt(frame.squares), frame, frame.axes)
+def frame_blocks(means: Array, frame: Frame) -> Blocks:
+    """Return the blocks of a frame with the mean squares of their modes."""
+    return Blocks(means, frame.count, 2.0 * np.pi / np.sqrt(frame.squares), frame, frame.axes)
 
 
 def _periodic(surface: Surface) -> tuple[Array, Array, Array]:

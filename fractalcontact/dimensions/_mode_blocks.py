@@ -327,14 +327,13 @@ class BlockModes:
     gapped: None = None
 
     @classmethod
-    def of(cls, heights: Array, spacing: tuple[float, float], scales: Scales) -> BlockModes:
-        """Transform a surface; `scales` is a window of wavelengths in spacings of x."""
-        from fractalcontact.dimensions._cosine_modes import Lattice, expected_power, mode_power
+    def of(cls, power: Array, spacing: tuple[float, float], scales: Scales) -> BlockModes:
+        """Collect squared modes, which are overwritten; `scales` is a window of wavelengths in x spacings."""
+        from fractalcontact.dimensions._cosine_modes import Lattice, expected_power
 
-        ny, nx = heights.shape
+        ny, nx = (n + 1 for n in power.shape)
         starts = _starts(ny, 1), _starts(nx, 1)
         centres = [(s[:-1] + s[1:] - 1) // 2 for s in starts]
-        power = mode_power(heights)
         least = 1e-12 * float(power.mean())
         means, logs = (
             _sums(values, starts) for values in (power, np.log(np.maximum(power, least, out=power)))

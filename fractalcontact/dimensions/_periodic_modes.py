@@ -14,7 +14,6 @@ import numpy as np
 
 from fractalcontact.base.spectra import half_wavenumbers, periodogram, radial_wavenumber
 from fractalcontact.dimensions import _whittle
-from fractalcontact.dimensions._profile_likelihood import QUANTILE, crossing, minimum
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -216,18 +215,18 @@ def fit_rolloff(modes: PeriodicModes) -> RolloffFit:
     def deviance(hurst: float) -> float:
         return float(likelihood.deviances(hurst).min())
 
-    hurst = minimum(deviance, _LOWEST, _HIGHEST, points=_POINTS)
+    hurst = _whittle.minimum(deviance, _LOWEST, _HIGHEST, points=_POINTS)
     least = deviance(hurst)
 
     def interval(rise: float) -> tuple[float, float]:
         """Return where the deviance has risen by `rise`."""
         low, high = (
-            crossing(lambda h: deviance(h) - least - rise, hurst, limit, limit)
+            _whittle.crossing(lambda h: deviance(h) - least - rise, hurst, limit, limit)
             for limit in (_LOWEST, _HIGHEST)
         )
         return low, high
 
-    inner, outer = interval(1.0), interval(QUANTILE)
+    inner, outer = interval(1.0), interval(_whittle.QUANTILE)
     corner = int(np.argmin(likelihood.deviances(hurst)))
     return RolloffFit(hurst, 0.5 * (inner[1] - inner[0]), *outer, float(modes.wavenumber[corner]))
 

@@ -9,21 +9,137 @@ variogram, whatever the gaps. A tilt of the profile is a mean proportional to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
+from fractalcontact.dimensions import _mode_blocks
+from fractalcontact.dimensions._blur import (
+    BLURRED_WINDOW,
+    blurred_estimate,
+    chosen_blocks,
+    fit_blurred,
+    is_seen,
+)
+from fractalcontact.dimensions._exponent_by_scale import (
+    frame_blocks,
+    longest_run,
+    octaves,
+    run_estimate,
+    several_exponents,
+)
+from fractalcontact.dimensions._heterogeneity import heterogeneity
+from fractalcontact.dimensions._increment_moments import increment_moments
+from fractalcontact.dimensions._increments import closed_form
+from fractalcontact.dimensions._mode_blocks import LOWEST
+from fractalcontact.dimensions._quantisation import rounding_note
+from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
+from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 CHUNK = 256
 SMALLEST = 8  # observed points
-QUANTILE = 3.841458820694124  # 95 % quantile of chi square with one degree of freedom
 _LOWEST, _HIGHEST = 1e-3, 0.999
 _AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smoother than fractal ones
 _SMOOTHEST = 1.9
 _TILT = 20.0  # variance of a random tilt that is eliminated, in units of the largest covariance of increments
 _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
+_WEAK = 2.0  # decrease of the penalised deviance from which blur and noise may widen the interval
+_LEAST_POINTS = 64  # of a profile whose blur is looked for
+_LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
+_SINGLE = 0.9  # share of the power beyond the longest that these may hold
+
+
+def profile_likelihood(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
+    """Fit a profile with its exact likelihood, or with that of its modes where it is blurred."""
+    heights, dx = surface.heights[0], surface.spacing[1]
+    weak = np.nan, np.nan
+    if np.isfinite(heights).all() and heights.size >= _LEAST_POINTS and not surface.finest_scale:
+        estimate, weak = _profile_modes(surface, scales, noise, spread)
+        if estimate is not None:
+            return estimate
+    stride = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
+    heights = heights[::stride]
+    longest = CHUNK if scales is None else int(scales[1] / (dx * stride) * (1 + 1e-9)) + 1
+    chunk = min(longest, CHUNK, int(np.isfinite(heights).sum()))
+    if chunk < SMALLEST:
+        return undefined(f"{chunk} points, at least {SMALLEST} are needed")
+    fit = fit_profile(heights, noise=noise, chunk=chunk)
+    window: dict[str, Any] = {
+        "scale_min": stride * dx,
+        "scale_max": (chunk - 1) * stride * dx,
+        "window": "exact likelihood of all increments" if scales is None else ASKED,
+    }
+    if fit.low > 1.0:
+        return Estimate(fit.hurst, ci_low=fit.low, ci_high=fit.high, **window)
+    moments = increment_moments([(heights[None], 1)], (heights.size,))
+    blocks = heterogeneity(moments, (1.0,), fit.hurst)
+    low, high = blocks.widened(fit.hurst, fit.low, fit.high)
+    low, high = float(np.fmin(low, weak[0])), float(np.fmax(high, weak[1]))
+    noise_note = ""
+    if not noise:
+        low, high, noise_note = closed_form(moments, (1.0,)).widened_for_noise(low, high)
+    rounding = "" if noise else rounding_note(heights[None], fit.standard_error)
+    if rounding:
+        with_noise = fit_profile(heights, noise=True, chunk=chunk)
+        low, high = min(low, with_noise.low), max(high, with_noise.high)
+    return Estimate(
+        fit.hurst,
+        fit.standard_error * blocks.widening,
+        low,
+        high,
+        rms_increment=fit.rms_increment * float(stride) ** -fit.hurst * surface.unit,
+        noise_height=float(np.sqrt(fit.noise)) * surface.unit if noise else np.nan,
+        note=joined(noise_note, blocks.note, rounding),
+        **window,
+    )
+
+
+def _profile_modes(
+    surface: Surface, scales: Scales, noise: bool, spread: float | None
+) -> tuple[Estimate | None, tuple[float, float]]:
+    """Return the estimate of a profile that is no fractional Brownian one, by its modes; None if it is one.
+
+    The second result is an interval that allows for weak blur or noise; NaN where the modes show none.
+    """
+    heights, dx, none = surface.heights[0], surface.spacing[1], (np.nan, np.nan)
+    frame = _mode_blocks.frame((heights.size,), (1.0,))
+    modes = _mode_blocks.profile_modes(heights) ** 2
+    if (share := _largest_share(modes)) > _SINGLE:
+        reason = f"a single wave holds {100.0 * share:.0f} % of the shorter waves: no fractal"
+        return undefined(reason), none
+    blocks = frame_blocks(frame.mean(modes), frame)
+    fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=chosen_blocks(frame, surface, scales))
+    if fit is not None and is_seen(fit, surface.axes, spread):
+        if scales is None and spread is None and not noise:
+            several = several_exponents(fit, blocks, surface)
+            if several is not None:
+                return several, none
+        amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
+        estimate = blurred_estimate(fit, surface, amplitude / max(1.0 - fit.hurst, 1e-9))
+        longest = heights.size * dx if scales is None else scales[1]
+        window = BLURRED_WINDOW if scales is None else ASKED
+        return replace(estimate, scale_max=longest, window=window), none
+    record = octaves(blocks)
+    run = longest_run(record)
+    if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
+        return run_estimate(run, surface), none
+    if fit is None or noise or not (fit.is_good and fit.gain > _WEAK and fit.hurst < 1.0):
+        return None, none
+    return None, (max(fit.low, 0.0), min(fit.high, 1.0))
+
+
+def _largest_share(power: Array) -> float:
+    """Return the share of the shorter waves of a profile that one of them and its neighbours hold."""
+    shorter = power[_LONGEST_MODES:]
+    strongest = int(np.argmax(shorter))
+    if strongest < _NEIGHBOURS or not shorter[strongest] > 0.0:
+        return 0.0
+    inside = slice(strongest - _NEIGHBOURS, strongest + _NEIGHBOURS + 1)
+    return float(shorter[inside].sum() / shorter.sum())
 
 
 @dataclass(frozen=True)
@@ -167,25 +283,3 @@ def _covariance(positions: Array, hurst: float, noise: float) -> Array:
     return np.ascontiguousarray(
         heights[:, 1:, 1:] - heights[:, 1:, :-1] - heights[:, :-1, 1:] + heights[:, :-1, :-1]
     )
-
-
-def minimum(
-    function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5, points: int = 9
-) -> float:
-    """Return where a function of one variable, which may have several minima, is least."""
-    from scipy.optimize import minimize_scalar
-
-    # a coarse grid first: the bounded search alone may end in a local minimum
-    grid = np.linspace(low, high, points)
-    k = int(np.argmin([function(g) for g in grid]))
-    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, points - 1)])
-    return float(minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
-
-
-def crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
-    """Return where a function that is negative at `inside` vanishes; `beyond` if not up to the limit."""
-    from scipy.optimize import brentq
-
-    if function(limit) < 0:
-        return beyond
-    return float(brentq(function, inside, limit, xtol=1e-5))

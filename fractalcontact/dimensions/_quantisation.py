@@ -54,3 +54,9 @@ def quantisation_note(share: float, interval: str) -> str:
         f"heights are rounded to steps, which make {100.0 * min(share, 1.0):.2g} % of the mean square second "
         f"difference: the interval also holds {interval}"
     )
+
+
+def rounding_note(heights: Array, error: float) -> str:
+    """Return a note where the heights were rounded so coarsely that it matters; empty otherwise."""
+    share = quantisation(heights)[1]
+    return quantisation_note(share, "that of a fit with white noise") if share > 0.5 * error else ""

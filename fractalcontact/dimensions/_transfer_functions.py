@@ -8,7 +8,8 @@ whole points (`FILTER`), or with the Gaussian transfer function itself (`TRANSFE
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,11 +31,16 @@ _LEAST_LOG = -600.0  # logarithm of the smallest expected power
 
 
 class Window:
-    """Blocks of a window with what the models need of them."""
+    """Blocks of a window with what the models need of them.
+
+    `edges` is the power of the jump of the slope at the edges, over that of the surface, by blocks of the
+    frame.
+    """
 
     def __init__(self, frame: Frame, inside: Array, power: Array, edges: Array | None = None) -> None:
         self.frame, self.inside = frame, inside
         self.count, self.power = frame.count[inside], power[inside]
+        self.number = float(self.count.sum())
         self.logs, self.squares = frame.logs[:, inside], frame.squares[inside]
         self.edges = None if edges is None else np.log1p(edges[inside])
         self._parts: dict[str, Array] = {}
@@ -44,6 +50,18 @@ class Window:
         if name not in self._parts:
             self._parts[name] = getattr(self.frame, name)[..., self.inside]
         return self._parts[name]
+
+    @cached_property
+    def lines(self) -> list[tuple[Array, Array]]:
+        """Wavenumbers along each axis, in radian per spacing, and the place of each block among them."""
+        pairs = (np.unique(w[self.inside], return_inverse=True) for w in self.frame.waves)
+        return [(w * d, index) for (w, index), d in zip(pairs, self.frame.spacing, strict=True)]
+
+    @cached_property
+    def widths(self) -> tuple[Array, Array]:
+        """Variances of the wavenumber in each block: see `Frame.variances`."""
+        plain, weighted = self.frame.variances
+        return plain[self.inside], weighted[self.inside]
 
     def signal(self, form: str, hurst: float, square: float) -> tuple[Array, Array, Array]:
         """Return the expected power without noise, and the derivatives of its logarithm by H and `square`."""
@@ -71,7 +89,7 @@ class Window:
 
         To second order in the width of the block: the mean of q^(-2 H - axes) exp(-square q^2).
         """
-        plain, weighted = (part[self.inside] for part in self.frame.variances)
+        plain, weighted = self.widths
         slope = 2.0 * (2.0 * hurst + self.frame.axes) * weighted / self.squares - plain
         mean = square * slope + 2.0 * square**2 * weighted
         return mean, 4.0 * square * weighted / self.squares, slope + 4.0 * square * weighted
@@ -94,15 +112,14 @@ class Window:
         total = np.maximum(total, np.exp(_LEAST_LOG))  # 0 for waves that the blur has removed
         return np.log(total), by_hurst / total, by_square / total
 
-    def _lattice_filter(self, square: float) -> Iterable[tuple[Array, Array]]:
+    def _lattice_filter(self, square: float) -> Iterator[tuple[Array, Array]]:
         """Yield the logarithm of the squared transfer function along each axis, and its derivative."""
-        for waves, spacing in zip(self.frame.waves, self.frame.spacing, strict=True):
-            lines, index = np.unique(waves[self.inside], return_inverse=True)
+        for (lines, index), spacing in zip(self.lines, self.frame.spacing, strict=True):
             variance = max(square, 1e-3) / spacing**2
             k = np.arange(1, int(4.0 * np.sqrt(variance) + 8.5))
             weights = np.exp(-k * k / (2.0 * variance))
             rates = weights * k * k / (2.0 * variance**2)
-            cosines = np.cos(np.outer(lines * spacing, k))
+            cosines = np.cos(np.outer(lines, k))
             total, total_rate = 1.0 + 2.0 * weights.sum(), 2.0 * rates.sum()
             transfer = (1.0 + 2.0 * cosines @ weights) / total
             rate = (2.0 * cosines @ rates - transfer * total_rate) / total
@@ -130,3 +147,8 @@ def edge_power(frame: Frame, hurst: float, square: float) -> Array:
         slopes = np.trapezoid(p**2 * radius**-power * np.exp(-square * radius), p, axis=1) / np.pi
         total += 4.0 * slopes[index] / (n * d * across**4) * -np.expm1(-square * across**2)
     return np.asarray(total / signal)
+
+
+def plain_power(frame: Frame, hurst: float) -> Array:
+    """Return the expected power of the surface before the blur."""
+    return np.asarray(np.exp(node_weights(hurst)[0] @ frame.logs))

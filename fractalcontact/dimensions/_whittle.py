@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fractalcontact.dimensions._records import NORMAL, SIGNIFICANT, Estimate, normal_interval
+from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, normal_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Model = Callable[[float], Array]
@@ -28,7 +28,7 @@ _LARGEST_NODE = 1.97
 _WIDTH = 0.06  # half the distance of the nodes, in ln H: the interpolation error is then 1e-5
 _WIDE = 0.24  # the same while the search is far from its end
 _ROUNDS, _STEPS = 40, 60
-_PENALTY, _LEVELS = 1.0, 9  # deviance that weak noise costs, and levels of noise tried
+QUANTILE = 3.841458820694124  # 95 % quantile of chi square with one degree of freedom
 UNEVEN = 4.0  # -z of the scatter of the modes beyond which the interval is widened
 
 # mean logarithm of a squared mode over its expected power, and the variance left once the mean is known
@@ -93,28 +93,6 @@ def fit_interval(
         )
     low, high = interval
     return result, Estimate(result.hurst, error, low, high, misfit=result.misfit, note="; ".join(notes))
-
-
-def allowing_noise(
-    interval: tuple[float, float], power: Array, fit: WhittleFit, largest: float, weights: Array | None = None
-) -> tuple[float, float]:
-    """Widen the interval of a fit without noise by the exponents that go with weak noise.
-
-    The deviance of a fit with noise of power 0 to `largest` follows from one scoring step. Noise costs a
-    penalty of one, so that surfaces without noise have nearly the interval of their own.
-    """
-    columns = np.stack([*fit.columns, 1.0 / fit.total])
-    halves = 0.5 * columns if weights is None else 0.5 * weights * columns
-    inverse = _inverse(halves @ columns.T)
-    step = inverse @ (halves @ (power / (fit.amplitude * fit.total) - 1.0))
-    if not inverse[2, 2] > 0.0:
-        return interval
-    noise = np.linspace(0.0, largest / fit.amplitude, _LEVELS)
-    excess = ((step[2] - noise) ** 2 - step[2] ** 2) / inverse[2, 2] + _PENALTY
-    left = NORMAL**2 - np.maximum(excess, 0.0)
-    hurst = (fit.hurst + inverse[1, 2] / inverse[2, 2] * noise)[left > 0.0]
-    half = fit.standard_error * np.sqrt(left[left > 0.0])
-    return float(np.min([*hurst - half, interval[0]])), float(np.max([*hurst + half, interval[1]]))
 
 
 def holding_sectors(interval: tuple[float, float], modes: Modes, start: float) -> tuple[float, float]:
@@ -291,7 +269,7 @@ def fit_power(
         columns=columns,
         bread=(half_weights * columns) @ means.T,
         total=total,
-        misfit=_misfit(columns, power / (amplitude * total) - means[0], half_weights),
+        misfit=misfit(columns, power / (amplitude * total) - means[0], half_weights),
         converged=converged,
     )
 
@@ -340,7 +318,7 @@ def _amplitude(power: Array, total: Array, means: Array, half_weights: float | A
     return float(np.sum(half_weights * (power / total)) / np.sum(half_weights * means[0]))
 
 
-def _misfit(columns: Array, residual: Array, half_weights: float | Array) -> float:
+def misfit(columns: Array, residual: Array, half_weights: float | Array) -> float:
     """Return z of the score of a change of H with scale, orthogonal to the fitted parameters."""
     bend = columns[1] ** 2
     bend = bend - columns.T @ (
@@ -354,3 +332,25 @@ def _inverse(information: Array) -> Array:
     """Invert a symmetric matrix whose columns have very different scales."""
     scale = 1.0 / np.sqrt(np.diag(information))
     return np.asarray(np.linalg.pinv(information * np.outer(scale, scale)) * np.outer(scale, scale))
+
+
+def minimum(
+    function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-5, points: int = 9
+) -> float:
+    """Return where a function of one variable, which may have several minima, is least."""
+    from scipy.optimize import minimize_scalar
+
+    # a coarse grid first: the bounded search alone may end in a local minimum
+    grid = np.linspace(low, high, points)
+    k = int(np.argmin([function(g) for g in grid]))
+    bounds = (grid[max(k - 1, 0)], grid[min(k + 1, points - 1)])
+    return float(minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
+
+
+def crossing(function: Callable[[float], float], inside: float, limit: float, beyond: float) -> float:
+    """Return where a function that is negative at `inside` vanishes; `beyond` if not up to the limit."""
+    from scipy.optimize import brentq
+
+    if function(limit) < 0:
+        return beyond
+    return float(brentq(function, inside, limit, xtol=1e-5))
