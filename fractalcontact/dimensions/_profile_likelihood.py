@@ -47,7 +47,6 @@ _AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smooth
 _SMOOTHEST = 1.9
 _TILT = 20.0  # variance of a random tilt that is eliminated, in units of the largest covariance of increments
 _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
-_WEAK = 2.0  # decrease of the penalised deviance from which blur and noise may widen the interval
 _LEAST_POINTS = 64  # of a profile whose blur is looked for
 _LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
 _SINGLE = 0.9  # share of the power beyond the longest that these may hold
@@ -127,7 +126,7 @@ def _profile_modes(
     run = longest_run(record)
     if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
         return run_estimate(run, surface), none
-    if fit is None or noise or not (fit.is_good and fit.gain > _WEAK and fit.hurst < 1.0):
+    if fit is None or noise or not (fit.is_good and fit.hurst < 1.0):
         return None, none
     return None, (max(fit.low, 0.0), min(fit.high, 1.0))
 
