@@ -92,6 +92,22 @@ def test_wrong_arguments_are_all_named():
         assert word in str(caught.value)
 
 
+@pytest.mark.parametrize(("family", "n"), [("crop", 48), ("profile", 256)])
+def test_blurred_and_noisy_members_of_a_family(family, n):
+    """Blur of a whole spacing is in the model: the interval is that of the longer waves."""
+    options = {"methods": "likelihood", "members": 12, "noise": 0.02, "rng": 3}
+    sharp, wide = (fc.accuracy.estimators(0.5, n, family, blur=b, **options).squeeze() for b in (0.0, 1.0))
+    assert wide["least_error"] > 1.5 * sharp["least_error"]
+    assert abs(sharp["bias"]) < 0.1
+    assert abs(wide["bias"]) < 0.2
+    assert min(sharp["interval_coverage"], wide["interval_coverage"]) > 0.7
+
+
+def test_marks_of_a_profile_are_removed():
+    table = fc.accuracy.estimators(0.5, 512, "profile", "likelihood", members=6, marks=3.0, rng=3).squeeze()
+    assert abs(table["bias"].item()) < 0.15
+
+
 CASES = {"hurst": (0.3, 0.7), "sizes": (16, 20), "families": "fbm", "methods": "increments", "members": 4}
 
 
