@@ -301,7 +301,7 @@ class _Instrument:
         fit = fit_blurred(power, frame)
         if fit is None or not (fit.is_good and fit.gain > _GAIN and fit.hurst < 1.0):
             return None
-        if several_exponents(fit, frame_blocks(power, frame), surface) is not None:
+        if several_exponents(fit, frame_blocks(frame.mean(power), frame), surface) is not None:
             return None
         every = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
         sharp, blurred = (every.signal(form, fit.hurst, fit.spread**2)[0] for form in (NONE, fit.form))

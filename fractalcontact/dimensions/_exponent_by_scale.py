@@ -35,6 +35,7 @@ _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may
 _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two exponents
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
+_UNDECIDED = 5.4  # its decrease up to which the interval holds blur and noise as well: 1.4 times 3.84
 _LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 _NAMES = (
@@ -440,7 +441,15 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
     gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
-    return run_estimate(run, surface) if gain < (_SHORTENED if is_shortened else -_DECISIVE) else None
+    if gain >= (_SHORTENED if is_shortened else -_DECISIVE):
+        return None
+    estimate = run_estimate(run, surface)
+    if not (fit.is_good and gain > -_UNDECIDED):
+        return estimate
+    low = fit.low if fit.low > LOWEST else 0.0
+    note = joined(estimate.note, _OR_NOISE)
+    ends = min(estimate.ci_low, low), max(estimate.ci_high, fit.high)
+    return replace(estimate, ci_low=ends[0], ci_high=ends[1], note=note)
 
 
 def alternatives(fit: BlurredFit, blocks: Blocks, *, is_bent: bool) -> tuple[float, float]:
