@@ -76,7 +76,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
         polar.plot(np.radians(azimuth[order]), angle(data[name].values[order]), label=label, **style)
     greatest = float(np.nan_to_num([float(angle(data[name].max())) for name in CURVES]).max())
     polar.set_ylim(0.0, 1.12 * greatest or 1.0)
-    rings = MaxNLocator(RINGS).tick_values(0.0, polar.get_ylim()[1])
+    rings = np.asarray(MaxNLocator(RINGS).tick_values(0.0, polar.get_ylim()[1]))
     polar.set_rticks(rings[(rings > 0) & (rings <= polar.get_ylim()[1])])
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
     polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))
