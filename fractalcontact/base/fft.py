@@ -65,7 +65,7 @@ def ifft(modes: Array) -> Array:
     """Undo the complex transform of the last axis."""
     if library() == "ducc0":
         return _along(_ducc0().c2c, modes, -1, np.empty_like(modes), forward=False, inorm=2)
-    return _scipy().ifft(modes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().ifft(modes, workers=_scipy_threads())  # type: ignore[no-any-return]
 
 
 def dct(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
@@ -77,7 +77,7 @@ def dct(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
     """
     if library() == "ducc0":
         return _axis_by_axis(_ducc0().dct, array, axes, type=transform_type)
-    return _scipy().dctn(array, type=transform_type, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().dctn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
 
 
 def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
@@ -87,7 +87,7 @@ def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
     """
     if library() == "ducc0":
         return _axis_by_axis(_ducc0().dst, array, axes, type=transform_type)
-    return _scipy().dstn(array, type=transform_type, axes=axes, workers=thread_count())  # type: ignore[no-any-return]
+    return _scipy().dstn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
 
 
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
@@ -105,7 +105,7 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
         out[ny:] = 0
         _along(_ducc0().r2c, rows, 1, out[:ny])
         return _along(_ducc0().c2c, out, 0, out)
-    threads = thread_count()
+    threads = _scipy_threads()
     modes = _scipy().rfft(plane, n=padded[1], axis=1, workers=threads)
     return _scipy().fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
 
@@ -118,7 +118,7 @@ def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]
         rows = np.empty((ny, padded[1]), dtype=modes.real.dtype)
         _along(_ducc0().c2r, modes[:ny], 1, rows, lastsize=padded[1], forward=False, inorm=2)
         return np.ascontiguousarray(rows[:, :nx])
-    threads = thread_count()
+    threads = _scipy_threads()
     modes = _scipy().ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
     return np.ascontiguousarray(_scipy().irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx])
 
@@ -139,6 +139,18 @@ def _scipy() -> Any:
     import scipy.fft
 
     return scipy.fft
+
+
+@cache
+def _splits_groups() -> bool:
+    """Return whether SciPy has the transforms of ducc0 (from 1.18), whose threads change bits (`_along`)."""
+    import scipy
+
+    return tuple(map(int, scipy.__version__.split(".")[:2])) >= (1, 18)
+
+
+def _scipy_threads() -> int:
+    return 1 if _splits_groups() else thread_count()
 
 
 @cache
@@ -198,7 +210,7 @@ def _forward(array: Array, axes: tuple[int, ...], out: Array | None) -> Array:
             out = np.empty(shape, dtype=np.result_type(array.dtype, np.complex64))
         _along(_ducc0().r2c, array, -1, out)
         return _along(_ducc0().c2c, out, -2, out) if len(axes) == 2 else out
-    modes = _scipy().rfftn(array, axes=axes, workers=thread_count())
+    modes = _scipy().rfftn(array, axes=axes, workers=_scipy_threads())
     if out is None:
         return modes  # type: ignore[no-any-return]
     out[...] = modes
@@ -226,7 +238,7 @@ def _backward(
         if out is None:
             out = np.empty((*modes.shape[:-1], shape[-1]), dtype=modes.real.dtype)
         return _along(_ducc0().c2r, modes, -1, out, lastsize=shape[-1], forward=False, inorm=2)
-    plane = _scipy().irfftn(modes, s=shape, axes=axes, workers=thread_count(), overwrite_x=overwrite)
+    plane = _scipy().irfftn(modes, s=shape, axes=axes, workers=_scipy_threads(), overwrite_x=overwrite)
     if out is None:
         return plane  # type: ignore[no-any-return]
     out[...] = plane

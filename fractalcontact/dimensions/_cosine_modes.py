@@ -264,12 +264,18 @@ def _difference_covariance(lattice: Lattice, hurst: float) -> Array:
     squares = y2[:, None] + x2
     squares[0, 0] = 1.0
     share = y2[:, None] / squares
-    covariance = np.zeros(lattice.shape)
+    covariance, term = np.zeros(lattice.shape), np.empty(lattice.shape)
     for order in range(_DERIVATIVES, 1, -1):
-        covariance += np.polynomial.polynomial.polyval(share, _derivative(lattice.spacing, hurst, order))
+        *lower, highest = _derivative(lattice.spacing, hurst, order)
+        term.fill(highest)
+        for coefficient in reversed(lower):  # in place: `polyval` takes two more arrays of the plane
+            term *= share
+            term += coefficient
+        covariance += term
         covariance /= squares
     covariance /= squares
-    covariance *= squares**hurst
+    covariance *= np.power(squares, hurst, out=term)
+    del share, term
     near = [
         min(n, int(_NEAR * max(lattice.spacing) / d) + 1)
         for n, d in zip((ny, nx), lattice.spacing, strict=True)
