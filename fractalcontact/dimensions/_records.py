@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fractalcontact.base.units import quantity_text
+
 SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
 ASKED = "asked for"  # the window of scales
 CONSTANT = "a constant height has no Hurst exponent"
@@ -69,8 +71,8 @@ class Estimate:
         """
         excess = GRIDDING * (finest / self.scale_min) ** 2 if self.scale_min > 0 else np.nan
         text = (
-            f"gridded from points that resolve {finest:.3g} m: H may be too high by {excess:.2g}, which "
-            "the interval holds"
+            f"gridded from points that resolve waves from {quantity_text(finest, 'm')} on, eight point "
+            f"distances: H may be too high by {excess:.2g}, which the interval holds"
         )
         return replace(self, ci_low=self.ci_low - excess, note=joined(self.note, text))
 

@@ -211,6 +211,8 @@ def read(
         "file_sha256": digest,
         **content.entries,
     }
+    if not str(content.entries.get("gridding", "none")).startswith("none"):
+        surface.attrs["achieved_error"] = "between the points nothing was measured: see finest_scale"
     return surface
 
 
