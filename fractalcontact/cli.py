@@ -152,12 +152,22 @@ def _add_question(commands: Any, question: str, line: str) -> None:
     command = commands.add_parser(question, help=line)
     command.add_argument("scan", help="file of the surface: every format of fractalcontact.surfaces.read")
     if question == "joint":
-        command.add_argument("upper", help="file of the upper face, in the same frame")
+        command.add_argument(
+            "upper", help="file of the upper face: in the frame of the lower one, heights up, above it"
+        )
+        command.add_argument(
+            "--as-scanned", action="store_true", help="do not move the upper face into mated position"
+        )
     if question != "roughness":
         command.add_argument("--young", type=float, required=True, help="Young's modulus of both bodies, Pa")
         command.add_argument("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
+        command.add_argument(
+            "--despike", action="store_true", help="remove spikes of the scan before it is pressed"
+        )
     command.add_argument(
-        "--units", help="unit of the heights, and of the coordinates of points: m, mm, um ..."
+        "--units",
+        help="unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of the "
+        "file, else m)",
     )
     command.add_argument("--spacing", type=float, help="distance between the points, or of the cells, in m")
     command.add_argument(
@@ -178,7 +188,9 @@ def _answer(options: argparse.Namespace) -> int:
         folder = f"{scan.name.partition('.')[0]}_{options.question}"
     arguments = {"spacing": options.spacing, "units": options.units}
     if options.question != "roughness":
-        arguments |= {"young": options.young, "poisson": options.poisson}
+        arguments |= {"young": options.young, "poisson": options.poisson, "despike": options.despike}
+    if options.question == "joint":
+        arguments["register"] = not options.as_scanned
     place = "." if options.scene else folder
     upper = getattr(options, "upper", None)
     text = scenes.template(options.question, scan, upper, folder=place, **arguments)

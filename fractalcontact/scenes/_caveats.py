@@ -19,6 +19,10 @@ MEMBER = "member"
 ISOLATED = 0.05  # of the area: less is lost in the pressure beside it
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
 PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
+RARE = 1e-3  # fraction of the openings beyond the quantile that a spike is compared with
+SPIKE = 2.0  # distances from the mean to that quantile; a Gaussian opening of 1e6 points has 1.6
+STEEP_SPIKE = 5.0  # rms increments of the lower face: one is the error of a filled point
+LEAST_OPENINGS = 2000
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
 
@@ -33,17 +37,38 @@ def caveats(tree: xr.DataTree) -> list[str]:
     Returns
     -------
     list of str
-        One sentence each: islands of too few cells, at which loads; slopes beyond small strains; the true
-        pressure where no hardness limits it; strengths beyond that of the material; uplift that did not come
-        to balance. Empty where the results have no such limit.
+        One sentence each: a spike that holds two faces apart; islands of too few cells, at which loads;
+        slopes beyond small strains; the true pressure where no hardness limits it; strengths beyond that of
+        the material; uplift that did not come to balance. Empty where the results have no such limit.
     """
-    lines: list[str] = []
+    lines: list[str] = [*_spike(tree)]
     for path, surface in PRESSED.items():
         pressed = group_of(tree, path)
         if pressed is not None and "contact_fraction" in pressed:
             lines += [*_resolution(path, pressed), *_slopes(path, pressed, surface)]
             lines += _true_pressure(path, pressed, _material(tree))
     return [*lines, *_strength(tree), *_uplift(tree)]
+
+
+def _spike(tree: xr.DataTree) -> Iterator[str]:
+    """Yield that the faces touch first at points far below the other openings: spikes of a scan."""
+    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
+    if upper is None or lower is None or "height" not in upper or "height" not in lower:
+        return
+    openings = (upper["height"] - lower["height"]).values
+    openings = openings[np.isfinite(openings)]
+    if openings.size < LEAST_OPENINGS:
+        return
+    low, mean = np.quantile(openings, RARE), openings.mean()
+    increment = np.sqrt(np.nanmean(np.diff(lower["height"].values, axis=-1) ** 2))
+    if mean - openings.min() > max(SPIKE * (mean - low), STEEP_SPIKE * increment):
+        ends = [quantity_text(float(end), "m") for end in (openings.min(), low)]
+        yield (
+            f"joints/faces: the smallest opening, {ends[0]}, is far below the others, of which "
+            f"{100 * (1 - RARE):g} % are above {ends[1]}: probably a spike of a scan, which then carries the "
+            "load and holds the faces apart. To remove spikes: despike = true and fill = true in [surface] "
+            "and [upper], or --despike."
+        )
 
 
 def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:

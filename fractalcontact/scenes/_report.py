@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.results import provenance_of
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import Note, Part, Table, text_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
@@ -21,6 +22,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 Summary = list[list[Part]]  # sections of tables, remarks and lines
 
+WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 # symbol of ISO 25178 and variable of `surfaces.describe`
 ISO_25178 = {
@@ -39,6 +41,7 @@ ISO_25178 = {
     "Spk": "reduced_peak_height",
     "Svk": "reduced_valley_depth",
 }
+WATER = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight of water over its viscosity, at 20 °C
 FRACTIONS = frozenset({"contact_fraction", "corrected_contact_fraction"})
 
 
@@ -86,7 +89,7 @@ def summary_parts(tree: xr.DataTree) -> Summary:
         _surface_parameters(tree),
         _joint_roughness(tree),
         _contact(tree),
-        _mated_position(tree),
+        _position(tree),
         _closure(tree),
         _elimination(tree),
         _area_by_spacing(tree),
@@ -123,16 +126,31 @@ def _ensemble(members: int) -> list[Part]:
     return [f"ensemble of {members} members: mean ± standard deviation over the members"]
 
 
-def amount(data: Any, digits: int = 3) -> str:
-    """Return a value with its unit and SI prefix; of an ensemble mean and standard deviation."""
+def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
+    """Return a value with its unit and SI prefix; of an ensemble mean and standard deviation.
+
+    `scale` is that of a column, see `_column_scale`.
+    """
     name = str(data.name)
-    units = data.attrs.get("units") or QUANTITIES[name].units or ""
     if name in FRACTIONS:
         scale = Scale(0.01, "%")
-    else:
-        scale = scale_for(units, float(_finite(data).mean()) if _finite(data).size else np.nan)
+    elif scale is None:
+        scale = scale_for(_units_of(data), float(_finite(data).mean()) if _finite(data).size else np.nan)
     unit = f" {scale.unit}".rstrip()
     return _over_members(scale(data.values), lambda value: number(value, digits), _decimals_of, unit)
+
+
+def _units_of(data: Any) -> str:
+    return str(data.attrs.get("units") or QUANTITIES[str(data.name)].units or "")
+
+
+def _column_scale(data: Any) -> Scale | None:
+    """Return one unit for a column of a table; None, each value its own, where they span three decades."""
+    sizes = np.abs(_finite(data))
+    sizes = sizes[sizes > 0]
+    if sizes.size == 0 or sizes.max() >= WIDE_COLUMN * sizes.min():
+        return None
+    return scale_for(_units_of(data), float(np.median(sizes)))
 
 
 def plain(data: Any, decimals: int, *, sign: bool = False) -> str:
@@ -222,7 +240,25 @@ def _surface_parameters(tree: xr.DataTree) -> list[Part]:
             values = statistics[name]
             text = amount(values) if values.attrs.get("units") == "m" else plain(values, 3)
             rows.append((symbol, QUANTITIES[name].long_name, text))
-    return [Table(rows)]
+    return [Table(rows), *map(Note, _gridding(statistics))]
+
+
+def _gridding(statistics: xr.Dataset) -> Iterator[str]:
+    """Yield how a cloud of points became a surface: points, cells, and the plane below the heights."""
+    record: Any = provenance_of(statistics)
+    while isinstance(record, dict) and "point_distance" not in record:  # what was done to the surface later
+        record = record.get("parameters", {}).get("surface", {})
+        record = record.get("provenance") if isinstance(record, dict) else None
+    if not isinstance(record, dict) or not {"y", "x"} <= set(statistics.sizes):
+        return
+    spacing = length(float(statistics["x"][1] - statistics["x"][0]))
+    cells = " x ".join(str(statistics.sizes[dim]) for dim in ("y", "x"))
+    distance = length(record["point_distance"])
+    text = f"gridded from {record['points']} points, about {distance} apart, on {cells} cells of {spacing}"
+    if record.get("plane") == "best fit":
+        tilt = float(np.degrees(np.arccos(min(1.0, abs(record["rotation_matrix"][2][2])))))
+        text += f"; heights are above the best-fit plane of the points, tilted by {tilt:.3g}°"
+    yield text
 
 
 def _joint_roughness(tree: xr.DataTree) -> list[Part]:
@@ -244,6 +280,9 @@ def _joint_roughness(tree: xr.DataTree) -> list[Part]:
                 at = metric.isel(azimuth=int(place(metric.values)))
                 rows.append((word, f"{float(at['azimuth']):g}°", f"{float(at):.2f}°"))
             tables.append(Table(rows))
+            tables.append(
+                Note("Azimuths are from E (+x) anticlockwise; a compass bearing is 90° minus the azimuth.")
+            )
     return tables
 
 
@@ -255,27 +294,40 @@ def _contact(tree: xr.DataTree) -> list[Part]:
         ("step", "nominal pressure", "closure", "contact area", "area, perimeter-corrected")
     ]
     names = ("nominal_pressure", "closure", "contact_fraction", "corrected_contact_fraction")
+    scales = {name: _column_scale(contact[name]) for name in names}
     for step in range(contact.sizes["step"]):
         state = contact.isel(step=step)
-        rows.append((str(step), *(amount(state[name]) for name in names)))
+        rows.append((str(step), *(amount(state[name], scale=scales[name]) for name in names)))
     return [Table(rows)]
 
 
-def _mated_position(tree: xr.DataTree) -> list[Part]:
-    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
-    if upper is None or "mismatch" not in upper:
+def _position(tree: xr.DataTree) -> list[Part]:
+    """Return how two measured faces lie: mated or as scanned."""
+    upper = group_of(tree, "joints/faces")
+    if upper is None:
         return []
-    lines: list[Part] = [
-        f"mated position: shift {amount(upper['shift_x'])} along x and {amount(upper['shift_y'])} along y, "
-        f"rotation {amount(upper['rotation'])}",
-        f"mismatch {amount(upper['mismatch'])} rms, correlation {plain(upper['correlation'], 3)}",
-    ]
-    if lower is not None and "height" in lower:
-        aperture = upper["height"] - lower["height"]
-        lines.append(
-            f"aperture: mean {length(aperture.mean())}, smallest {length(aperture.min())} (negative: overlap)"
+    lines: list[Part] = []
+    if "mismatch" in upper:
+        lines = [
+            f"mated position: shift {amount(upper['shift_x'])} along x and {amount(upper['shift_y'])} "
+            f"along y, rotation {amount(upper['rotation'])}",
+            f"mismatch {amount(upper['mismatch'])} rms, correlation {plain(upper['correlation'], 3)}",
+        ]
+    return [*lines, *_openings(upper, group_of(tree, "surfaces"))]
+
+
+def _openings(upper: xr.Dataset, lower: xr.Dataset | None) -> Iterator[Part]:
+    """Yield the opening of the faces where they lie, and at first touch."""
+    if lower is None or "height" not in lower or "height" not in upper:
+        return
+    aperture = upper["height"] - lower["height"]
+    mean, smallest = float(aperture.mean()), float(aperture.min())
+    yield f"aperture: mean {length(mean)}, smallest {length(smallest)}"
+    if smallest < 0.0:
+        yield Note(
+            f"negative: the faces overlap. Rigid, they first touch with the upper one lifted by "
+            f"{length(-smallest)}, at a mean aperture of {length(mean - smallest)}"
         )
-    return lines
 
 
 def _closure(tree: xr.DataTree) -> list[Part]:
@@ -285,9 +337,19 @@ def _closure(tree: xr.DataTree) -> list[Part]:
     names = ("normal_force", "closure", "interface_closure", "contact_fraction", "corrected_contact_fraction")
     head = ("closure at shear", "normal force", "closure", "interface closure", "contact area")
     rows: list[tuple[str, ...]] = [(*head, "area, perimeter-corrected")]
-    for shear, state in _at_shears(closure.isel(step=-1)):
-        rows.append((shear, *(amount(state[name]) for name in names)))
-    return [Table(rows)]
+    last = closure.isel(step=-1)
+    scales = {name: _column_scale(last[name]) for name in names}
+    for shear, state in _at_shears(last):
+        rows.append((shear, *(amount(state[name], scale=scales[name]) for name in names)))
+    return [Table(rows), *map(Note, _last_pressure(last))]
+
+
+def _last_pressure(last: xr.Dataset) -> Iterator[str]:
+    """Yield the nominal pressure of the last step, where it is one for all shears."""
+    pressures = _finite(last["nominal_pressure"]) if "nominal_pressure" in last else np.zeros(0)
+    if pressures.size and float(np.ptp(pressures)) <= ROUNDING * float(np.abs(pressures).max()):
+        pressure = quantity_text(float(pressures[0]), "Pa")
+        yield f"at the last step of the load, {pressure} on the area of the block"
 
 
 def _elimination(tree: xr.DataTree) -> list[Part]:
@@ -363,10 +425,29 @@ def _leakage(tree: xr.DataTree) -> list[Part]:
     axes = [str(axis) for axis in flow["axis"].values]
     heads = [f"hydraulic, along {axis}" for axis in axes]
     rows: list[tuple[str, ...]] = [("aperture at shear", "normal force", "mean", *heads)]
-    for shear, state in _at_shears(flow.isel(step=-1)):
-        every = (amount(state["hydraulic_aperture"].sel(axis=axis)) for axis in axes)
-        rows.append((shear, amount(state["normal_force"]), amount(state["aperture"]), *every))
-    return [Table(rows)]
+    last = flow.isel(step=-1)
+    force, mean, hydraulic = (
+        _column_scale(last[name]) for name in ("normal_force", "aperture", "hydraulic_aperture")
+    )
+    for shear, state in _at_shears(last):
+        every = (amount(state["hydraulic_aperture"].sel(axis=axis), scale=hydraulic) for axis in axes)
+        load, gap = amount(state["normal_force"], scale=force), amount(state["aperture"], scale=mean)
+        rows.append((shear, load, gap, *every))
+    return [Table(rows), *map(Note, _transmissivity(last["transmissivity"]))]
+
+
+def _transmissivity(last: xr.DataArray) -> Iterator[str]:
+    """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
+    open_ones = _finite(last)[_finite(last) > 0]
+    if open_ones.size:
+        ends = (float(open_ones.min()), float(open_ones.max()))
+        cubes, water = (
+            " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, WATER)
+        )
+        yield (
+            f"transmissivity, the hydraulic aperture cubed over 12: {cubes} m³; times unit weight over "
+            f"viscosity, for water at 20 °C, {water} m²/s"
+        )
 
 
 def _uplift(tree: xr.DataTree) -> list[Part]:
@@ -438,8 +519,12 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     """Yield every shear as text with its results."""
     if "shear" not in data.coords:
         yield "", data
+    scale = _column_scale(data["shear"]) if "shear" in data.coords else None
     for shear in np.atleast_1d(data["shear"].values) if "shear" in data.coords else ():
-        yield length(shear), data.sel(shear=shear) if "shear" in data.dims else data
+        yield (
+            scale.text(shear) if scale else length(shear),
+            data.sel(shear=shear) if "shear" in data.dims else data,
+        )
 
 
 def _at_directions(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

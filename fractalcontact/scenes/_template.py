@@ -30,6 +30,8 @@ def template(
     young: float | None = None,
     poisson: float = 0.2,
     folder: str | os.PathLike[str] = ".",
+    despike: bool = False,
+    register: bool = True,
     **reading: Any,
 ) -> str:
     """Return a scene that answers a usual question to a measured surface.
@@ -45,6 +47,10 @@ def template(
         Young's modulus (Pa) and Poisson's ratio of both bodies, for "contact" and "joint".
     folder : path-like
         Folder of the scene; the files are named relative to it.
+    despike : bool
+        Remove spikes from the surfaces before they are pressed, see `fractalcontact.surfaces.despike`.
+    register : bool
+        Of a joint: move the upper face into mated position. False: leave the faces as they were scanned.
     **reading
         Arguments of `fractalcontact.surfaces.read` for both files: spacing, units, plane ...
 
@@ -81,21 +87,30 @@ def template(
             problems.require(Path(scan).is_file(), "scan", "an existing file", Path(scan).name)
         if question != "roughness":
             problems.number("young", young, above=0)
+            problems.boolean("despike", despike)
+            problems.boolean("register", register)
             problems.number("poisson", poisson, above=-1, at_most=0.5)
         if question == "joint" and problems.path("upper", upper):
             problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
     facts = _facts(scan, options)
-    tables = [("surface", _file_table(scan, folder, options, facts["missing"] and question != "roughness"))]
+    is_pressed = question != "roughness"
+    prepared = {"despike": True} if despike and is_pressed else {}
+    if (facts["missing"] or prepared) and is_pressed:
+        prepared["fill"] = True
+    tables = [("surface", _file_table(scan, folder, options | prepared))]
     if question == "joint":
         if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
             }
-        tables.append(("upper", _file_table(str(upper), folder, options, facts["missing"])))
-    if question != "roughness":
+        tables.append(("upper", _file_table(str(upper), folder, options | prepared)))
+    if is_pressed:
         tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
     tables += {"roughness": _roughness, "contact": _contact, "joint": _joint}[question](facts, young, poisson)
-    text = [f"title = {json.dumps(f'{question.capitalize()} of {Path(scan).name}')}", ""]
+    if question == "joint":
+        dict(tables)["joint"]["register"] = register
+    names = " and ".join(Path(file).name for file in ([scan, str(upper)] if question == "joint" else [scan]))
+    text = [f"title = {json.dumps(f'{question.capitalize()} of {names}')}", ""]
     for name, table in tables:
         text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
     return "\n".join(text)
@@ -122,11 +137,11 @@ def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str
 
 
 def _file_table(
-    scan: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], fill: bool
+    scan: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the table that reads a file."""
     path = Path(os.path.relpath(Path(scan).resolve(), Path(folder).resolve())).as_posix()
-    return {"read": path, **options, **({"fill": True} if fill else {})}
+    return {"read": path, **options}
 
 
 def _roughness(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:

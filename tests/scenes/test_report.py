@@ -180,12 +180,31 @@ def test_units_follow_the_values():
     assert "e+0" not in text
 
 
+def test_column_has_one_unit_within_three_decades():
+    surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
+    for pressures, shown in (([4e5, 6e5], ["0.4 MPa", "0.6 MPa"]), ([1e3, 1e7], ["1 kPa", "10 MPa"])):
+        pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=pressures)
+        text = fc.scenes.summary(xr.DataTree.from_dict({"contact": pressed}))
+        assert [cells[1] for cells in rows(text, "step")] == shown
+
+
+def test_transmissivity_of_parallel_plates_in_two_units():
+    """Plates 0.1 mm apart: w^3/12 = 8.33e-14 m3, times 998.2 kg/m3 9.81 m/s2 / 1.002 mPa s = 8.14e-7 m2/s."""
+    gap = fc.surfaces.from_array(np.full((8, 8), 1e-4), 1e-3).expand_dims(step=[0])
+    flow = fc.joints.transmissivity(gap.assign_coords(normal_force=("step", [5.0], {"units": "N"})))
+    text = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/transmissivity": flow})).split())
+    assert "cubed over 12: 8.33e-14 m³; times unit weight over viscosity" in text
+    assert "for water at 20 °C, 8.14e-07 m²/s" in text
+
+
 def test_small_forces_are_not_zero_kilonewton():
     face = fc.surfaces.fbm((32, 32), 1e-7, hurst=0.8, rms_increment=3e-9, rng=1)
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-7)
     closing = fc.joints.closure(crack, shear=[2e-7], normal_force=[2e-6])
     cells = rows(fc.scenes.summary(xr.DataTree.from_dict({"joints/closure": closing})), "closure at shear")[0]
     assert cells[:2] == ["200 nm", "2 µN"]
+    text = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/closure": closing})).split())
+    assert f"the last step of the load, {2e-6 / 16e-7**2 / 1e6:.3g} MPa on the area of the block" in text
 
 
 def test_no_negative_zero_and_no_contradiction_beside_the_dimension():
@@ -221,6 +240,7 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
     assert rows["Sq"].endswith(f"{float(statistics.rms_height) * 1e6:.3g} µm")
     assert rows["Sdq"].endswith(f"{float(statistics.rms_slope):.3f}")
     assert rows["E"].split()[1] == f"{float(jrc.roughness_coefficient[0]):.1f}"
+    assert "Azimuths are from E (+x) anticlockwise" in " ".join(text.split())
     metric = rose.roughness_metric
     assert rows["largest"].split()[1:] == [
         f"{float(metric.azimuth[int(metric.argmax('azimuth'))]):g}°", f"{float(metric.max()):.2f}°"

@@ -62,6 +62,38 @@ def test_joint_of_two_faces(scans):
     assert float(joints["closure"]["contact_fraction"].isel(shear=0, step=-1)) > 0.9
 
 
+def test_joint_with_a_spike_as_scanned(scans):
+    """One false point holds the faces apart until it is removed; faces as scanned keep their distance."""
+    upper = fc.open("upper.nc").load()
+    upper[40, 50] -= 1e-3
+    fc.save(upper, "spiked.nc")
+    command = ["joint", "lower.nc", "spiked.nc", "--young", "3e10", "--quiet", "--as-scanned"]
+    assert main([*command, "-o", "spiked"]) == 0
+    assert main([*command, "-o", "without", "--despike"]) == 0
+    spiked, without = (fc.open(f"{folder}/result.nc") for folder in ("spiked", "without"))
+    distance = without["joints/faces/height"] - without["surfaces/height"]
+    assert float(distance.mean()) == pytest.approx(1e-4, rel=1e-3)
+    assert "probably a spike" in fc.scenes.summary(spiked)
+    assert "a mean aperture of 1 mm" in fc.scenes.summary(spiked).replace("\n    ", " ")
+    assert "probably a spike" not in fc.scenes.summary(without)
+    lifted = [float(tree["joints/closure/mean_gap"][0, 0]) for tree in (spiked, without)]
+    assert lifted[0] > 0.8e-3 > 0.1e-3 > lifted[1]
+    title = tomllib.loads((scans / "spiked" / "joint.toml").read_text())["title"]
+    assert title == "Joint of lower.nc and spiked.nc"
+
+
+def test_summary_says_how_a_cloud_was_gridded(scans):
+    """Points, cells and tilt are those of the file."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(0.0, 19.2, (2, 9000))
+    np.savetxt("tilted.xyz", np.c_[x, y, np.tan(np.radians(10.0)) * x + 0.02 * rng.normal(size=x.size)])
+    assert main(["roughness", "tilted.xyz", "--units", "mm", "--spacing", "2e-4", "--quiet"]) == 0
+    text = " ".join(fc.scenes.summary(fc.open("tilted_roughness/result.nc")).split())
+    assert "gridded from 9000 points" in text
+    assert "cells of 200 µm; heights are above the best-fit plane of the points, tilted by 10°" in text
+    assert "between the points nothing was measured" in text
+
+
 def test_joint_of_two_tilted_clouds(scans):
     """The upper cloud is gridded on the plane and the cells of the lower one: its distance stays."""
     rng, side = np.random.default_rng(1), 96 * 0.2
