@@ -60,6 +60,7 @@ sphinx_gallery_conf = {
     "only_warn_on_example_error": False,
     "download_all_examples": False,
     "show_signature": False,
+    "capture_repr": (),  # what a drawing call returns says nothing to a reader
     "remove_config_comments": True,
     "min_reported_time": 1,
 }

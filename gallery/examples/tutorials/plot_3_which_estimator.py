@@ -6,6 +6,8 @@ The same surfaces, exact and spoilt as scans are, by several estimators. The tru
 surfaces are synthetic.
 """
 
+import json
+
 import numpy as np
 import xarray as xr
 from matplotlib import pyplot as plt
@@ -33,7 +35,7 @@ for name, surface in surfaces.items():
     surfaces[name] = surface.rename("height").assign_attrs(units="m")
 estimates = {name: fc.dimensions.estimate(surface, METHODS) for name, surface in surfaces.items()}
 table = xr.concat([one.fractal_dimension for one in estimates.values()], "surface", coords="minimal")
-print(table.assign_coords(surface=list(surfaces)).round(2).to_pandas())
+print(table.assign_coords(surface=list(surfaces)).round(2).to_pandas().to_string())
 
 # %%
 # The default, ``likelihood``, models noise and blur where the heights show them, and is the only one with
@@ -46,12 +48,12 @@ for ax, name in zip(panels, ["exact", "white noise", "blur of 1.5 spacings"], st
     ax.set_title(name)
 
 # %%
-# What the estimate found is said beside the number.
+# What the estimate found is said in the attribute ``comment``, for each method.
 
 for name, one in estimates.items():
     first = one.isel(method=0)
     print(f"{name}: {first.fractal_dimension:.2f} ({3 - first.ci_high:.2f} to {3 - first.ci_low:.2f})")
-    print("   ", first.hurst.attrs["comment"][:140])
+    print("   ", json.loads(first.hurst.attrs["comment"]).get("default", "no remark"))
 
 # %%
 # Take the default, unless a standard or a comparison with other work asks for a curve; then quote its
