@@ -21,7 +21,8 @@ surface = fc.surfaces.spectral(
 print(surface)
 
 # %%
-# Only the pressure over modulus times rms slope matters. Loads are evenly spaced in the logarithm.
+# What matters is the load: the pressure divided by the product of modulus and rms slope. Loads are evenly
+# spaced in the logarithm.
 
 modulus = fc.contact.effective_modulus(70e9, 0.3)
 pressure = 0.1 * modulus * np.geomspace(3e-3, 2.0, 14)
