@@ -52,7 +52,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"[\\/]plot_",
     "ignore_pattern": r"(conf|site_parts|__init__)\.py$",
-    "within_subsection_order": "ExampleTitleSortKey",
+    "within_subsection_order": "FileNameSortKey",
     "subsection_order": [*(f"examples/{name}" for name in SECTIONS), "*"],
     "nested_sections": False,
     "reset_modules": (),
