@@ -519,12 +519,11 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
     """Yield every shear as text with its results."""
     if "shear" not in data.coords:
         yield "", data
-    scale = _column_scale(data["shear"]) if "shear" in data.coords else None
-    for shear in np.atleast_1d(data["shear"].values) if "shear" in data.coords else ():
-        yield (
-            scale.text(shear) if scale else length(shear),
-            data.sel(shear=shear) if "shear" in data.dims else data,
-        )
+        return
+    shears = np.atleast_1d(data["shear"].values)
+    for shear in shears:
+        text = scale_for("m", shears).text(shear)
+        yield text, data.sel(shear=shear) if "shear" in data.dims else data
 
 
 def _at_directions(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
