@@ -27,6 +27,7 @@ FORMS = {
     TRANSFER: "a filter of the sampled heights",
 }
 _NO_ALIASES = 0.1  # squared spread beyond which far aliases do not matter
+_MOST_MEAN = 1.0  # logarithm of a mean over its centre, beyond which nothing of the power is left
 _LEAST_LOG = -600.0  # logarithm of the smallest expected power
 
 
@@ -92,7 +93,9 @@ class Window:
         plain, weighted = self.widths
         slope = 2.0 * (2.0 * hurst + self.frame.axes) * weighted / self.squares - plain
         mean = square * slope + 2.0 * square**2 * weighted
-        return mean, 4.0 * square * weighted / self.squares, slope + 4.0 * square * weighted
+        is_small = mean < _MOST_MEAN
+        by_hurst, by_square = 4.0 * square * weighted / self.squares, slope + 4.0 * square * weighted
+        return np.minimum(mean, _MOST_MEAN), by_hurst * is_small, by_square * is_small
 
     def _unaliased(self, form: str, hurst: float, square: float) -> tuple[Array, Array, Array]:
         """Return the logarithm of the spectral density of a blur before sampling, and derivatives."""

@@ -64,3 +64,11 @@ def test_derivatives(form, square, window):
     np.testing.assert_allclose((ends[1] - ends[0]) / (2 * step), by_hurst, atol=2e-4)
     ends = [np.log(window.signal(form, 0.6, square + s)[0]) for s in (-step, step)]
     np.testing.assert_allclose((ends[1] - ends[0]) / (2 * step), by_square, atol=1e-3)
+
+
+@pytest.mark.parametrize("form", list(FORMS))
+def test_widest_blur_leaves_finite_power(form, window):
+    signal, by_hurst, by_square = window.signal(form, 0.6, 200.0)
+    assert np.isfinite([signal, by_hurst, by_square]).all()
+    if form != NONE:
+        assert signal[FRAME.squares > 1.0].max() < 1e-15 * signal.max()
