@@ -364,7 +364,10 @@ def _longest_run(
 
 
 def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate | None, int]:
-    """Return `_longest_run` of a surface with few gaps, which are filled; None if they are many."""
+    """Return `_longest_run` of a surface with few gaps, which are filled.
+
+    None if they are many, or if few waves dominate the modes.
+    """
     if surface.finest_scale:
         return None, 1
     filled = _without_small_gaps(heights, surface.plane_spacing, _FEW_GAPS)
@@ -373,8 +376,10 @@ def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate | None,
     frame = _mode_blocks.frame(filled.shape, surface.plane_spacing)
     power = _cosine_modes.mode_power(filled)
     fit = fit_blurred(power, frame)
+    if fit is None or not fit.is_even:
+        return None, 1
     window = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
-    return _longest_run(filled, window, surface, is_even=fit is not None and fit.is_even)
+    return _longest_run(filled, window, surface, is_even=True)
 
 
 def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:

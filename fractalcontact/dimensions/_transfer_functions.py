@@ -83,7 +83,7 @@ class Window:
         if form != NONE:
             mean, mean_hurst, mean_square = self._mean_in_blocks(hurst, square)
             logs, by_hurst, by_square = logs + mean, by_hurst + mean_hurst, by_square + mean_square
-        return np.exp(np.maximum(logs, _LEAST_LOG)), by_hurst, by_square
+        return np.exp(np.clip(logs, _LEAST_LOG, -_LEAST_LOG)), by_hurst, by_square
 
     def _mean_in_blocks(self, hurst: float, square: float) -> tuple[Array, Array, Array]:
         """Return the logarithm of the mean of a blurred block over its centre, beyond that of the plain one.

@@ -30,13 +30,12 @@ else:
 
 # %%
 # The default estimate. The points were interpolated linearly on the grid, which changes the shortest waves:
-# the estimate is that of the longest run of octaves of wavelength with one exponent, and says which one.
+# the exponent changes with scale, and the interval says so. The figure has the longest run of octaves.
 
 result = fc.dimensions.estimate(fracture).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
 print(f"H = {float(result.hurst):.2f}, 95 % interval {low:.2f} to {high:.2f}")
 print(f"dimension {float(result.fractal_dimension):.2f}")
-print(f"wavelengths from {1e3 * float(result.scale_min):.1f} mm")
 print(result.hurst.attrs["comment"])
 
 # %%
