@@ -61,9 +61,9 @@ def curves(axes: Any) -> Any:
     """
     from matplotlib.axes import Axes
 
-    panels = (
-        axes if isinstance(axes, Mapping) else dict(enumerate(np.ravel(np.asarray(axes, dtype=object)), 1))
-    )
+    panels: Mapping[Any, Any] = axes if isinstance(axes, Mapping) else {1: axes}
+    if isinstance(axes, (list, tuple, np.ndarray)):
+        panels = dict(enumerate(np.ravel(np.asarray(axes, dtype=object)), 1))
     with Problems("fractalcontact.plotting.curves") as problems:
         are_axes = bool(panels) and all(isinstance(ax, Axes) for ax in panels.values())
         problems.require(

@@ -43,7 +43,7 @@ from fractalcontact.plotting._shear_curve import shear_curve
 from fractalcontact.plotting._strength_envelope import strength_envelope
 from fractalcontact.plotting._style import drawn_for_files, figure_of, needs_log_axis
 from fractalcontact.plotting._transmissivity import hydraulic_aperture
-from fractalcontact.plotting._units import shown_in
+from fractalcontact.plotting._units import check_units, shown_in
 from fractalcontact.plotting._uplift import uplift
 
 if TYPE_CHECKING:
@@ -116,6 +116,7 @@ def draw(
         problems.path("folder", folder, what="the path of a folder")
         problems.boolean("progress", progress)
         problems.boolean("paper", paper)
+        check_units(problems, units)
         if problems.require(
             isinstance(formats, (list, tuple)) and bool(formats), "formats", "a sequence of words", formats
         ):

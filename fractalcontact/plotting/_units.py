@@ -67,10 +67,18 @@ def units_of(data: xr.DataArray) -> str:
     return str(units)
 
 
+def check_units(problems: Problems, units: Any) -> None:
+    """Check that units are given by name."""
+    expected = "names of variables and their units"
+    problems.require(units is None or isinstance(units, Mapping), "units", expected, units)
+
+
 def shown_in(data: Any, units: Units | None, where: str) -> Any:
     """Return a result whose variables have the units that a figure is to show them in as an attribute."""
-    if not units:
+    if units is None:
         return data
+    with Problems(f"fc.plotting.{where}") as problems:
+        check_units(problems, units)
     if isinstance(data, xr.DataTree):
         parts = [node.to_dataset() for node in data.subtree]
     else:

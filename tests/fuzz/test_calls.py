@@ -127,6 +127,8 @@ KEPT = {
     "a number as a path": ("open", "path", lambda: 3, "path"),
     "a long name": ("save", "path", lambda: "x" * 300 + ".nc", "path"),
     "a number as a scene": ("scenes.plan", "scene", lambda: 3, "scene"),
+    "a word as units of figures": ("plotting.draw", "units", lambda: "no", "units"),
+    "an object that is no array as axes": ("plotting.curves", "axes", VALUES["class without array"], "axes"),
     "a list as axes": ("plotting.contact_area", "ax", list, "ax"),
     "another unit in a figure": ("plotting.rigid_dilatancy", "dilatancy", lambda: slid().assign(
         shear=slid()["shear"].assign_attrs(units="mm")), "dilatancy.shear.units"),
