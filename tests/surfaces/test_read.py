@@ -74,7 +74,7 @@ def test_empty_cells_are_missing(tmp_path):
         ("1,2\n3,inf\n", "1 infinite"),
         ("1,2,3\n", "a grid of heights"),
         ("1\n2\n3\n", "a grid of heights"),
-        ("", "no numbers in it"),
+        ("", "got the empty file"),
         ("# nothing\n", "no numbers in it"),
     ],
 )
