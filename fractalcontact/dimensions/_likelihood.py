@@ -53,7 +53,6 @@ from fractalcontact.dimensions._whittle import (
     LEAST_MODES,
     WhittleFit,
     fit_interval,
-    holding_sectors,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -64,7 +63,6 @@ _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
 # and a rougher second surface make it positive, and are seen later than a blur
 _SLIGHT = -2.5, 1.5
-_VAGUE_RUN = 0.7  # width of an interval of the longest run of octaves that says nothing
 _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface allows for
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
 _LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
@@ -88,10 +86,6 @@ _PERIODIC_FAMILY = "periodic family: power law between cut-offs"
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
     "another family than its own: see fractalcontact.surfaces.fill"
-)
-_OF_SECTORS = (
-    "a few waves hold more than their share: a lay, a step or a pattern; the interval holds the exponents of "
-    "sectors of azimuth, each fitted alone"
 )
 _OR_SECOND = (
     "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
@@ -175,8 +169,8 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
             return ground
         is_bent = abs(fit.misfit) > SIGNIFICANT * blocks.widening
         if is_bent and scales is None and spread is None:
-            if unseen is not None:
-                estimate, lag = _longest_run(heights, unseen.window, surface, is_even=is_even)
+            if unseen is not None and is_even:
+                estimate, lag = _longest_run(heights, unseen.window, surface)
             elif power is None and not noise:
                 estimate, lag = _run_beside_gaps(heights, surface)
         if estimate is not None:
@@ -337,13 +331,10 @@ def _with_blur(
     return replace(estimate, window=window, scale_max=longest), round(_BEYOND * fit.spread), True
 
 
-def _longest_run(
-    heights: Array, window: Window, surface: Surface, *, is_even: bool
-) -> tuple[Estimate | None, int]:
+def _longest_run(heights: Array, window: Window, surface: Surface) -> tuple[Estimate | None, int]:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
-    None if there is no run, or if few waves dominate it. Where they dominate the surface (`is_even` is False)
-    the interval also holds the exponents of sectors of azimuth.
+    None if there is no run, or if few waves dominate it.
     """
     run = longest_run(octaves(frame_blocks(window.power, window.frame)))
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
@@ -354,13 +345,7 @@ def _longest_run(
     )
     if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
         return None, 1
-    estimate, stride = run_estimate(run, surface), max(1, round(0.5 * run.low))
-    if is_even:
-        return estimate, stride
-    low, high = holding_sectors((estimate.ci_low, estimate.ci_high), part, run.fit.hurst)
-    if not high - low < _VAGUE_RUN:
-        return None, 1
-    return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OF_SECTORS)), stride
+    return run_estimate(run, surface), max(1, round(0.5 * run.low))
 
 
 def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate | None, int]:
@@ -379,7 +364,7 @@ def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate | None,
     if fit is None or not fit.is_even:
         return None, 1
     window = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
-    return _longest_run(filled, window, surface, is_even=True)
+    return _longest_run(filled, window, surface)
 
 
 def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:

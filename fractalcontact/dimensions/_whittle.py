@@ -95,11 +95,6 @@ def fit_interval(
     return result, Estimate(result.hurst, error, low, high, misfit=result.misfit, note="; ".join(notes))
 
 
-def holding_sectors(interval: tuple[float, float], modes: Modes, start: float) -> tuple[float, float]:
-    """Widen an interval until it holds those of sectors of azimuth, each fitted alone."""
-    return _holding_groups(interval, modes, modes.sector, start, False)
-
-
 def _holding_groups(
     interval: tuple[float, float], modes: Modes, groups: Array, start: float, noise: bool
 ) -> tuple[float, float]:
