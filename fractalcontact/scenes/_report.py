@@ -42,6 +42,10 @@ ISO_25178 = {
     "Svk": "reduced_valley_depth",
 }
 WATER = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight of water over its viscosity, at 20 °C
+OUTSIDE_SCALE = (
+    "A coefficient outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
+    "the face is smoother, or rougher, than all of them."
+)
 FRACTIONS = frozenset({"contact_fraction", "corrected_contact_fraction"})
 
 
@@ -272,6 +276,8 @@ def _joint_roughness(tree: xr.DataTree) -> list[Part]:
             low, high = (plain(profiles[f"roughness_coefficient_{end}"], 1) for end in ("low", "high"))
             rows.append((direction, plain(profiles["roughness_coefficient"], 1), f"{low} ... {high}"))
         tables.append(Table(rows))
+        if (jrc["scale_position"] != 0).any():
+            tables.append(Note(OUTSIDE_SCALE))
     if (polar := group_of(tree, "joints/directional_roughness")) is not None:
         metric = polar["roughness_metric"].mean(MEMBER) if MEMBER in polar.dims else polar["roughness_metric"]
         if metric.notnull().any():

@@ -245,3 +245,12 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
     assert rows["largest"].split()[1:] == [
         f"{float(metric.azimuth[int(metric.argmax('azimuth'))]):g}°", f"{float(metric.max()):.2f}°"
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("increment", "outside"), [(1e-8, True), (3e-5, False)])
+def test_coefficient_beyond_the_standard_profiles_is_told(increment, outside):
+    surface = fc.surfaces.fbm((64, 64), 2e-4, hurst=0.7, rms_increment=increment, rng=3)
+    jrc = fc.joints.roughness_coefficient(surface)
+    text = fc.scenes.summary(xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc}))
+    assert bool((jrc.scale_position != 0).any()) is outside
+    assert ("is extrapolated" in " ".join(text.split())) is outside
