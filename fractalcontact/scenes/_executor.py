@@ -142,7 +142,7 @@ def run_tasks(
         if result is not None:
             yield number, result
         rest = (time.perf_counter() - start) * len(left)
-        if points <= SMALL_SURFACE and rest > WORTH_A_COPY and can_fork():
+        if len(left) > 1 and points <= SMALL_SURFACE and rest > WORTH_A_COPY and can_fork():
             break
     numbers, half = list(left), threads.thread_count() // 2
 

@@ -233,6 +233,22 @@ def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, te
             xr.testing.assert_identical(serial[name][variable].variable, shared[name][variable].variable)
 
 
+def test_last_part_keeps_all_threads(tmp_path, monkeypatch):
+    """A copy of the process helps from two parts on: one alone is not held to half of the threads."""
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
+    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
+    closure, used = fc.joints.closure, []
+
+    def watched(*arguments, **options):
+        used.append(threads.thread_count())
+        return closure(*arguments, **options)
+
+    monkeypatch.setattr(fc.joints, "closure", functools.update_wrapper(watched, closure))
+    fc.scenes.run(tmp_path / "study.toml", progress=False)
+    assert used == [2, 2]
+
+
 def test_error_of_a_part_is_raised_with_a_copy(tmp_path, monkeypatch):
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
     monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
