@@ -16,6 +16,7 @@ import numpy as np
 from fractalcontact.base.netcdf_header import Header, read_headers
 from fractalcontact.base.tables import Note, Part, Table, screen_width, text_of
 
+SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
 REASONS = ("comment", "reason")  # attributes with a reason for each method, as JSON
 
 
@@ -82,10 +83,11 @@ def stage_parts(result: Any) -> list[Part]:
         origin = "" if facts.get("origin") == "computed" else f" ({facts.get('origin')})"
         rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_phrases(achieved)) + origin))
     together = sum(facts["run_time"] for facts in stages.values())
+    total = entry.get("run_time", together)
     if "run_time" in entry:  # workers share the stages, and take time to start
         rows.append(("all stages", f"{together:.2f}", ""))
-    rows.append(("total", f"{entry.get('run_time', together):.2f}", ""))
-    return [Table(rows)]
+    rows.append(("total", f"{total:.2f}", ""))
+    return [Table(rows), *([Note(SHARED)] if together > total else [])]
 
 
 def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:

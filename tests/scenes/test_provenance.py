@@ -282,6 +282,16 @@ def test_total_of_the_summary_is_the_time_of_the_whole_run(study):
     assert float(lines["total"]) == pytest.approx(provenance_of(study)["run_time"], abs=0.006)
 
 
+@pytest.mark.parametrize(("total", "told"), [(1.5, True), (2.5, False)])
+def test_stages_that_ran_at_the_same_time_are_told(study, total, told):
+    entry = provenance_of(study) | {"run_time": total}
+    entry["stages"] = {name: {"run_time": 1.0, "origin": "computed"} for name in ("surfaces", "dimensions")}
+    other = study.copy()
+    other.attrs["provenance"] = json.dumps(entry)
+    text = fc.scenes.summary(other)
+    assert ("are each counted in full" in " ".join(text.split())) is told
+
+
 def test_provenance_of_a_study_has_no_folder(tmp_path):
     surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
     path = fc.save(surface, tmp_path / "scan.nc")
