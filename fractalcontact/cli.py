@@ -12,7 +12,7 @@ import os
 import sys
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         collect_garbage_less_often()
         block_dask_import()
-    options = _parser().parse_args(arguments)
+    options = _parsers()[0].parse_args(arguments)
     warnings.showwarning = _say_warning
     try:
         with leaving(_leave):
@@ -62,11 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def command_help() -> dict[str, str]:
     """Return what `--help` prints for every command, by its name."""
-    (commands,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
-    return {str(name): parser.format_help() for name, parser in commands.choices.items()}
+    return {name: parser.format_help() for name, parser in _parsers()[1].items()}
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentParser]]:
+    """Return the parser of the command line, and that of each command by its name."""
     from fractalcontact import __version__
 
     parser = argparse.ArgumentParser(
@@ -144,7 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
     info.add_argument("file", help="a NetCDF file that this package wrote")
     info.set_defaults(action=_info)
-    return parser
+    return parser, commands.choices
 
 
 def _add_question(commands: Any, question: str, line: str) -> None:

@@ -52,15 +52,14 @@ def caveats(tree: xr.DataTree) -> list[str]:
 
 def _spike(tree: xr.DataTree) -> Iterator[str]:
     """Yield that the faces touch first at points far below the other openings: spikes of a scan."""
-    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
-    if upper is None or lower is None or "height" not in upper or "height" not in lower:
+    aperture = aperture_as_placed(tree)
+    if aperture is None:
         return
-    openings = (upper["height"] - lower["height"]).values
-    openings = openings[np.isfinite(openings)]
+    openings = aperture.values[np.isfinite(aperture.values)]
     if openings.size < LEAST_OPENINGS:
         return
     low, mean = np.quantile(openings, RARE), openings.mean()
-    increment = np.sqrt(np.nanmean(np.diff(lower["height"].values, axis=-1) ** 2))
+    increment = np.sqrt(np.nanmean(np.diff(np.asarray(tree["surfaces/height"]), axis=-1) ** 2))
     if mean - openings.min() > max(SPIKE * (mean - low), STEEP_SPIKE * increment):
         ends = [quantity_text(float(end), "m") for end in (openings.min(), low)]
         yield (
@@ -69,6 +68,14 @@ def _spike(tree: xr.DataTree) -> Iterator[str]:
             "load and holds the faces apart. To remove spikes: despike = true and fill = true in [surface] "
             "and [upper], or --despike."
         )
+
+
+def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
+    """Return the upper less the lower of two measured faces, where they lie; None where they are not kept."""
+    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
+    if upper is None or lower is None or "height" not in upper or "height" not in lower:
+        return None
+    return upper["height"] - lower["height"]
 
 
 def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:

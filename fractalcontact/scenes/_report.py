@@ -14,7 +14,14 @@ from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.tables import Note, Part, Table, text_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._caveats import MEMBER, caveats, group_of, member_count, peak_remarks
+from fractalcontact.scenes._caveats import (
+    MEMBER,
+    aperture_as_placed,
+    caveats,
+    group_of,
+    member_count,
+    peak_remarks,
+)
 from fractalcontact.scenes._contents import reasons, stage_parts
 from fractalcontact.scenes._paper import paper_parts
 
@@ -319,14 +326,12 @@ def _position(tree: xr.DataTree) -> list[Part]:
             f"along y, rotation {amount(upper['rotation'])}",
             f"mismatch {amount(upper['mismatch'])} rms, correlation {plain(upper['correlation'], 3)}",
         ]
-    return [*lines, *_openings(upper, group_of(tree, "surfaces"))]
+    aperture = aperture_as_placed(tree)
+    return lines if aperture is None else [*lines, *_openings(aperture)]
 
 
-def _openings(upper: xr.Dataset, lower: xr.Dataset | None) -> Iterator[Part]:
+def _openings(aperture: xr.DataArray) -> Iterator[Part]:
     """Yield the opening of the faces where they lie, and at first touch."""
-    if lower is None or "height" not in lower or "height" not in upper:
-        return
-    aperture = upper["height"] - lower["height"]
     mean, smallest = float(aperture.mean()), float(aperture.min())
     yield f"aperture: mean {length(mean)}, smallest {length(smallest)}"
     if smallest < 0.0:
@@ -444,9 +449,10 @@ def _leakage(tree: xr.DataTree) -> list[Part]:
 
 def _transmissivity(last: xr.DataArray) -> Iterator[str]:
     """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
-    open_ones = _finite(last)[_finite(last) > 0]
-    if open_ones.size:
-        ends = (float(open_ones.min()), float(open_ones.max()))
+    values = _finite(last)
+    values = values[values > 0]
+    if values.size:
+        ends = (float(values.min()), float(values.max()))
         cubes, water = (
             " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, WATER)
         )
@@ -527,9 +533,9 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
         yield "", data
         return
     shears = np.atleast_1d(data["shear"].values)
+    scale = scale_for("m", shears)
     for shear in shears:
-        text = scale_for("m", shears).text(shear)
-        yield text, data.sel(shear=shear) if "shear" in data.dims else data
+        yield scale.text(shear), data.sel(shear=shear) if "shear" in data.dims else data
 
 
 def _at_directions(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

@@ -94,9 +94,11 @@ def template(
             problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
     facts = _facts(scan, options)
     is_pressed = question != "roughness"
-    prepared = {"despike": True} if despike and is_pressed else {}
-    if (facts["missing"] or prepared) and is_pressed:
-        prepared["fill"] = True
+    prepared = {}
+    if is_pressed and despike:
+        prepared = {"despike": True, "fill": True}
+    elif is_pressed and facts["missing"]:
+        prepared = {"fill": True}
     tables = [("surface", _file_table(scan, folder, options | prepared))]
     if question == "joint":
         if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
@@ -106,11 +108,12 @@ def template(
         tables.append(("upper", _file_table(str(upper), folder, options | prepared)))
     if is_pressed:
         tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
-    tables += {"roughness": _roughness, "contact": _contact, "joint": _joint}[question](facts, young, poisson)
     if question == "joint":
-        dict(tables)["joint"]["register"] = register
-    names = " and ".join(Path(file).name for file in ([scan, str(upper)] if question == "joint" else [scan]))
-    text = [f"title = {json.dumps(f'{question.capitalize()} of {names}')}", ""]
+        tables += _joint(facts, register)
+    else:
+        tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
+    files = Path(scan).name + (f" and {Path(str(upper)).name}" if question == "joint" else "")
+    text = [f"title = {json.dumps(f'{question.capitalize()} of {files}')}", ""]
     for name, table in tables:
         text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
     return "\n".join(text)
@@ -144,7 +147,7 @@ def _file_table(
     return {"read": path, **options}
 
 
-def _roughness(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:
+def _roughness(facts: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     want: dict[str, Any] = {
         "surfaces": ["height", "describe", "texture"],
         "dimensions": ["default", "variogram"],
@@ -169,12 +172,12 @@ def _contact(facts: Mapping[str, Any], young: Any, poisson: float) -> list[tuple
     return [("contact", {"nominal_pressure": loads}), ("want", want)]
 
 
-def _joint(facts: Mapping[str, Any], *_: Any) -> list[tuple[str, dict[str, Any]]]:
+def _joint(facts: Mapping[str, Any], register: bool) -> list[tuple[str, dict[str, Any]]]:
     step = facts["spacing"]
     block = step * math.floor(0.6 * facts["extent"] / step)
     farthest = step * math.floor(0.15 * facts["extent"] / step)
     shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]
-    joint = {"block": float(f"{block:.9g}"), "register": True, "shear": sorted(set(shears))}
+    joint = {"block": float(f"{block:.9g}"), "register": register, "shear": sorted(set(shears))}
     loads = {"nominal_pressure": {"first": PRESSURES[0], "last": PRESSURES[1], "count": 6}}
     dilatancy = {"direction": ["E", "N", "W", "S"]}
     want = {
