@@ -173,15 +173,14 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
     size = (2.3 * len(cases) + 1.6, 5.2)
     shown = _style.panels(axes, (2, len(cases)), size, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
-    names = words(data["method"])
-    styles = [
-        _method_style(number) | {"ls": "-" if number < len(_style.cycle()) else "--"}
-        for number in range(len(names))
-    ]
+    styles = {
+        name.replace("_", " "): _method_style(number) | {"ls": "-" if number < len(_style.cycle()) else "--"}
+        for number, name in enumerate(words(data["method"]))
+    }
     for (upper, lower), (family, size) in zip(shown.T, cases, strict=True):
         case = data.sel(family=family, size=size)
         for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
-            _curves_against_hurst(ax, case, quantity, dict(zip(names, styles, strict=True)))
+            _curves_against_hurst(ax, case, quantity, styles)
         upper.set_yscale("log")
         upper.axhline(1.0, color=_style.ink(), lw=0.9, ls=":")
         lower.axhline(0.95, color=_style.ink(), lw=0.9, ls=":")
@@ -190,9 +189,7 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
         label_axis(lower.xaxis, "true Hurst exponent", PLAIN)
     label_axis(shown[0, 0].yaxis, "rms error / Cramér-Rao bound", PLAIN)
     label_axis(shown[1, 0].yaxis, "interval coverage", PLAIN)
-    entries = [
-        _style.legend_line(name.replace("_", " "), **style) for name, style in zip(names, styles, strict=True)
-    ]
+    entries = [_style.legend_line(name, **style) for name, style in styles.items()]
     _style.side_legend(shown[0, -1], entries)
     return shown
 
@@ -205,8 +202,7 @@ def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: dic
         finite = np.isfinite(values[row])
         if not finite.any():
             continue
-        ax.plot(hurst[finite], values[row][finite], **style, label=name.replace("_", " "))
+        ax.plot(hurst[finite], values[row][finite], **style, label=name)
         if f"{quantity}_low" in case:
             low, high = (table(case, f"{quantity}_{end}", dims)[row][finite] for end in ("low", "high"))
-            label = f"{name.replace('_', ' ')}, interval"
-            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8, label=label)
+            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8, label=f"{name}, interval")

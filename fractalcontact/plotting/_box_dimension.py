@@ -8,12 +8,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.power_law import local_slope
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
 from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
 from fractalcontact.plotting._paths import at_force, curve_name, load_of, load_text, shear_words
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +86,7 @@ def box_dimension(
         if not bool(data[name].notnull().any()):
             _style.write_in_empty_axes(ax, "no contact")
     first, *_, last = (*shown.values(), *shown.values())
-    first.set_ylabel(name_of(data[name]))
+    label_axis(first.yaxis, name_of(data[name]), PLAIN)
     if data.sizes["step"] > 1:
         _style.sequence_legend(last, *shears, colours)
     _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
@@ -120,7 +119,7 @@ def _dimension_curve(
     labelled = against in path.variables
     values = table(path, name, (dim,))
     x = table(path, against, (dim,)) if labelled else np.arange(values.size, dtype=float)
-    scale = scale_of(path[against]) if labelled else scale_for("", 1.0)
+    scale = scale_of(path[against]) if labelled else PLAIN
     certain = np.full(values.shape, True)
     if "ci_low" in path and "ci_high" in path:
         low, high = (table(path, end, (dim,)) for end in ("ci_low", "ci_high"))
@@ -135,10 +134,7 @@ def _dimension_curve(
         null = table(path, "null_dimension", (dim,))
         ax.plot(scale(x), null, color=colour, label=f"random null{place}", **_style.NULL_LINE)
     _style.log_x_if_wide(ax, x)
-    if labelled:
-        label_axis(ax.xaxis, name_of(path[against]), scale)
-    else:
-        ax.set_xlabel(against)
+    label_axis(ax.xaxis, name_of(path[against]) if labelled else against, scale)
 
 
 @_style.checked

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.units import scale_for
+from fractalcontact.base.units import Scale
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import table
 from fractalcontact.plotting._paths import (
@@ -20,7 +20,7 @@ from fractalcontact.plotting._paths import (
     shear_text,
     shear_words,
 )
-from fractalcontact.plotting._units import name_of, scale_of
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SIZES = ("box_length", "radius_length", "box_size", "radius")
 MAX_CURVES = 6  # more curves than this cross the curves of their random nulls illegibly
 TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
+CELLS = Scale(1.0, "cells")
 STEEP = 1.5  # ratio of values above which lacunarity is drawn on a logarithmic axis
 
 
@@ -85,7 +86,7 @@ def _draw_curves(
     curves = table(path, name, (dim, over))
     null = table(path, null_name, (dim, over)) if null_name in path else None
     boxes = table(path, size, (over,)) if size in path.variables else np.arange(1.0, curves.shape[1] + 1)
-    scale = scale_of(path[size]) if size in path.variables else scale_for("", 1.0)
+    scale = scale_of(path[size]) if size in path.variables else PLAIN
     for i, colour in enumerate(colours):
         dot = "o" if curves.shape[1] == 1 else ""
         ax.plot(scale(boxes), curves[i], color=colour, marker=dot, label=f"contact domain{places[i]}")
@@ -103,7 +104,7 @@ def _draw_curves(
             ax.text(1.0, 1.01, note, transform=ax.transAxes, ha="right", color=_style.grey(), size="small")
     _style.plain_ticks(ax)
     size_name = "radius" if over == "radius" else "box size"
-    ax.set_xlabel(scale.label(size_name) if size.endswith("_length") else f"{size_name} (cells)")
-    ax.set_ylabel("local dimension" if name == "local_slope" else name_of(path[name]))
+    label_axis(ax.xaxis, size_name, scale if size.endswith("_length") else CELLS)
+    label_axis(ax.yaxis, "local dimension" if name == "local_slope" else name_of(path[name]), PLAIN)
     if not shown.size:
         _style.write_in_empty_axes(ax, "no contact")

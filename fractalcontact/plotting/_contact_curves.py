@@ -195,7 +195,7 @@ def pressure_distribution(
             density = _persson(beside, float(scale(nominal[i])), float(scale(spread)))
             ax.plot(beside, density, color=colour, label=curve_name("Persson", words, i), **THEORY)
     label_axis(ax.xaxis, "pressure", scale)
-    ax.set_ylabel(f"nominal area per pressure (1/{scale.unit})")
+    label_axis(ax.yaxis, "nominal area per pressure", Scale(1 / scale.factor, f"1/{scale.unit}"))
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
     _style.sequence_legend(ax, *words, colours)

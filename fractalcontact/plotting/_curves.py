@@ -64,11 +64,10 @@ def curves(axes: Any) -> Any:
     panels: Mapping[Any, Any] = axes if isinstance(axes, Mapping) else {1: axes}
     if isinstance(axes, (list, tuple, np.ndarray)):
         panels = dict(enumerate(np.ravel(np.asarray(axes, dtype=object)), 1))
-    with Problems("fractalcontact.plotting.curves") as problems:
+    with Problems("fc.plotting.curves") as problems:
         are_axes = bool(panels) and all(isinstance(ax, Axes) for ax in panels.values())
-        problems.require(
-            are_axes, "axes", "Axes, or an array, sequence or mapping of them", type(axes).__name__
-        )
+        expected = "Axes, or an array, sequence or mapping of them"
+        problems.require(are_axes, "axes", expected, type(axes).__name__)
     rows = [row for name, ax in panels.items() for row in _of_panel(name, ax)]
     columns = {name: ("point", [row[i] for row in rows]) for i, name in enumerate(COLUMNS)}
     return xr.Dataset(columns).to_dataframe().reset_index(drop=True)
@@ -81,13 +80,13 @@ def _of_panel(name: Any, ax: Axes) -> Iterator[tuple[Any, ...]]:
     is_polar = ax.name == "polar"
     labels = "azimuth (°)" if is_polar else _plain(ax.get_xlabel()), _plain(ax.get_ylabel())
     rows = _names_of_rows(ax)
-    for curve, points in _labelled_points(ax):
+    for curve, vertices in _labelled_points(ax):
         if curve.startswith("_"):
             continue
-        x, y = np.asarray(points, dtype=np.float64).reshape(-1, 2).T
-        for one, other in zip(np.degrees(x) if is_polar else x, y, strict=True):
-            if np.isfinite(one) and np.isfinite(other):
-                yield panel, _plain(curve), float(one), rows.get(float(other), float(other)), *labels
+        x, y = np.asarray(vertices, dtype=np.float64).reshape(-1, 2).T
+        points = np.stack([np.degrees(x) if is_polar else x, y], axis=1)
+        for across, up in points[np.isfinite(points).all(axis=1)].tolist():
+            yield panel, _plain(curve), across, rows.get(up, up), *labels
 
 
 def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
@@ -109,7 +108,7 @@ def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
             yield str(collection.get_label()), np.concatenate(collection.get_segments() or [np.empty((0, 2))])
         elif isinstance(collection, PolyCollection):
             for path in collection.get_paths():
-                yield f"{collection.get_label()}", path.vertices
+                yield str(collection.get_label()), path.vertices
     for patch in ax.patches:
         if isinstance(patch, Polygon):
             yield str(patch.get_label()), patch.get_xy()

@@ -9,7 +9,7 @@ import numpy as np
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._directions import direction_styles
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +72,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
         entries.append(_style.legend_line(name, **style))
     ax.axhline(0.0, color=_style.grey(), lw=0.6)
     label_axis(ax.xaxis, name_of(data["shear"]), along)
-    ax.set_ylabel("correlation of the faces")
+    label_axis(ax.yaxis, "correlation of the faces", PLAIN)
     _style.side_legend(ax, entries, title="block slides")
     _style.side_legend(ax, [_style.legend_line("decorrelation\nlength", lw=0.7, ls=":")], low=True)
     return ax
@@ -124,6 +124,6 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
         ax.set_xscale("log")
     _style.plain_ticks(ax)
     label_axis(ax.xaxis, name_of(data["shear"]), along)
-    ax.set_ylabel("dimension of the delta-surface")
+    label_axis(ax.yaxis, "dimension of the delta-surface", PLAIN)
     _style.side_legend(ax, entries, title="method")
     return ax

@@ -116,7 +116,7 @@ def draw(
         problems.path("folder", folder, what="the path of a folder")
         problems.boolean("progress", progress)
         problems.boolean("paper", paper)
-        check_units(problems, units)
+        check_units(problems, "units", units)
         if problems.require(
             isinstance(formats, (list, tuple)) and bool(formats), "formats", "a sequence of words", formats
         ):

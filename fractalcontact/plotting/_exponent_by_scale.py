@@ -8,7 +8,7 @@ import numpy as np
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,6 +77,6 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     _style.plain_ticks(ax)
     ax.set_ylim(max(LOWEST, float(np.nanmin(low)) - 0.1), min(HIGHEST, float(np.nanmax(high)) + 0.1))
     label_axis(ax.xaxis, name_of(data["wavelength"]), along)
-    ax.set_ylabel("Hurst exponent")
+    label_axis(ax.yaxis, "Hurst exponent", PLAIN)
     _style.side_legend(ax, entries)
     return ax

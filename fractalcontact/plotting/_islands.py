@@ -18,7 +18,7 @@ from fractalcontact.plotting._inputs import (
 )
 from fractalcontact.plotting._paths import curve_name, load_words, shear_words
 from fractalcontact.plotting._surface import label_axes, plane_scale
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,7 +151,7 @@ def _island_areas(ax: Axes, data: xr.Dataset) -> None:
     areas = np.asarray(data["area"].values, dtype=float).ravel()
     scale = scale_of(data["area"])
     label_axis(ax.xaxis, name_of(data["area"]), scale)
-    ax.set_ylabel("number of islands of at least this area")
+    label_axis(ax.yaxis, "number of islands of at least this area", PLAIN)
     if not np.isfinite(areas).any():
         _style.write_in_empty_axes(ax, "no islands")
         return

@@ -12,7 +12,7 @@ from fractalcontact.plotting._contact_maps import maps_height
 from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of, table
 from fractalcontact.plotting._paths import curve_name, shear_words
 from fractalcontact.plotting._surface import plane_scale
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PER_CENT, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from fractalcontact.plotting._style import AxesArray, Panels
@@ -143,12 +143,12 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
         name = curve_name("loading path", shears, row)
         line: dict[str, Any] = {"color": colour, "marker": marker, "label": name}
         left.plot(along(displacement[row]), up(force[row]), **line)
-        share = 100 * stuck[row] / np.where(contact[row] > 0, contact[row], np.nan)
-        right.plot(up(force[row]), share, **line)
+        share = stuck[row] / np.where(contact[row] > 0, contact[row], np.nan)
+        right.plot(up(force[row]), PER_CENT(share), **line)
     label_axis(left.xaxis, name_of(data["tangential_displacement"]), along)
     label_axis(left.yaxis, name_of(data["tangential_force"]), up)
     label_axis(right.xaxis, name_of(data["tangential_force"]), up)
-    right.set_ylabel("part of the contact that sticks (%)")
+    label_axis(right.yaxis, "part of the contact that sticks", PER_CENT)
     right.set_ylim(0, 105)
     _style.sequence_legend(right, *shears, colours)
     return shown

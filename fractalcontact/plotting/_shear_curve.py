@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
@@ -64,16 +63,16 @@ def shear_curve(
     colours = dict(zip(pressures.tolist(), _style.sequence_colours(pressures.size), strict=True))
     displacements = np.concatenate([each["shear_displacement"].values.ravel() for each in data])
     along = scale_of(data[0]["shear_displacement"], displacements)
+    stress = scale_of(data[0]["nominal_pressure"], pressures)
     for ax, name in zip(shown, SHOWN, strict=True):
         across = scale_of(data[0][name], np.concatenate([each[name].values.ravel() for each in data]))
         for each, style in zip(data, ({}, BESIDE), strict=False):
             for i, pressure in enumerate(each["nominal_pressure"].values.tolist()):
                 x = np.broadcast_to(each["shear_displacement"].values, each[name].shape)[i]
-                label = f"{each.attrs.get('title', name)}, normal stress {quantity_text(pressure, 'Pa')}"
+                label = f"{each.attrs.get('title', name)}, normal stress {stress.text(pressure)}"
                 ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], label=label, **style)
         label_axis(ax.yaxis, name_of(data[0][name]), across)
         label_axis(ax.xaxis, name_of(data[0]["shear_displacement"]), along)
-    stress = scale_of(data[0]["nominal_pressure"], pressures)
     labels = [f"{value:.3g}" for value in stress(pressures)]
     entries = [
         _style.legend_line(text, color=colours[key]) for text, key in zip(labels, colours, strict=True)

@@ -14,6 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import is_real, number_of_entries
 from fractalcontact.base.validation import Problems, Words
+from fractalcontact.plotting._units import check_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,10 +104,7 @@ def _check_option(problems: Problems, name: str, value: Any, declared: str) -> N
         expected = "a sequence of Axes, a Figure or SubFigure, or None"
         problems.require(value is None or several or isinstance(value, FigureBase), name, expected, value)
     elif words[0] == "Units":
-        valid = isinstance(value, dict) and all(
-            isinstance(word, str) for pair in value.items() for word in pair
-        )
-        problems.require(valid or value is None, name, "a dict of variable and unit", value)
+        check_units(problems, name, value)
     elif words[0] == "Figure":
         expected = "a Figure or SubFigure, or None"
         problems.require(value is None or isinstance(value, FigureBase), name, expected, value)

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import scale_for
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of, table, words
 from fractalcontact.plotting._paths import curve_name, load_of, shear_words
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +68,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
         x = table(data, against, (over, dim))
     else:
         x = np.tile(np.arange(aperture.shape[1]), (len(aperture), 1))
-    along = scale_of(data[against]) if labelled else scale_for("", 1.0)
+    along = scale_of(data[against]) if labelled else PLAIN
     across = scale_of(data["hydraulic_aperture"])
     mean_gap = table(data, "aperture", (over, dim)) if "aperture" in data else None
     colours = _style.sequence_colours(len(aperture))
@@ -86,10 +85,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     _style.log_x_if_wide(ax, x)
     if np.nanmax(aperture, initial=0.0) > 0:
         ax.set_ylim(bottom=0)
-    if labelled:
-        label_axis(ax.xaxis, name_of(data[against]), along)
-    else:
-        ax.set_xlabel(against)
+    label_axis(ax.xaxis, name_of(data[against]) if labelled else against, along)
     label_axis(ax.yaxis, name_of(data["hydraulic_aperture"]), across)
     _style.sequence_legend(ax, *shears, colours)
     if flows:

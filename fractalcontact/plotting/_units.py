@@ -55,6 +55,7 @@ SHORT = {
     "covering_length": "length of the covering polygon",
 }
 PLAIN = Scale(1.0, "")  # of a number without a unit
+PER_CENT = Scale(0.01, "%")
 PERCENT = frozenset({"contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage"})
 
 
@@ -67,18 +68,21 @@ def units_of(data: xr.DataArray) -> str:
     return str(units)
 
 
-def check_units(problems: Problems, units: Any) -> None:
-    """Check that units are given by name."""
-    expected = "names of variables and their units"
-    problems.require(units is None or isinstance(units, Mapping), "units", expected, units)
+def check_units(problems: Problems, name: str, units: Any) -> None:
+    """Check that units are given by the names of variables."""
+    are_words = isinstance(units, Mapping) and all(
+        isinstance(word, str) for pair in units.items() for word in pair
+    )
+    problems.require(units is None or are_words, name, "a dict of variable and unit", units)
 
 
 def shown_in(data: Any, units: Units | None, where: str) -> Any:
-    """Return a result whose variables have the units that a figure is to show them in as an attribute."""
+    """Return a result whose variables have the units that a figure is to show them in as an attribute.
+
+    The units have been checked by `check_units`.
+    """
     if units is None:
         return data
-    with Problems(f"fc.plotting.{where}") as problems:
-        check_units(problems, units)
     if isinstance(data, xr.DataTree):
         parts = [node.to_dataset() for node in data.subtree]
     else:
@@ -131,7 +135,7 @@ def scale_of(data: xr.DataArray, values: Any = None) -> Scale:
     if wanted is not None:
         return wanted
     if str(data.name) in PERCENT:
-        return Scale(0.01, "%")
+        return PER_CENT
     return scale_for(units_of(data), np.asarray(data.values if values is None else values))
 
 
@@ -141,9 +145,8 @@ def label_axis(axis: Any, text: str, scale: Scale) -> None:
     name = axis.axis_name
     shared = axis.axes.get_shared_x_axes() if name == "x" else axis.axes.get_shared_y_axes()
     for ax in shared.get_siblings(axis.axes):
-        getattr(
-            ax, f"{name}axis"
-        ).units = scale.unit  # `set_units` would leave bands and intervals out of view
+        sibling = ax.xaxis if name == "x" else ax.yaxis
+        sibling.units = scale.unit  # `set_units` would leave bands and intervals out of view
 
 
 def name_of(data: xr.DataArray) -> str:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._inputs import extent_of, require_dims, result_of, words
@@ -87,12 +86,8 @@ def _state(data: Any) -> str:
     shown = {"shear": "shear", "effective_stress": "effective stress", "nominal_pressure": "normal stress"}
     present = [name for name in shown if name in data.variables and data[name].size == 1]
     present = [name for name in present if not (name == "nominal_pressure" and "effective_stress" in present)]
-    values = {name: float(np.ravel(data[name].values)[0]) for name in present}
-    return ", ".join(
-        f"{shown[name]} {quantity_text(value, 'm' if name == 'shear' else 'Pa')}"
-        for name, value in values.items()
-        if np.isfinite(value)
-    )
+    texts = {name: scale_of(data[name]).text(np.ravel(data[name].values)[0]) for name in present}
+    return ", ".join(f"{shown[name]} {text}" for name, text in texts.items() if text != "-")
 
 
 def _draw_diagrams(ax: Any, data: Any, profile: Any, extent: Any, length: Any, pressure: Any) -> None:

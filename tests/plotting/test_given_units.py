@@ -3,10 +3,11 @@
 import numpy as np
 import plotting_synthetic
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
 from plotting_figures import drawn, factor
 
-from fractalcontact import plotting, surfaces
+from fractalcontact import joints, plotting, surfaces
 from fractalcontact.base.errors import InvalidInput
 
 
@@ -93,8 +94,6 @@ def test_wrong_units_are_refused(study, units, named):
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_formats_of_files(study, tmp_path, suffix):
-    import xarray as xr
-
     tree = xr.DataTree.from_dict({"/dimensions": study["dimensions"].to_dataset()})
     files = plotting.draw(tree, tmp_path, formats=[suffix])
     start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
@@ -123,3 +122,28 @@ def test_units_of_a_figure_of_the_paper(study):
 
 def test_numbers_without_a_unit_say_so(study):
     assert plotting.dimensions(study["dimensions"]).xaxis.get_units() == ""
+
+
+@pytest.mark.parametrize("units", ["kN", 3, {"normal_force": 3}, ["normal_force", "kN"]])
+def test_units_of_all_figures_are_words_by_name(study, tmp_path, units):
+    tree = xr.DataTree.from_dict({"/joints/closure": study["joints/closure"].to_dataset()})
+    with pytest.raises(InvalidInput, match="units: expected a dict of variable and unit"):
+        plotting.draw(tree, tmp_path, units=units)
+    with pytest.raises(InvalidInput, match="units: expected a dict of variable and unit"):
+        plotting.closure_laws(tree["joints/closure"], units=units)
+
+
+def test_units_in_titles_and_names_of_curves():
+    gap = surfaces.from_array(np.full((8, 16), 1e-4), 1.0)
+    water = joints.uplift(gap, upstream_pressure=490e3).assign_coords(shear=2e-3, effective_stress=4e5)
+    title = plotting.uplift(water)[0].get_title(loc="left")
+    assert title == "shear 2 mm, effective stress 400 kPa"
+    units = {"shear": "um", "effective_stress": "MPa"}
+    title = plotting.uplift(water, units=units)[0].get_title(loc="left")
+    assert title == "shear 2000 µm, effective stress 0.4 MPa"
+
+    face = surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    law = {"nominal_pressure": 1e6, "wall_strength": 6e7, "residual_friction_angle": 30}
+    curve = joints.shear_curve(face, [0, 1e-3, 5e-3], **law)
+    numbers = plotting.curves(plotting.shear_curve(curve, units={"nominal_pressure": "kPa"}))
+    assert numbers["curve"].str.endswith("normal stress 1000 kPa").all()
