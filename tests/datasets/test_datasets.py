@@ -90,6 +90,20 @@ def test_land_surface_has_the_position_and_heights_of_the_map():
     assert (land == land.round()).all()
 
 
+def test_land_surface_has_no_single_exponent():
+    """The text of the example `plot_land_surface.py`: smooth at the shortest waves, flat at the longest."""
+    land = fc.surfaces.sample("jacksboro_fault_dem")
+    default = fc.dimensions.estimate(land).isel(method=0)
+    assert default.hurst == 1
+    assert default.ci_low.isnull()
+    assert "smoother than a fractal surface" in default.hurst.attrs["comment"]
+    by_octave = fc.dimensions.scaling(land).sortby("wavelength")
+    assert by_octave.ci_low[0] > 1
+    assert by_octave.ci_low[-1] < 0 < by_octave.ci_high[-1]
+    published = (0.414, 0.513)  # Huang and Turcotte (1990), of Oregon
+    assert by_octave.window_ci_high < published[0]
+
+
 def test_unknown_sample_is_refused():
     with pytest.raises(ValueError, match="concrete_crack"):
         fc.surfaces.sample("moon")

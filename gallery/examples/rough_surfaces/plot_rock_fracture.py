@@ -13,6 +13,7 @@ environment variable ``FRACTALCONTACT_DATA`` names; the page :doc:`/measured_sur
 licence and checksum. Without the file a synthetic surface of H = 0.81 stands in for it.
 """
 
+import json
 import os
 from pathlib import Path
 
@@ -27,19 +28,21 @@ if Path(os.environ.get("FRACTALCONTACT_DATA", "nowhere"), f"{name}.npy").is_file
 else:
     fracture = fc.surfaces.fbm((217, 217), 3e-4, hurst=0.81, rms_increment=1.2e-4, rng=1)
     print("no file of the gneiss: a synthetic stand-in of H = 0.81, which is no measurement")
+print(fracture)
 
 # %%
 # The default estimate. The points were interpolated linearly on the grid, which changes the shortest waves:
-# the exponent changes with scale, and the interval says so. The figure has the longest run of octaves.
+# the exponent changes with scale, the interval is wide, and the comment says why.
 
 result = fc.dimensions.estimate(fracture).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
 print(f"H = {float(result.hurst):.2f}, 95 % interval {low:.2f} to {high:.2f}")
 print(f"dimension {float(result.fractal_dimension):.2f}")
-print(result.hurst.attrs["comment"])
+print(json.loads(result.hurst.attrs.get("comment", "{}")).get("default", "no remark"))
 
 # %%
-# The exponent by octave of wavelength, and by direction. The bands are the published ones, of other rocks.
+# Left, the exponent by octave of wavelength; blue is the longest run of octaves that one exponent explains.
+# Right, the exponent by direction; the grey bands are the published ones, of other rocks.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(8.5, 3.4), layout="constrained")
 fc.plotting.scaling(fc.dimensions.scaling(fc.surfaces.fill(fracture)), ax=left)
