@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.dimensions import _blur_fit
-from fractalcontact.dimensions._blur_fit import Fit
+from fractalcontact.dimensions._blur_fit import NARROW, Fit
 from fractalcontact.dimensions._mode_blocks import LOWEST, Frame
-from fractalcontact.dimensions._records import Estimate
+from fractalcontact.dimensions._records import ASKED, Estimate
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import (
     BAND,
@@ -45,7 +45,6 @@ _POOR = 3.5  # z of the scatter of the blocks beyond which a model does not fit
 _UNEVEN = 4.0  # -z of the mean logarithm beyond which few waves dominate
 _FIRST, _GROWTH = 14.0, 1.5  # first window in numbers of the longest wave, and ratio of successive ones
 _LEAST = 60  # modes of a window
-_SHARP = 0.03  # squared spread below which edges do not matter
 _WIDE = 1.1  # squared spread beyond which the forms do not differ
 _EDGE = 0.07  # share of the power of the edges beyond which a mode is left out
 _OCTAVES, _WEAK = 5, 3.0  # longest octaves compared with a fit, and -z beyond which they are too weak
@@ -53,7 +52,7 @@ _WHITE = 0.5  # share of the waves below the noise that the edges must not distu
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
-BLURRED_WINDOW = "the modes that a model of blur and noise fits"
+_WINDOW = "the modes that a model of blur and noise fits"
 _CORNER = 0.75  # of the Nyquist wavenumber: waves beyond it along every axis give a first guess of noise
 
 
@@ -140,9 +139,7 @@ def fit_blurred(
     first : Fit, optional
         A fit to all modes, which is tried before the search for a window.
     """
-    search = _Search(frame.mean(power), frame, noise, None if spread is None else spread**2)
-    if chosen is not None:
-        search.allowed = chosen
+    search = _Search(frame.mean(power), frame, noise, None if spread is None else spread**2, chosen)
     if frame.count[search.allowed].sum() < _LEAST:
         return None
     window, start = search.window(first)
@@ -185,8 +182,8 @@ def fit_blurred(
         shortest=float(2.0 * np.pi / np.sqrt(frame.squares[window.inside].max())),
         scatter=scatter,
         flatness=min(
-            _flatness(power, frame, window.inside, _blur_fit.spread_in_blocks(window, best)),
-            -abs(_asymmetry(power, frame, window.inside)),
+            _flatness(power, window, _blur_fit.spread_in_blocks(window, best)),
+            -abs(_asymmetry(power, window)),
         ),
         gain=plain[0] - best.penalised if plain else np.inf,
         penalised=best.penalised,
@@ -206,24 +203,32 @@ def is_seen(fit: BlurredFit, axes: int, spread: float | None) -> bool:
     return fit.is_good and fit.gain > CLEAR[axes] and fit.high - fit.low < _VAGUE
 
 
-def blurred_estimate(fit: BlurredFit, surface: Surface, amplitude: float) -> Estimate:
-    """Return the estimate of a fit of blur and noise; `amplitude` is half the squared increment, (1 - H)."""
+def blurred_estimate(
+    fit: BlurredFit, surface: Surface, scales: Scales, amplitude: float, longest: float
+) -> Estimate:
+    """Return the estimate of a fit of blur and noise.
+
+    `amplitude` is half the mean square increment over one spacing, times 1 - H; `longest` is the longest wave
+    in m.
+    """
     has_noise = np.isfinite(fit.noise)
     parts = []
     if fit.form != NONE:
         spread = f" with a spread of {fit.spread:.2g} spacings" if fit.spread > 0.0 else ""
         parts = [FORMS[fit.form] + spread]
     parts += ["white noise"] if has_noise else []
-    fractal = fit.hurst < 1.0
+    half_square = amplitude / max(1.0 - fit.hurst, 1e-9)
     return Estimate(
         fit.hurst,
         fit.standard_error,
         fit.low if fit.low > LOWEST else 0.0,
         fit.high,
         scale_min=fit.shortest * surface.spacing[1],
-        rms_increment=float(np.sqrt(2.0 * amplitude)) * surface.unit if fractal else np.nan,
+        scale_max=longest,
+        rms_increment=float(np.sqrt(2.0 * half_square)) * surface.unit if fit.hurst < 1.0 else np.nan,
         noise_height=float(np.sqrt(fit.noise)) * surface.unit if has_noise else np.nan,
         blur_spread=fit.spread * surface.spacing[1] if fit.form != NONE else np.nan,
+        window=_WINDOW if scales is None else ASKED,
         note=f"the surface shows {' and '.join(parts)}, which is in the model" if parts else "",
     )
 
@@ -231,9 +236,11 @@ def blurred_estimate(fit: BlurredFit, surface: Surface, amplitude: float) -> Est
 class _Search:
     """Search for the window and the parameters."""
 
-    def __init__(self, power: Array, frame: Frame, noise: bool, square: float | None) -> None:
+    def __init__(
+        self, power: Array, frame: Frame, noise: bool, square: float | None, chosen: Array | None
+    ) -> None:
         self.power, self.frame, self.noise, self.square = power, frame, noise, square
-        self.allowed: Array = np.ones(power.size, dtype=bool)
+        self.allowed: Array = np.ones(power.size, dtype=bool) if chosen is None else chosen
 
     def window(self, first: Fit | None) -> tuple[Window, Fit]:
         """Return the largest window that a model fits, and that model; that around `first` if it fits there.
@@ -241,27 +248,26 @@ class _Search:
         Without noise windows grow from the longest waves on; with noise all modes are used at once, apart
         from those that the edges disturb.
         """
-        if first is not None and (found := self._around(first)) is not None:
-            return found
-        quiet = self._growing()
+        if first is not None and (around := self._around(first)) is not None:
+            return around
+        quiet_window, quiet, quiet_scatter = self._growing()
         limits = [_CORNER * np.pi / d for d in self.frame.spacing]
         corner = np.logical_and.reduce([w > limit for w, limit in zip(self.frame.waves, limits, strict=True)])
         corner &= self.allowed
         if not corner.any():
-            return quiet[0], quiet[1]
+            return quiet_window, quiet
         level = float(np.average(self.power[corner], weights=self.frame.count[corner]))
-        noisy = replace(quiet[1], noise=max(level / quiet[1].amplitude, 1e-280), has_noise=True)
+        noisy = replace(quiet, noise=max(level / quiet.amplitude, 1e-280), has_noise=True)
         for _ in range(3):
             window = self._window(noisy, np.inf)
             if window.number < _LEAST:
-                return quiet[0], quiet[1]
+                return quiet_window, quiet
             noisy = _blur_fit.fit(window, noisy)
         noisy = self._best_form(window, noisy)
-        if self._is_white(window, noisy) and _blur_fit.scatter(window, noisy) < max(
-            _POOR, min(quiet[2], 1e3)
-        ):
+        most = max(_POOR, min(quiet_scatter, 1e3))
+        if self._is_white(window, noisy) and _blur_fit.scatter(window, noisy) < most:
             return window, noisy
-        return quiet[0], quiet[1]
+        return quiet_window, quiet
 
     def _around(self, first: Fit) -> tuple[Window, Fit] | None:
         """Return the window of a fit to all modes, and the best model there; None if it does not fit."""
@@ -319,7 +325,7 @@ class _Search:
         """Return the window of a fit: waves that edges disturb little, not fallen too far without noise."""
         squares = self.frame.squares
         inside = self.allowed & (squares <= reach**2)
-        if fit.square < _SHARP:
+        if fit.square < NARROW:
             return Window(self.frame, inside, self.power)
         edges = edge_power(self.frame, fit.hurst, fit.square)
         signal = plain_power(self.frame, fit.hurst) * np.exp(-np.minimum(fit.square * squares, 600.0))
@@ -365,28 +371,29 @@ class _Search:
         return min((_blur_fit.fit(window, start, form) for form in forms), key=lambda fit: fit.deviance)
 
 
-def _flatness(power: Array, frame: Frame, inside: Array, spread: Array) -> float:
+def _flatness(power: Array, window: Window, spread: Array) -> float:
     """Return z of the mean logarithm of the squared modes about the logarithm of the mean of their block.
 
     `spread` is the variance of the logarithm of their expected power, which lowers it by half as much.
     """
     from scipy.special import polygamma, psi
 
-    count = frame.count[inside]
+    count = window.count
     with np.errstate(divide="ignore"):
-        logs = frame.mean(np.log(np.maximum(power, 1e-12 * power.mean())))[inside]
-        means = np.log(frame.mean(power)[inside])
+        logs = window.frame.mean(np.log(np.maximum(power, 1e-12 * power.mean())))[window.inside]
+        means = np.log(window.power)
     expected = psi(0.5) - psi(0.5 * count) + np.log(count)  # of logarithms of chi square
     variance = np.sum(count * polygamma(1, 0.5) - count**2 * polygamma(1, 0.5 * count))
     excess = float(np.sum(count * (logs - means - expected + 0.5 * spread)))
     return excess / float(np.sqrt(variance)) if variance > 0.0 else 0.0
 
 
-def _asymmetry(power: Array, frame: Frame, inside: Array) -> float:
+def _asymmetry(power: Array, window: Window) -> float:
     """Return z of the difference between waves steeper along y and along x; 0 if they are not paired."""
+    frame, inside = window.frame, window.inside
     if not frame.is_mirrored:
         return 0.0
-    part = frame.mean(np.tril(power, -1))[inside] / frame.mean(power)[inside]
+    part = frame.mean(np.tril(power, -1))[inside] / window.power
     pairs = frame.index[0][inside] != frame.index[1][inside]
-    weights = 0.5 * frame.count[inside][pairs] + 1.0
+    weights = 0.5 * window.count[pairs] + 1.0
     return float(np.sum(weights * (2.0 * part[pairs] - 1.0)) / np.sqrt(np.sum(weights)))

@@ -13,11 +13,12 @@ from fractalcontact.dimensions._whittle import misfit
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_BELOW, _ABOVE = 3.5, 3.7  # the same at the ends of an interval where blur and noise may be 0, their bound
-PENALTY = 2.0  # Akaike: deviance that a parameter must bring
+# rise of the deviance at the lower and upper end of an interval where blur and noise may be 0, their bound
+_BELOW, _ABOVE = 3.5, 3.7
+_PENALTY = 2.0  # Akaike: deviance that a parameter must bring
 CORRELATION = 1.05  # of the squared standard error, for the modes are slightly correlated
-MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matters
-NARROW = 0.03  # squared spread below which edges do not matter
+_MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matters
+NARROW = 0.03  # squared spread below which the jump does not matter
 _COST, _NOISE_COST = 5.0, 1.0  # deviance of blur and of noise in the interval where neither is seen
 _LARGEST = 200.0  # squared spread
 _ENDS = 6  # steps to an end of an interval
@@ -59,12 +60,12 @@ class Fit:
     @property
     def penalised(self) -> float:
         """Deviance with the penalty of the parameters."""
-        return self.deviance + PENALTY * self.parameters
+        return self.deviance + _PENALTY * self.parameters
 
     @property
     def correlation(self) -> float:
         """Factor on the squared standard error for the correlation of the modes."""
-        return CORRELATION if self.square < NARROW else MORE_CORRELATION
+        return CORRELATION if self.square < NARROW else _MORE_CORRELATION
 
     def with_noise(self, has_noise: bool, window: Window) -> Fit:
         """Return a start with noise or without."""
@@ -227,8 +228,8 @@ def _end(window: Window, best: Fit, rise: float, step: float) -> float:
 
 
 @dataclass(frozen=True)
-class Hidden:
-    """What blur and noise may do to a surface that is fitted without them.
+class Comparison:
+    """A surface that is fitted without blur and noise, compared with one that has both.
 
     Attributes
     ----------
@@ -265,8 +266,8 @@ class Hidden:
         fits = [plain, *(fit(self.window, start.with_noise(True, self.window)) for start in starts)]
         least, low, high = min(map(_with_cost, fits)), plain.hurst, plain.hurst
         # of the two starts of one form the better
-        kinds = {(each.form, each.has_noise): each for each in sorted(fits, key=_with_cost, reverse=True)}
-        for best in kinds.values():
+        better = {(each.form, each.has_noise): each for each in sorted(fits, key=_with_cost, reverse=True)}
+        for best in better.values():
             below, above = (end * best.correlation + least - _with_cost(best) for end in (_BELOW, _ABOVE))
             if below > 0.0:
                 ends = interval(self.window, best, below, above)
@@ -279,7 +280,7 @@ def _with_cost(model: Fit) -> float:
     return model.deviance + _COST * (model.form != NONE) + _NOISE_COST * model.has_noise
 
 
-def hidden(window: Window, start: float, *, noise: bool) -> Hidden:
+def compare(window: Window, start: float, *, noise: bool) -> Comparison:
     """Compare a surface without blur, and without noise unless it is asked for, with one that has both."""
     plain = fit(window, Fit(NONE, start, 0.0).with_noise(noise, window))
     forms = (NONE, 0.0), (TRANSFER, 0.1), (TRANSFER, 1.0), (FILTER, 0.15)
@@ -291,4 +292,4 @@ def hidden(window: Window, start: float, *, noise: bool) -> Hidden:
     slopes = np.stack([np.ones(residual.size), columns[0]])
     best = min(fits, key=lambda each: each.penalised)
     bend = misfit(slopes, residual, 0.5 * window.count)
-    return Hidden(plain, plain.penalised - best.penalised, bend, window, best)
+    return Comparison(plain, plain.penalised - best.penalised, bend, window, best)

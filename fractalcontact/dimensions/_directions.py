@@ -23,7 +23,7 @@ from fractalcontact.dimensions._anisotropy import (
     directional_fit,
     fit_anisotropy,
 )
-from fractalcontact.dimensions._blur import fit_blurred
+from fractalcontact.dimensions._blur import CLEAR, fit_blurred
 from fractalcontact.dimensions._exponent_by_scale import frame_blocks, several_exponents
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
@@ -71,7 +71,6 @@ _IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surf
 _SHARE_COMPARED = 1 / 3  # of the surface, which a second difference may span in a test
 _ROUNDING = 1e-22  # of the largest mean square: the heights do not vary along that direction
 _BENT = 2.0  # standard deviations of the curvature from which on blur and noise are looked for
-_GAIN = 4.0  # decrease of the penalised deviance by which they are seen, as in `estimate`
 _LEFT = 0.1  # of a mean square difference, which noise must leave
 _NO_VARIATION = "the heights do not vary along this direction"
 _NO_MODEL = "the surface is not an anisotropic fractional Brownian one, and no model gives the scatter"
@@ -299,7 +298,7 @@ class _Instrument:
         frame = _mode_blocks.frame(surface.heights.shape, surface.plane_spacing)
         power = _cosine_modes.mode_power(surface.heights)
         fit = fit_blurred(power, frame)
-        if fit is None or not (fit.is_good and fit.gain > _GAIN and fit.hurst < 1.0):
+        if fit is None or not (fit.is_good and fit.gain > CLEAR[2] and fit.hurst < 1.0):
             return None
         if several_exponents(fit, frame_blocks(frame.mean(power), frame), surface) is not None:
             return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,9 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur import BlurredFit
+from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
-from fractalcontact.dimensions._records import NORMAL, Estimate, joined
+from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -23,7 +24,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _LEAST = 12  # modes of an octave
 _STEPS, _LONGEST_STEP = 60, 0.5
 _SCORING_STEPS = 40  # of a fit of two exponents
-_CORRELATION = 1.05  # of squared standard errors: neighbouring modes are slightly correlated
 _LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
 _FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
 _RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
@@ -34,8 +34,8 @@ _FLAT = 1.2  # times the standard errors of two exponents: the likelihood is fla
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
 _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two exponents
+_UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
-_UNDECIDED = 5.4  # its decrease up to which the interval holds blur and noise as well: 1.4 times 3.84
 _LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 _NAMES = (
@@ -293,7 +293,7 @@ def fit_power_law(blocks: Blocks, inside: Array) -> PowerLaw:
         if not information > 0.0:
             break
         step = 0.5 * float(np.sum(part.count * slope * (ratio / mean - 1.0))) / information
-        error = float(np.sqrt(_CORRELATION / information))
+        error = float(np.sqrt(CORRELATION / information))
         hurst += float(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
         if abs(step) < 1e-6:
             break
@@ -324,7 +324,7 @@ def fit_two_exponents(blocks: Blocks, inside: Array) -> TwoExponents | None:
     deviance, (rough, smooth, crossing), information = best
     if not (waves.min() < crossing < waves.max() and np.linalg.cond(information) < 1e12):
         return None
-    errors = _FLAT * NORMAL * np.sqrt(_CORRELATION * np.diag(np.linalg.inv(information)))
+    errors = _FLAT * NORMAL * np.sqrt(CORRELATION * np.diag(np.linalg.inv(information)))
     laws = [
         PowerLaw(float(hurst), float(hurst - error), float(hurst + error), modes, deviance)
         for hurst, error in zip((rough, smooth), errors[:2], strict=True)
@@ -407,7 +407,7 @@ def longest_run(record: Sequence[Octave]) -> Run:
             if len(run) < max(width, min(2, len(record))):
                 continue
             fit = fit_power_law(run[0].blocks, np.logical_or.reduce([octave.inside for octave in run]))
-            ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / _CORRELATION
+            ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
             fits = len(run) == 1 or chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM
             is_fractal = fit.hurst > _LEAST_HURST and fit.low < 1.0
             if not fits or not is_fractal:
@@ -436,8 +436,7 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
             estimate = _two_estimate(two, record[0], blocks, surface)
             if gain < -_TWO_ALONE or not fit.is_good:
                 return estimate
-            low, high = min(estimate.ci_low, fit.low), max(estimate.ci_high, fit.high)
-            return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OR_NOISE))
+            return estimate.holding(fit.low, fit.high, _OR_NOISE)
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
     gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
@@ -446,10 +445,7 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
     estimate = run_estimate(run, surface)
     if not (fit.is_good and gain > -_UNDECIDED):
         return estimate
-    low = fit.low if fit.low > LOWEST else 0.0
-    note = joined(estimate.note, _OR_NOISE)
-    ends = min(estimate.ci_low, low), max(estimate.ci_high, fit.high)
-    return replace(estimate, ci_low=ends[0], ci_high=ends[1], note=note)
+    return estimate.holding(fit.low if fit.low > LOWEST else 0.0, fit.high, _OR_NOISE)
 
 
 def alternatives(fit: BlurredFit, blocks: Blocks, *, is_bent: bool) -> tuple[float, float]:

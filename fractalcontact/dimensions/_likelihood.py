@@ -6,7 +6,7 @@ spectrum between cut-offs. Profiles with free ends: the exact likelihood of thei
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -14,14 +14,14 @@ import numpy as np
 
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_modes
 from fractalcontact.dimensions._blur import (
-    BLURRED_WINDOW,
     CLEAR,
+    BlurredFit,
     blurred_estimate,
     chosen_blocks,
     fit_blurred,
     is_seen,
 )
-from fractalcontact.dimensions._blur_fit import Fit, Hidden, hidden
+from fractalcontact.dimensions._blur_fit import Comparison, compare
 from fractalcontact.dimensions._exponent_by_scale import (
     alternatives,
     frame_blocks,
@@ -58,7 +58,7 @@ from fractalcontact.dimensions._whittle import (
 Array = np.ndarray[Any, np.dtype[Any]]
 SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 
-_PLAIN = 10.0  # the same from which a surface is not fitted without them
+_PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are fitted
 _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
 # and a rougher second surface make it positive, and are seen later than a blur
@@ -133,6 +133,40 @@ def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) ->
     return estimate.without_interval(_PERIODIC_GAPS)
 
 
+@dataclass(frozen=True)
+class _FreeEdges:
+    """Heights with free edges, and what is asked for.
+
+    Attributes
+    ----------
+    surface : Surface
+    heights : ndarray, shape (ny, nx)
+        Without the rows and columns at the border where nothing was observed.
+    power : ndarray, optional
+        Squared cosine modes; None with gaps.
+    scales, noise
+        As in `fractalcontact.dimensions.estimate`.
+    spread : float, optional
+        That of a known blur, in spacings of x.
+    pilot : float
+        First estimate of H.
+    """
+
+    surface: Surface
+    heights: Array
+    power: Array | None
+    scales: Scales
+    noise: bool
+    spread: float | None
+    pilot: float
+
+    @property
+    def is_default(self) -> bool:
+        """Whether nothing is known of the window, the instrument, or the points that were gridded."""
+        is_asked = self.scales is not None or self.spread is not None or self.noise
+        return not (is_asked or self.surface.finest_scale)
+
+
 def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
     """Fit the cosine modes of a surface with free edges; `spread` in spacings is that of a known blur."""
     heights = _cropped(surface.heights)
@@ -141,64 +175,51 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     power = _cosine_modes.mode_power(heights) if np.isfinite(heights).all() else None
     if power is not None and _is_separable(power, heights):
         return undefined(_SEPARABLE)
-    levelled = _without_offsets(heights)
-    moments = cache(lambda stride: _moments(levelled, stride))
-    pilot = _pilot(moments(1), surface.plane_spacing)
-    unseen, estimate, is_even = None, None, True
+    levelled, spacing = _without_offsets(heights), surface.plane_spacing
+    moments = cache(lambda stride: increment_moments([(levelled, len(levelled))], levelled.shape, stride))
+    compared_parts = cache(lambda hurst, stride: heterogeneity(moments(stride), spacing, hurst))
+    free = _FreeEdges(surface, heights, power, scales, noise, spread, _pilot(moments(1), spacing))
     stride = _stride(scales, max(surface.spacing))
-    # gridding has removed short waves, as a blur does
-    if power is not None and power.size >= _LEAST_NUMBER and not surface.finest_scale:
-        unseen = _hidden(power, surface, scales, noise, pilot)
-    is_default = scales is None and spread is None and not noise and not surface.finest_scale
-    if power is not None and unseen is not None:
-        blocks = heterogeneity(moments(stride), surface.plane_spacing, unseen.plain.hurst)
-        if is_default and (ground := _ground(heights, surface, blocks, unseen.plain.hurst, unseen.misfit)):
+    comparison, blurred = _comparison(free), None
+    if comparison is not None:
+        hurst = comparison.plain.hurst
+        parts = compared_parts(hurst, stride)
+        if ground := _ground(free, parts, hurst, comparison.misfit):
             return ground
-        if spread is not None or _shows_blur(unseen, blocks):
-            estimate, lag, is_even = _with_blur(power, surface, scales, noise, spread, unseen.best)
-            if estimate is not None:
-                stride = max(stride, lag)
-                estimate = _allowing_steps(estimate, unseen, heights, noise)
-    if estimate is None:
-        modes = _modes(heights, power, surface, scales, pilot)
+        if spread is not None or _shows_blur(comparison, parts):
+            blurred = _blurred_fit(free, comparison)
+    if comparison is not None and blurred is not None and is_seen(blurred, surface.axes, spread):
+        estimate, lag = _with_blur(free, comparison, blurred)
+        estimate = _allowing_rounding(estimate, comparison, free)
+    else:
+        modes = _modes(free)
         if modes.number < LEAST_MODES:
             return undefined(f"{modes.number:.0f} modes in the window, at least {LEAST_MODES} are needed")
-        fit = modes.fit(pilot, noise)
-        blocks = heterogeneity(moments(stride), surface.plane_spacing, fit.hurst)
-        if is_default and (ground := _ground(heights, surface, blocks, fit.hurst, fit.misfit)):
+        fit = modes.fit(free.pilot, noise)
+        parts = compared_parts(fit.hurst, stride)
+        if ground := _ground(free, parts, fit.hurst, fit.misfit):
             return ground
-        is_bent = abs(fit.misfit) > SIGNIFICANT * blocks.widening
-        if is_bent and scales is None and spread is None:
-            if unseen is not None and is_even:
-                estimate, lag = _longest_run(heights, unseen.window, surface)
-            elif power is None and not noise:
-                estimate, lag = _run_beside_gaps(heights, surface)
-        if estimate is not None:
-            stride, estimate = max(stride, lag), replace(estimate, misfit=fit.misfit)
-        else:
-            # unequal parts look like blur or noise
-            estimate = _plain(modes, fit, None if blocks.note else unseen, surface, scales, noise, pilot)
-            is_slight = not _SLIGHT[0] < fit.misfit < _SLIGHT[1] and abs(fit.misfit) <= SIGNIFICANT
-            if unseen is not None and is_default and is_slight and not blocks.note and fit.hurst < 1.0:
-                estimate = _allowing_scales(estimate, heights, unseen.window, fit.misfit)
-    blocks = heterogeneity(moments(stride), surface.plane_spacing, estimate.hurst)
-    low, high = blocks.widened(estimate.hurst, estimate.ci_low, estimate.ci_high)
+        is_even = blurred is None or blurred.is_even
+        estimate, lag = _without_blur(free, modes, fit, parts, comparison, is_even=is_even)
+    parts = compared_parts(estimate.hurst, max(stride, lag))
+    low, high = parts.widened(estimate.hurst, estimate.ci_low, estimate.ci_high)
     rounding = "" if noise else rounding_note(heights, estimate.standard_error)
     periodic_note = "a periodic surface with gaps is treated as free" if all(surface.grid.periodic) else ""
     return replace(
         estimate,
-        standard_error=estimate.standard_error * blocks.widening,
+        standard_error=estimate.standard_error * parts.widening,
         ci_low=low,
         ci_high=high,
-        note=joined(periodic_note, estimate.note, blocks.note, rounding),
+        note=joined(periodic_note, estimate.note, parts.note, rounding),
     )
 
 
-def _ground(
-    heights: Array, surface: Surface, blocks: Heterogeneity, hurst: float, misfit: float
-) -> Estimate | None:
-    """Return the estimate of the ground between steps; None where there are none."""
-    ground = without_steps(heights, surface.plane_spacing, hurst) if blocks.note else None
+def _ground(free: _FreeEdges, parts: Heterogeneity, hurst: float, misfit: float) -> Estimate | None:
+    """Return the estimate of the ground between steps; None where there are none, or not by default."""
+    if not (free.is_default and parts.note):
+        return None
+    surface = free.surface
+    ground = without_steps(free.heights, surface.plane_spacing, hurst)
     if ground is None:
         return None
     return replace(
@@ -210,42 +231,109 @@ def _ground(
     )
 
 
-def _allowing_steps(estimate: Estimate, unseen: Hidden, heights: Array, noise: bool) -> Estimate:
-    """Return an estimate with blur; where heights are rounded, its interval holds that of noise alone."""
-    low, high = estimate.ci_low, estimate.ci_high
-    if not noise and rounding_note(heights, estimate.standard_error):
-        ends = unseen.interval(np.inf, blur=False)
-        low, high = min(low, ends[0]), max(high, ends[1])
-    return replace(estimate, ci_low=low, ci_high=high, misfit=unseen.misfit)
+def _comparison(free: _FreeEdges) -> Comparison | None:
+    """Compare the surface with one that is blurred and noisy; None where that is not known.
+
+    With gaps, with few modes, and where gridding has removed short waves, as a blur does.
+    """
+    if free.power is None or free.power.size < _LEAST_NUMBER or free.surface.finest_scale:
+        return None
+    frame = _mode_blocks.frame(free.heights.shape, free.surface.plane_spacing)
+    inside = chosen_blocks(frame, free.surface, free.scales)
+    if frame.count[inside].sum() < _LEAST_NUMBER:
+        return None
+    return compare(Window(frame, inside, frame.mean(free.power)), free.pilot, noise=free.noise)
 
 
-def _shows_blur(unseen: Hidden, blocks: Heterogeneity) -> bool:
+def _shows_blur(comparison: Comparison, parts: Heterogeneity) -> bool:
     """Return whether blur or noise is to be fitted; unequal parts count for fewer modes, and look like it."""
-    gain = unseen.gain / blocks.widening**2
-    if abs(unseen.misfit) > SIGNIFICANT * blocks.widening:
+    gain = comparison.gain / parts.widening**2
+    if abs(comparison.misfit) > SIGNIFICANT * parts.widening:
         return gain > _PLAIN
-    return not blocks.note and gain > (_PLAIN if unseen.plain.hurst < 1.0 else CLEAR[2])
+    return not parts.note and gain > (_PLAIN if comparison.plain.hurst < 1.0 else CLEAR[2])
 
 
-def _plain(
+def _blurred_fit(free: _FreeEdges, comparison: Comparison) -> BlurredFit | None:
+    """Fit blur and noise in the largest window that a model of them fits; None if it has too few modes."""
+    assert free.power is not None  # a surface with gaps is not compared
+    window = comparison.window
+    return fit_blurred(
+        free.power,
+        window.frame,
+        noise=free.noise,
+        spread=free.spread,
+        chosen=window.inside,
+        first=comparison.best,
+    )
+
+
+def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tuple[Estimate, int]:
+    """Return the estimate of a surface on which blur or noise is seen, and a lag beyond the blur."""
+    surface, window = free.surface, comparison.window
+    longest = 2.0 * np.pi / float(np.sqrt(window.squares.min())) * surface.spacing[1]
+    estimate = blurred_estimate(fit, surface, free.scales, fit.amplitude, longest)
+    if free.is_default:
+        blocks = frame_blocks(window.power, window.frame)
+        several = several_exponents(fit, blocks, surface)
+        if several is not None:
+            return several, round(0.5 * several.scale_min / max(surface.spacing))
+        low, high = alternatives(fit, blocks, is_bent=True)
+        if low < estimate.ci_low or high > estimate.ci_high:
+            estimate = estimate.holding(low, high, _OR_SECOND)
+    return estimate, round(_BEYOND * fit.spread)
+
+
+def _allowing_rounding(estimate: Estimate, comparison: Comparison, free: _FreeEdges) -> Estimate:
+    """Return an estimate with blur; where heights are rounded, its interval holds that of noise alone."""
+    if not free.noise and rounding_note(free.heights, estimate.standard_error):
+        estimate = estimate.holding(*comparison.interval(np.inf, blur=False))
+    return replace(estimate, misfit=comparison.misfit)
+
+
+def _without_blur(
+    free: _FreeEdges,
     modes: SurfaceModes,
     fit: WhittleFit,
-    unseen: Hidden | None,
-    surface: Surface,
-    scales: Scales,
-    noise: bool,
-    pilot: float,
-) -> Estimate:
-    """Return the estimate of a surface on which no blur is seen."""
+    parts: Heterogeneity,
+    comparison: Comparison | None,
+    *,
+    is_even: bool,
+) -> tuple[Estimate, int]:
+    """Return the estimate of a surface on which no blur is seen, and a lag inside its window.
+
+    `is_even` states that no few waves dominate the modes.
+    """
+    is_bent = abs(fit.misfit) > SIGNIFICANT * parts.widening
+    run = None
+    if is_bent and free.scales is None and free.spread is None:
+        if comparison is not None and is_even:
+            run = _longest_run(free, comparison.window)
+        elif free.power is None and not free.noise:
+            run = _run_beside_gaps(free)
+    if run is not None:
+        estimate, lag = run
+        return replace(estimate, misfit=fit.misfit), lag
+    if parts.note:
+        comparison = None  # unequal parts look like blur or noise
+    estimate = _plain(free, modes, fit, comparison)
+    is_slight = not _SLIGHT[0] < fit.misfit < _SLIGHT[1] and abs(fit.misfit) <= SIGNIFICANT
+    if comparison is not None and free.is_default and is_slight and fit.hurst < 1.0:
+        estimate = _allowing_scales(estimate, free, comparison.window, fit.misfit)
+    return estimate, 1
+
+
+def _plain(free: _FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: Comparison | None) -> Estimate:
+    """Return the estimate of one exponent at all scales of the window."""
+    surface, scales, noise = free.surface, free.scales, free.noise
     dx = surface.spacing[1]
-    fit, estimate = fit_interval(modes, pilot, noise, fit)
+    fit, estimate = fit_interval(modes, free.pilot, noise, fit)
     low, high = estimate.ci_low, estimate.ci_high
     if not noise and rounding_note(surface.heights, estimate.standard_error):
-        with_noise = fit_interval(modes, pilot, True)[1]
+        with_noise = fit_interval(modes, free.pilot, True)[1]
         low, high = float(np.fmin(low, with_noise.ci_low)), float(np.fmax(high, with_noise.ci_high))
-    if unseen is not None:
-        ends = unseen.interval(_WEAK_NOISE, blur=scales is None)
-        low, high = (ends[0], ends[1]) if not estimate.note else (min(low, ends[0]), max(high, ends[1]))
+    if comparison is not None:
+        ends = comparison.interval(_WEAK_NOISE, blur=scales is None)
+        low, high = ends if not estimate.note else (min(low, ends[0]), max(high, ends[1]))
     return replace(
         estimate,
         ci_low=low,
@@ -259,11 +347,11 @@ def _plain(
     )
 
 
-def _allowing_scales(estimate: Estimate, heights: Array, window: Window, misfit: float) -> Estimate:
+def _allowing_scales(estimate: Estimate, free: _FreeEdges, window: Window, misfit: float) -> Estimate:
     """Widen the interval by what blur, noise or a second exponent would give that cannot be excluded."""
-    if heights.size > _LARGE:
+    if free.power is None or free.heights.size > _LARGE:
         return estimate
-    fit = fit_blurred(_cosine_modes.mode_power(heights), window.frame)
+    fit = fit_blurred(free.power, window.frame)
     if fit is None:
         return estimate
     low, high = alternatives(fit, frame_blocks(window.power, window.frame), is_bent=False)
@@ -271,8 +359,41 @@ def _allowing_scales(estimate: Estimate, heights: Array, window: Window, misfit:
         f"the exponent may change with scale ({misfit:+.1f} standard deviations): the interval holds those "
         "that blur, noise or a second exponent would give"
     )
-    low, high = min(estimate.ci_low, low), max(estimate.ci_high, high)
-    return replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, note))
+    return estimate.holding(low, high, note)
+
+
+def _longest_run(free: _FreeEdges, window: Window) -> tuple[Estimate, int] | None:
+    """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
+
+    None if there is no run, or if few waves dominate it.
+    """
+    run = longest_run(octaves(frame_blocks(window.power, window.frame)))
+    if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
+        return None
+    dx = free.surface.spacing[1]
+    part = _modes(replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst))
+    if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
+        return None
+    return run_estimate(run, free.surface), max(1, round(0.5 * run.low))
+
+
+def _run_beside_gaps(free: _FreeEdges) -> tuple[Estimate, int] | None:
+    """Return `_longest_run` of a surface with few gaps, which are filled.
+
+    None if they are many, or if few waves dominate the modes.
+    """
+    if free.surface.finest_scale:
+        return None
+    filled = _without_small_gaps(free.heights, free.surface.plane_spacing, _FEW_GAPS)
+    if np.isnan(filled).any():
+        return None
+    frame = _mode_blocks.frame(filled.shape, free.surface.plane_spacing)
+    power = _cosine_modes.mode_power(filled)
+    fit = fit_blurred(power, frame)
+    if fit is None or not fit.is_even:
+        return None
+    window = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
+    return _longest_run(replace(free, heights=filled, power=power), window)
 
 
 def _is_separable(power: Array, heights: Array) -> bool:
@@ -281,90 +402,16 @@ def _is_separable(power: Array, heights: Array) -> bool:
     return float(power.sum()) <= _ROUNDING * float(np.sum(centred * centred))
 
 
-def _modes(
-    heights: Array, power: Array | None, surface: Surface, scales: Scales, pilot: float
-) -> SurfaceModes:
-    """Return the modes of a surface, those of a large complete one in blocks; `power` if it is complete."""
-    spacing, dx = surface.plane_spacing, surface.spacing[1]
-    window = None if scales is None else (scales[0] / dx, scales[1] / dx)
+def _modes(free: _FreeEdges) -> SurfaceModes:
+    """Return the modes of the window; those of a large complete surface in blocks."""
+    heights, power, spacing = free.heights, free.power, free.surface.plane_spacing
+    dx = free.surface.spacing[1]
+    window = None if free.scales is None else (free.scales[0] / dx, free.scales[1] / dx)
     if power is not None and heights.size > _LARGE:
         return _mode_blocks.BlockModes.of(power, spacing, window)
     lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
     chosen = between(_cosine_modes.wavelengths(lattice), window)
-    return _cosine_modes.FreeModes.of(heights, lattice, chosen, pilot, power)
-
-
-def _hidden(power: Array, surface: Surface, scales: Scales, noise: bool, pilot: float) -> Hidden | None:
-    """Compare the surface with one that is blurred and noisy; None if too few modes are in the window."""
-    frame = _mode_blocks.frame(tuple(n + 1 for n in power.shape), surface.plane_spacing)
-    inside = chosen_blocks(frame, surface, scales)
-    if frame.count[inside].sum() < _LEAST_NUMBER:
-        return None
-    return hidden(Window(frame, inside, frame.mean(power)), pilot, noise=noise)
-
-
-def _with_blur(
-    power: Array, surface: Surface, scales: Scales, noise: bool, spread: float | None, first: Fit
-) -> tuple[Estimate | None, int, bool]:
-    """Return the estimate with blur and noise, and a lag beyond the blur; None where they are not seen.
-
-    The last result is whether no few waves dominate the modes.
-    """
-    frame = _mode_blocks.frame(tuple(n + 1 for n in power.shape), surface.plane_spacing)
-    chosen = chosen_blocks(frame, surface, scales)
-    fit = fit_blurred(power, frame, noise=noise, spread=spread, chosen=chosen, first=first)
-    if fit is None or not is_seen(fit, surface.axes, spread):
-        return None, 1, fit is None or fit.is_even
-    if scales is None and spread is None and not noise:
-        blocks = frame_blocks(frame.mean(power), frame)
-        several = several_exponents(fit, blocks, surface)
-        if several is not None:
-            return several, round(0.5 * several.scale_min / max(surface.spacing)), True
-    estimate = blurred_estimate(fit, surface, fit.amplitude / max(1.0 - fit.hurst, 1e-9))
-    if scales is None and spread is None and not noise:
-        low, high = alternatives(fit, blocks, is_bent=True)
-        if low < estimate.ci_low or high > estimate.ci_high:
-            low, high = min(estimate.ci_low, low), max(estimate.ci_high, high)
-            estimate = replace(estimate, ci_low=low, ci_high=high, note=joined(estimate.note, _OR_SECOND))
-    window = BLURRED_WINDOW if scales is None else ASKED
-    longest = 2.0 * np.pi / float(np.sqrt(frame.squares[chosen].min())) * surface.spacing[1]
-    return replace(estimate, window=window, scale_max=longest), round(_BEYOND * fit.spread), True
-
-
-def _longest_run(heights: Array, window: Window, surface: Surface) -> tuple[Estimate | None, int]:
-    """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
-
-    None if there is no run, or if few waves dominate it.
-    """
-    run = longest_run(octaves(frame_blocks(window.power, window.frame)))
-    if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
-        return None, 1
-    dx = surface.spacing[1]
-    part = _modes(
-        heights, _cosine_modes.mode_power(heights), surface, (run.low * dx, run.high * dx), run.fit.hurst
-    )
-    if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
-        return None, 1
-    return run_estimate(run, surface), max(1, round(0.5 * run.low))
-
-
-def _run_beside_gaps(heights: Array, surface: Surface) -> tuple[Estimate | None, int]:
-    """Return `_longest_run` of a surface with few gaps, which are filled.
-
-    None if they are many, or if few waves dominate the modes.
-    """
-    if surface.finest_scale:
-        return None, 1
-    filled = _without_small_gaps(heights, surface.plane_spacing, _FEW_GAPS)
-    if np.isnan(filled).any():
-        return None, 1
-    frame = _mode_blocks.frame(filled.shape, surface.plane_spacing)
-    power = _cosine_modes.mode_power(filled)
-    fit = fit_blurred(power, frame)
-    if fit is None or not fit.is_even:
-        return None, 1
-    window = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
-    return _longest_run(filled, window, surface)
+    return _cosine_modes.FreeModes.of(heights, lattice, chosen, free.pilot, power)
 
 
 def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
@@ -391,11 +438,7 @@ def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate
     rounding = "" if noise else rounding_note(surface.heights, estimate.standard_error)
     if rounding:
         with_noise = fit_interval(modes, 0.5, True)[1]
-        estimate = replace(
-            estimate,
-            ci_low=min(estimate.ci_low, with_noise.ci_low),
-            ci_high=max(estimate.ci_high, with_noise.ci_high),
-        )
+        estimate = estimate.holding(with_noise.ci_low, with_noise.ci_high)
     jumps = np.diff(heights, append=heights[..., :1], axis=-1)
     cell = float(np.prod(surface.relative_spacing))
     noise_note = _NEGATIVE_NOISE if noise and fit.noise < 0 else ""
@@ -433,11 +476,6 @@ def _without_offsets(heights: Array) -> Array:
     if np.isnan(heights).any():
         return heights
     return np.asarray(heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True) + heights.mean())
-
-
-def _moments(heights: Array, stride: int) -> Moments:
-    """Return the mean square increments of levelled heights and of their blocks."""
-    return increment_moments([(heights, len(heights))], heights.shape, stride)
 
 
 def _stride(scales: Scales, spacing: float) -> int:

@@ -9,14 +9,13 @@ variogram, whatever the gaps. A tilt of the profile is a mean proportional to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.dimensions import _mode_blocks
 from fractalcontact.dimensions._blur import (
-    BLURRED_WINDOW,
     blurred_estimate,
     chosen_blocks,
     fit_blurred,
@@ -118,10 +117,8 @@ def _profile_modes(
             if several is not None:
                 return several, none
         amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
-        estimate = blurred_estimate(fit, surface, amplitude / max(1.0 - fit.hurst, 1e-9))
         longest = heights.size * dx if scales is None else scales[1]
-        window = BLURRED_WINDOW if scales is None else ASKED
-        return replace(estimate, scale_max=longest, window=window), none
+        return blurred_estimate(fit, surface, scales, amplitude, longest), none
     record = octaves(blocks)
     run = longest_run(record)
     if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:

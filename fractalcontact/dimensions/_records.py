@@ -61,6 +61,11 @@ class Estimate:
         """Return the estimate without its standard error and interval."""
         return replace(self, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=reason)
 
+    def holding(self, low: float, high: float, note: str = "") -> Estimate:
+        """Widen the interval until it holds another one, for the reason in the note."""
+        low, high = min(self.ci_low, low), max(self.ci_high, high)
+        return replace(self, ci_low=low, ci_high=high, note=joined(self.note, note))
+
     def gridded(self, finest: float) -> Estimate:
         """Widen the interval by what gridding may have done to the power of the window.
 

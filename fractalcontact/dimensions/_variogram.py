@@ -232,8 +232,8 @@ def _profile_variograms(surfaces: Sequence[Surface], longest: float | None) -> l
     torus = n if periodic else fft.fast_length(2 * n)
     counts = np.full(steps.size, n) if periodic else n - steps
     pairs = np.where(periodic & (2 * steps == n), counts // 2, counts)  # each is met twice at half a period
-    curves = []
-    for start in range(0, len(lines), rows := max(1, _TOGETHER // torus)):
+    curves, rows = [], max(1, _TOGETHER // torus)
+    for start in range(0, len(lines), rows):
         low = lines[start : start + rows].min(axis=1, keepdims=True)
         heights = lines[start : start + rows] - low
         unit = np.ldexp(1.0, np.frexp(heights.max(axis=1, keepdims=True))[1])

@@ -41,9 +41,9 @@ def test_interval_is_that_of_the_standard_error():
 
 def test_blur_that_is_not_seen_is_in_the_interval():
     modes = window(TRANSFER, 0.5, 0.012, 0.0)
-    hidden = _blur_fit.hidden(modes, 0.5, noise=False)
-    assert hidden.plain.hurst > 0.51
-    low, high = hidden.interval(0.08)
+    comparison = _blur_fit.compare(modes, 0.5, noise=False)
+    assert comparison.plain.hurst > 0.51
+    low, high = comparison.interval(0.08)
     assert low < 0.5 < high
-    alone = hidden.interval(0.08, blur=False)
+    alone = comparison.interval(0.08, blur=False)
     assert alone[0] > 0.5
