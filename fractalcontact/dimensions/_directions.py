@@ -24,7 +24,7 @@ from fractalcontact.dimensions._anisotropy import (
     fit_anisotropy,
 )
 from fractalcontact.dimensions._blur import CLEAR, fit_blurred
-from fractalcontact.dimensions._exponent_by_scale import frame_blocks, several_exponents
+from fractalcontact.dimensions._exponent_by_scale import frame_blocks
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
 from fractalcontact.dimensions._records import (
@@ -43,6 +43,7 @@ from fractalcontact.dimensions._second_differences import (
     SecondDifferences,
     lattice_directions,
 )
+from fractalcontact.dimensions._second_exponent import several_exponents
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _cosine_modes, _mode_blocks, _periodic_modes
+from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur import (
     CLEAR,
     BlurredFit,
@@ -23,18 +23,16 @@ from fractalcontact.dimensions._blur import (
 )
 from fractalcontact.dimensions._blur_fit import Comparison, compare
 from fractalcontact.dimensions._exponent_by_scale import (
-    alternatives,
     frame_blocks,
     longest_run,
     octaves,
     run_estimate,
-    several_exponents,
 )
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
 from fractalcontact.dimensions._increment_moments import Moments, increment_moments
 from fractalcontact.dimensions._increments import closed_form, without_steps
 from fractalcontact.dimensions._mode_blocks import LOWEST
-from fractalcontact.dimensions._periodic_modes import PeriodicModes
+from fractalcontact.dimensions._periodic_modes import periodic_likelihood
 from fractalcontact.dimensions._profile_likelihood import profile_likelihood
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import (
@@ -46,6 +44,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
+from fractalcontact.dimensions._second_exponent import alternatives, several_exponents
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import Window
 from fractalcontact.dimensions._waves import without_waves
@@ -67,7 +66,6 @@ _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
 _LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
 _ROUNDING = 1e-26  # relative rounding of the mean square in transforms
-_PERIODIC_WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
 _FREE_WINDOW = "all modes that vary along both axes"
 _INTERPOLATED = 0.01  # share of heights on a line with their neighbours
 _LINEAR = (
@@ -82,7 +80,6 @@ _SEPARABLE = (
     "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
     "exponent is: estimate profiles, or see `directions`"
 )
-_PERIODIC_FAMILY = "periodic family: power law between cut-offs"
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
     "another family than its own: see fractalcontact.surfaces.fill"
@@ -90,13 +87,6 @@ _PERIODIC_GAPS = (
 _OR_SECOND = (
     "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
     "give `noise=True` where it is noise"
-)
-_CUT_OFF_BELOW_NOISE = (
-    "a cut-off that is below the noise looks like another exponent: give `scales` inside the power law of a "
-    "surface; the modes of a profile are too few"
-)
-_NEGATIVE_NOISE = (
-    "the fitted noise is negative and reported as 0: there is none, or short waves were smoothed away"
 )
 
 
@@ -121,7 +111,7 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
 def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) -> Estimate:
     """Fit the family of a surface without single waves."""
     if all(surface.grid.periodic) and surface.is_complete:
-        return _periodic_surface(surface, scales, noise)
+        return periodic_likelihood(surface, scales, noise)
     if surface.finest_scale and scales is None:
         resolved = _fitted(surface, surface.resolved(scales), noise, psf)
         return replace(resolved, window=_RESOLVED_WINDOW)
@@ -343,7 +333,7 @@ def _plain(free: _FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: C
         rms_increment=_rms_increment(fit) * surface.unit,
         noise_height=float(np.sqrt(max(fit.noise, 0.0))) * surface.unit if noise else np.nan,
         window=_FREE_WINDOW if scales is None else ASKED,
-        note=joined(_NEGATIVE_NOISE if noise and fit.noise < 0 else "", estimate.note),
+        note=joined(fit.noise_note, estimate.note),
     )
 
 
@@ -412,63 +402,6 @@ def _modes(free: _FreeEdges) -> SurfaceModes:
     lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
     chosen = between(_cosine_modes.wavelengths(lattice), window)
     return _cosine_modes.FreeModes.of(heights, lattice, chosen, free.pilot, power)
-
-
-def _periodic_surface(surface: Surface, scales: Scales, noise: bool) -> Estimate:
-    """Fit a power law to the modes of a periodic surface or profile."""
-    heights = surface.heights if surface.axes == 2 else surface.heights[0]
-    modes = PeriodicModes.of(heights, surface.relative_spacing)
-    unit = max(surface.grid.extent)
-    has_rolloff = surface.axes == 1 and scales is None and not noise
-    if has_rolloff:
-        low, high = _periodic_modes.cut_offs(modes)
-    elif scales is None:
-        low, high = _periodic_modes.band(modes)
-    else:
-        low, high = unit / scales[1], unit / scales[0]
-    modes = modes.between(low, high)
-    if modes.weights.sum() < LEAST_MODES:
-        return undefined(f"{modes.weights.sum():.0f} modes in the band, at least {LEAST_MODES} are needed")
-    if has_rolloff:
-        modes, fit, estimate = _with_rolloff(modes)
-    else:
-        fit, estimate = fit_interval(modes, 0.5, noise)
-    if noise and (surface.axes == 1 or (scales is None and abs(fit.misfit) > SIGNIFICANT)):
-        estimate = estimate.without_interval(_CUT_OFF_BELOW_NOISE)
-    rounding = "" if noise else rounding_note(surface.heights, estimate.standard_error)
-    if rounding:
-        with_noise = fit_interval(modes, 0.5, True)[1]
-        estimate = estimate.holding(with_noise.ci_low, with_noise.ci_high)
-    jumps = np.diff(heights, append=heights[..., :1], axis=-1)
-    cell = float(np.prod(surface.relative_spacing))
-    noise_note = _NEGATIVE_NOISE if noise and fit.noise < 0 else ""
-    return replace(
-        estimate,
-        scale_min=unit / float(modes.wavenumber.max()),
-        scale_max=unit / float(modes.wavenumber.min()),
-        rms_increment=float(np.sqrt(np.mean(jumps * jumps))) * surface.unit,
-        noise_height=float(np.sqrt(max(fit.noise / cell, 0.0))) * surface.unit if noise else np.nan,
-        window=_PERIODIC_WINDOW if scales is None else ASKED,
-        note=joined(_PERIODIC_FAMILY, noise_note, estimate.note, rounding),
-    )
-
-
-def _with_rolloff(modes: PeriodicModes) -> tuple[PeriodicModes, WhittleFit, Estimate]:
-    """Fit a profile with a roll-off at any wavelength; return its modes beyond the corner as well."""
-    rolloff = _periodic_modes.fit_rolloff(modes)
-    modes = modes.between(rolloff.corner, np.inf)
-    fit, estimate = fit_interval(modes, float(np.clip(rolloff.hurst, 0.01, 1.5)), False)
-    low, high = rolloff.low, rolloff.high
-    if estimate.note:  # the modes do not follow one power law
-        low, high = min(low, estimate.ci_low), max(high, estimate.ci_high)
-    estimate = replace(
-        estimate,
-        hurst=rolloff.hurst,
-        standard_error=rolloff.standard_error,
-        ci_low=low,
-        ci_high=high,
-    )
-    return modes, fit, estimate
 
 
 def _without_offsets(heights: Array) -> Array:

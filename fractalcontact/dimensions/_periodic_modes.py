@@ -1,4 +1,4 @@
-"""Modes of a periodic surface or profile: the band of its power law, and the fit with a roll-off.
+"""Maximum likelihood estimate of a periodic surface or profile: its modes, their band, and a roll-off.
 
 The modes of a periodic Gaussian surface are independent, and it has no shorter waves than its grid carries:
 no window, no aliasing, no edges. What must be found is the band of the power law: where the spectrum is cut
@@ -7,13 +7,16 @@ off, and where it rolls off into a plateau at long waves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.spectra import half_wavenumbers, periodogram, radial_wavenumber
 from fractalcontact.dimensions import _whittle
+from fractalcontact.dimensions._quantisation import rounding_note
+from fractalcontact.dimensions._records import ASKED, SIGNIFICANT, Estimate, joined, undefined
+from fractalcontact.dimensions._surface_input import Scales, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -23,6 +26,70 @@ _NEXT = 4  # rings that must all have fallen: a single mode may be that weak by 
 _PENALTY = 6.0  # decrease of the deviance that a roll-off of a surface must bring
 _EVERY, _CORNERS = 64, 50  # corners tried: all of the first, then so many at growing distances
 _LOWEST, _HIGHEST, _POINTS = -0.4, 1.9, 24  # Hurst exponents searched with a roll-off, and first points
+_WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
+_FAMILY = "periodic family: power law between cut-offs"
+_CUT_OFF_BELOW_NOISE = (
+    "a cut-off that is below the noise looks like another exponent: give `scales` inside the power law of a "
+    "surface; the modes of a profile are too few"
+)
+
+
+def periodic_likelihood(surface: Surface, scales: Scales, noise: bool) -> Estimate:
+    """Fit a power law to the modes of a periodic surface or profile."""
+    heights = surface.heights if surface.axes == 2 else surface.heights[0]
+    modes = PeriodicModes.of(heights, surface.relative_spacing)
+    unit = max(surface.grid.extent)
+    has_rolloff = surface.axes == 1 and scales is None and not noise
+    if has_rolloff:
+        low, high = cut_offs(modes)
+    elif scales is None:
+        low, high = band(modes)
+    else:
+        low, high = unit / scales[1], unit / scales[0]
+    modes = modes.between(low, high)
+    if modes.weights.sum() < _whittle.LEAST_MODES:
+        return undefined(
+            f"{modes.weights.sum():.0f} modes in the band, at least {_whittle.LEAST_MODES} are needed"
+        )
+    if has_rolloff:
+        modes, fit, estimate = _with_rolloff(modes)
+    else:
+        fit, estimate = _whittle.fit_interval(modes, 0.5, noise)
+    if noise and (surface.axes == 1 or (scales is None and abs(fit.misfit) > SIGNIFICANT)):
+        estimate = estimate.without_interval(_CUT_OFF_BELOW_NOISE)
+    rounding = "" if noise else rounding_note(surface.heights, estimate.standard_error)
+    if rounding:
+        with_noise = _whittle.fit_interval(modes, 0.5, True)[1]
+        estimate = estimate.holding(with_noise.ci_low, with_noise.ci_high)
+    jumps = np.diff(heights, append=heights[..., :1], axis=-1)
+    cell = float(np.prod(surface.relative_spacing))
+    return replace(
+        estimate,
+        scale_min=unit / float(modes.wavenumber.max()),
+        scale_max=unit / float(modes.wavenumber.min()),
+        rms_increment=float(np.sqrt(np.mean(jumps * jumps))) * surface.unit,
+        noise_height=float(np.sqrt(max(fit.noise / cell, 0.0))) * surface.unit if noise else np.nan,
+        window=_WINDOW if scales is None else ASKED,
+        note=joined(_FAMILY, fit.noise_note, estimate.note, rounding),
+    )
+
+
+def _with_rolloff(modes: PeriodicModes) -> tuple[PeriodicModes, _whittle.WhittleFit, Estimate]:
+    """Fit a profile with a roll-off at any wavelength; return its modes beyond the corner as well."""
+    rolloff = fit_rolloff(modes)
+    modes = modes.between(rolloff.corner, np.inf)
+    fit, estimate = _whittle.fit_interval(modes, float(np.clip(rolloff.hurst, 0.01, 1.5)), False)
+    low, high = rolloff.low, rolloff.high
+    if estimate.note:  # the modes do not follow one power law
+        low, high = min(low, estimate.ci_low), max(high, estimate.ci_high)
+    estimate = replace(
+        estimate,
+        hurst=rolloff.hurst,
+        standard_error=rolloff.standard_error,
+        ci_low=low,
+        ci_high=high,
+    )
+    return modes, fit, estimate
 
 
 @dataclass(frozen=True)

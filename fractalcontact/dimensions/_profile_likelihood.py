@@ -26,7 +26,6 @@ from fractalcontact.dimensions._exponent_by_scale import (
     longest_run,
     octaves,
     run_estimate,
-    several_exponents,
 )
 from fractalcontact.dimensions._heterogeneity import heterogeneity
 from fractalcontact.dimensions._increment_moments import increment_moments
@@ -34,6 +33,7 @@ from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
+from fractalcontact.dimensions._second_exponent import several_exponents
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
 

@@ -30,6 +30,9 @@ _WIDE = 0.24  # the same while the search is far from its end
 _ROUNDS, _STEPS = 40, 60
 QUANTILE = 3.841458820694124  # 95 % quantile of chi square with one degree of freedom
 UNEVEN = 4.0  # -z of the scatter of the modes beyond which the interval is widened
+_NEGATIVE_NOISE = (
+    "the fitted noise is negative and reported as 0: there is none, or short waves were smoothed away"
+)
 
 # mean logarithm of a squared mode over its expected power, and the variance left once the mean is known
 CHI_SQUARE = (-np.euler_gamma - np.log(2.0), 0.5 * np.pi**2 - 2.0)
@@ -157,6 +160,11 @@ class WhittleFit:
     total: Array
     misfit: float
     converged: bool
+
+    @property
+    def noise_note(self) -> str:
+        """A note where the fitted noise is negative; empty otherwise."""
+        return _NEGATIVE_NOISE if self.noise < 0 else ""
 
 
 @dataclass(frozen=True)
