@@ -60,7 +60,7 @@ SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 _PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are fitted
 _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
-# and a rougher second surface make it positive, and are seen later than a blur
+# and a rougher second surface make it positive, and are harder to see than a blur
 _SLIGHT = -2.5, 1.5
 _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface allows for
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for

@@ -5,6 +5,9 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
+from fractalcontact.dimensions._blur import fit_blurred
+from fractalcontact.dimensions._cosine_modes import mode_power
+from fractalcontact.dimensions._mode_blocks import frame
 
 SPACING, STEP = 1e-4, 1e-6
 
@@ -47,6 +50,21 @@ def test_blur_of_a_large_surface_is_seen():
     assert float(result.ci_low) - margin <= 0.7 <= float(result.ci_high) + margin
     assert float(result.ci_high - result.ci_low) < 0.04
     assert float(result.blur_spread) == pytest.approx(SPACING, rel=0.05)
+
+
+def test_model_of_blur_agrees_with_no_lay():
+    ground = fc.surfaces.fbm((128, 128), 1.0, hurst=0.5, rms_increment=1.0, rng=1).values
+    y, x = np.indices(ground.shape)
+    blocks = frame(ground.shape, (1.0, 1.0))
+    exact = fit_blurred(mode_power(ground), blocks)
+    assert exact.is_good
+    assert exact.is_even
+    for seed in (3, 4):
+        profile = fc.surfaces.fbm((200,), 1.0, hurst=0.5, rms_increment=10.0, rng=seed).values
+        lay = np.interp(x + 0.4 * y, np.arange(200), profile)
+        fit = fit_blurred(mode_power(ground + lay), blocks)
+        assert not fit.is_even
+        assert not fit.is_good
 
 
 def test_noise_after_blur_is_measured():

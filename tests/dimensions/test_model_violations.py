@@ -125,7 +125,7 @@ def test_sum_of_two_surfaces_has_the_exponent_of_each(rng):
 
 @pytest.mark.parametrize("lag", [3.0, 8.0])
 def test_sum_in_a_small_surface_has_a_wide_interval(lag):
-    """Noise and a second exponent are alike at 128 points: one in four intervals held 0.3 before."""
+    """Noise and a second exponent are alike at 128 points."""
     inside, notes = 0, []
     for seed in range(12):
         both = ((0.3, 0), (0.8, 100))
@@ -147,7 +147,7 @@ def test_slight_change_with_scale_widens_the_interval():
     misfits = np.array([float(result.misfit) for result in results])
     np.testing.assert_array_equal(has_note, (misfits >= 1.5) | (misfits <= -2.5))
     assert widths[has_note].min(initial=1.0) > widths[~has_note].max()
-    assert has_note.sum() <= 10  # one in thirteen of exact surfaces
+    assert has_note.sum() <= 10  # one in fourteen of exact surfaces, as measured on 400
 
 
 def test_few_gaps_leave_the_window_of_one_exponent():

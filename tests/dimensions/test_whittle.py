@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import fractalcontact as fc
 from fractalcontact.dimensions import _cosine_modes, _whittle
 
 
@@ -22,6 +23,20 @@ def test_fit_recovers_parameters_of_exact_data():
     noisy = _whittle.fit_power(4.0 * (model(0.6) + 0.07), model, 0.3, noise=0.01)
     assert noisy.hurst == pytest.approx(0.6, rel=1e-3)
     assert noisy.noise == pytest.approx(0.28, rel=1e-2)
+    assert noisy.noise_note == ""
+    smoothed = _whittle.fit_power(4.0 * (model(0.6) - 0.02), model, 0.6, noise=0.01)
+    assert smoothed.noise == pytest.approx(-0.08, rel=0.05)
+    assert "negative" in smoothed.noise_note
+
+
+def test_white_noise_ends_at_the_limit_of_the_range():
+    lattice = _cosine_modes.Lattice.of((40, 40), (1.0, 1.0))
+    model = lambda h: _cosine_modes.expected_power(lattice, h).ravel()  # noqa: E731
+    assert not _whittle.fit_power(np.ones(39**2), model, 0.5).converged
+    white = 1e-6 * np.random.default_rng(1).standard_normal((128, 128))
+    result = fc.dimensions.estimate(fc.surfaces.from_array(white, 1e-4)).isel(method=0)
+    assert "limit of its range" in result.hurst.attrs["comment"]
+    assert float(result.hurst) < 1e-3
 
 
 def test_standard_error_equals_scatter():
