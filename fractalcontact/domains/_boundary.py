@@ -112,7 +112,9 @@ def analyse(planes: Planes) -> xr.Dataset:
         bool,
     )
     sides = np.array([differing[:, :2].sum() for _, differing in counts], np.int64)
-    without_interior = np.isfinite(dimension) & ~has_interior
+    # cells that alternate have sides and no dimension: none of their pairs at two steps differ
+    alternate = np.isnan(dimension) & (sides > 0) & (min(planes.grid.shape) > 2)
+    without_interior = alternate | (np.isfinite(dimension) & ~has_interior)
     notes = _notes(dimension, half_width, without_interior, planes.grid.shape)
     dimension = np.where(has_interior, dimension, np.nan)
     variables = {
@@ -242,9 +244,9 @@ def _notes(
     }
     has_value = np.isfinite(dimension)
     comments = []
-    if not has_value.all():
+    if (is_without := ~(has_value | without_interior)).any():
         reason = "there is no boundary" if min(shape) > 2 else "no boundary can be compared at two steps"
-        comments.append(f"NaN where {reason} ({int((~has_value).sum())} planes)")
+        comments.append(f"NaN where {reason} ({int(is_without.sum())} planes)")
     if without_interior.any():
         comments.append(
             "NaN where the set or its complement has no interior: too few of its cells lie in whole blocks "

@@ -201,6 +201,17 @@ def test_missing_or_short_boundary_is_nan_with_a_reason():
     assert "fewer than 200" in result.ci_low.attrs["comment"]
 
 
+def test_cells_that_alternate_have_no_interior():
+    y, x = np.indices((60, 60))
+    for cells in ((x + y) % 2, x % 2):
+        result = fc.domains.boundary_dimension(as_mask(cells))
+        assert np.isnan(result.boundary_dimension)
+        assert int(result.boundary_sides) > 1000
+        comment = result.boundary_dimension.attrs["comment"]
+        assert "no interior" in comment
+        assert "no boundary (" not in comment
+
+
 def test_unequal_spacings():
     heights = fc.surfaces.fbm((256, 256), (1.0, 2.0), hurst=0.5, rms_increment=1.0, rng=8)
     mask = heights > float(heights.median())
