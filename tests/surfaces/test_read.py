@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import struct
 import sys
 
 import numpy as np
@@ -333,6 +334,41 @@ def test_first_row_by_format(tmp_path, suffix, row_of_largest_y):
     surface = fc.surfaces.read(tmp_path / f"a.{suffix}", units="m")
     assert 1e7 * surface[-1].values == pytest.approx(row_of_largest_y)
     assert surface.y[-1] > surface.y[0]
+
+
+MARKED = np.array([[5.0, 1.0, 1.0], [2.0, 2.0, 3.0]])  # um, the first row first in the file
+
+
+def _sdf():
+    head = {"ManufacID": "x", "CreateDate": "010120200000", "ModDate": "010120200000", "NumPoints": 3}
+    head |= {"NumProfiles": 2, "Xscale": 1e-6, "Yscale": 1e-6, "Zscale": 1e-6, "Zresolution": -1}
+    head |= {"Compression": 0, "DataType": 7, "CheckType": 0}
+    lines = ["aISO-1.0", *(f"{key} = {value}" for key, value in head.items()), "*"]
+    return "\n".join([*lines, *(" ".join(map(str, row)) for row in MARKED), "*", ""]).encode()
+
+
+def _bcr():
+    head = {"fileformat": "bcrf", "xpixels": 3, "ypixels": 2, "xlength": 3, "ylength": 2, "intelmode": 1}
+    head |= {"xunit": "um", "yunit": "um", "zunit": "um"}
+    text = "".join(f"{key} = {value}\n" for key, value in head.items())
+    return text.ljust(2048).encode() + MARKED.astype("<f4").tobytes()
+
+
+def _os3d():
+    texts = b"".join(struct.pack("<i", len(text)) + text for text in (b"marked", b"20200101120000"))
+    head = struct.pack("<iidddd", 3, 2, 1.0, 1.0, 0.0, 0.0)
+    return b"OmniSurf3D" + struct.pack("<ii", 1, 1) + texts + head + MARKED.astype("<f4").tobytes() + b"\0"
+
+
+@pytest.mark.parametrize("made", [_sdf, _bcr, _os3d])
+def test_first_row_of_written_files_is_the_top(tmp_path, made):
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / f"a.{made.__name__[1:]}"
+    path.write_bytes(made())
+    surface = fc.surfaces.read(path)
+    assert 1e6 * surface[-1].values == pytest.approx(MARKED[0], rel=1e-6)
+    assert 1e6 * surface[0].values == pytest.approx(MARKED[1], rel=1e-6)
+    assert [float(surface[axis][1] - surface[axis][0]) for axis in "yx"] == pytest.approx([1e-6, 1e-6])
 
 
 def test_azimuth_of_grooves_in_an_instrument_file(tmp_path):
