@@ -16,7 +16,6 @@ probes give the standard error.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import factorial
 from typing import Any
@@ -100,11 +99,11 @@ class FreeModes:
         def model(hurst: float) -> Array:
             return expected_power(self.lattice, hurst)[self.chosen]
 
-        gaps: Callable[[float], Array] | None = None
+        gaps: _whittle.Excess | None = None
         white = None
         if self.gapped is not None:
             gapped = self.gapped
-            gaps = lambda hurst: gapped.excess(hurst)[self.chosen]  # noqa: E731
+            gaps = lambda hursts: [part[self.chosen] for part in gapped.excess(*hursts)]  # noqa: E731
             white = gapped.white_excess()[self.chosen] if noise else None
         return _whittle.fit_from_starts(self.power, model, start, noise, gaps=gaps, white_excess=white)
 
@@ -322,13 +321,15 @@ class Filling:
         self.observed = observed
         y, x = (np.linspace(-1.0, 1.0, n) for n in observed.shape)
         columns = np.stack(np.broadcast_arrays(1.0, x, y[:, None]))[:, observed]
-        self._plane = np.linalg.qr(columns.T)[0]
+        self._plane = np.ascontiguousarray(np.linalg.qr(columns.T)[0].T)
         inner, self._outer = _laplacian(observed, spacing)
-        self._solve = splu(inner) if inner.shape[0] else None
+        # a Laplacian is symmetric and positive: ordering its own graph, without pivots, is fastest
+        order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+        self._solve = splu(inner, **order) if inner.shape[0] else None
 
     def __call__(self, values: Array) -> Array:
         """Fill a surface from its observed points: shape (points,) to (ny, nx)."""
-        values = values - self._plane @ (values @ self._plane)
+        values = self._without_plane(values)
         heights = np.zeros(self.observed.shape)
         heights[self.observed] = values
         if self._solve is not None:
@@ -340,7 +341,14 @@ class Filling:
         values = heights[self.observed]
         if self._solve is not None:
             values = values - self._outer.T @ self._solve.solve(heights[~self.observed], "T")
-        return np.asarray(values - self._plane @ (values @ self._plane))
+        return self._without_plane(values)
+
+    def _without_plane(self, values: Array) -> Array:
+        """Subtract the plane of least squares; `einsum` starts no threads of a linear algebra library."""
+        rest = values.copy()
+        for row in self._plane:
+            rest -= row * np.einsum("i,i", values, row)
+        return rest
 
 
 def _laplacian(observed: Array, spacing: tuple[float, float]) -> tuple[Any, Any]:
@@ -416,14 +424,18 @@ class GappedModes:
         values = heights[self.observed]
         return np.asarray(cosine_modes(self.filling(values - values.mean())) ** 2)
 
-    def excess(self, hurst: float) -> Array:
-        """Return the excess of the expected power over that of the complete surface."""
-        symbol = _symbol(self.lattice.covariance(hurst))
-        excess = np.zeros(self._root.shape)
+    def excess(self, *hursts: float) -> list[Array]:
+        """Return the excess of the expected power over that of the complete surface, at each exponent."""
+        symbols = [_symbol(self.lattice.covariance(hurst)) for hurst in hursts]
+        excess = [np.zeros(self._root.shape) for _ in hursts]
         for sign, (observed, complete) in zip(self._signs, self._sources, strict=True):
-            filled = self.filling(_convolved(symbol, self._embed(observed))[self.observed])
-            excess += sign * cosine_modes(filled - _convolved(symbol, complete))
-        return np.asarray(excess / (len(self._signs) * self._root))
+            modes = _padded_modes(complete)  # one transform for all exponents
+            whole = [_product(symbol, modes, complete.shape) for symbol in symbols]
+            modes = _padded_modes(self._embed(observed))
+            for k, symbol in enumerate(symbols):
+                filled = self.filling(_product(symbol, modes, complete.shape)[self.observed])
+                excess[k] += sign * cosine_modes(filled - whole[k])
+        return [part / (len(self._signs) * self._root) for part in excess]
 
     def white_excess(self) -> Array:
         """Return the excess of the expected power of white noise."""
@@ -490,6 +502,16 @@ def _symbol(covariance: Array) -> Array:
 
 def _convolved(symbol: Array, heights: Array) -> Array:
     """Multiply heights by the covariance matrix, by transforms on the torus."""
+    return _product(symbol, _padded_modes(heights), heights.shape)
+
+
+def _padded_modes(heights: Array) -> Array:
+    """Transform heights on the torus of twice the size."""
     ny, nx = heights.shape
-    modes = fft.rfft2(np.pad(heights, ((0, ny), (0, nx))))
-    return fft.irfft2(symbol * modes, (2 * ny, 2 * nx))[:ny, :nx]
+    return fft.rfft2_padded(heights, (2 * ny, 2 * nx))
+
+
+def _product(symbol: Array, modes: Array, shape: tuple[int, ...]) -> Array:
+    """Multiply transformed heights by the covariance matrix."""
+    ny, nx = shape
+    return fft.irfft2_cropped(symbol * modes, (2 * ny, 2 * nx), (ny, nx))

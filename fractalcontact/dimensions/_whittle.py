@@ -21,6 +21,7 @@ from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, normal_int
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Model = Callable[[float], Array]
+Excess = Callable[[tuple[float, ...]], list[Array]]
 
 LEAST_MODES = 12
 LOWEST, HIGHEST = 1e-4, 1.9  # range of H where the lattice covariance is defined
@@ -184,13 +185,13 @@ class _Local:
 
     @classmethod
     def expanded(
-        cls, model: Model, gaps: Model | None, centre: float, width: float, white_excess: Array | None
+        cls, model: Model, gaps: Excess | None, centre: float, width: float, white_excess: Array | None
     ) -> _Local:
         """Evaluate the models at the nodes; the excess is small enough for a straight line."""
         low, level, high = (np.log(model(float(np.exp(centre + i * width)))) for i in (-1, 0, 1))
         excess = None
         if gaps is not None:
-            left, right = (gaps(float(np.exp(centre + i * width))) for i in (-1, 1))
+            left, right = gaps((float(np.exp(centre - width)), float(np.exp(centre + width))))
             excess = (0.5 * (left + right), 0.5 * (right - left))
         return cls(centre, width, level, 0.5 * (high - low), 0.5 * (high + low) - level, excess, white_excess)
 
@@ -221,7 +222,7 @@ def fit_power(
     start: float,
     *,
     noise: float | None = None,
-    gaps: Model | None = None,
+    gaps: Excess | None = None,
     white_excess: Array | None = None,
     weights: Array | None = None,
 ) -> WhittleFit:
@@ -239,7 +240,7 @@ def fit_power(
         First guess of the noise over the amplitude; None: no noise is fitted. The estimate may be
         negative: a limit at zero would bias the interval of H.
     gaps : callable, optional
-        Hurst exponent to the excess of the expected power that gaps cause.
+        Hurst exponents to the excess of the expected power that gaps cause at each of them.
     white_excess : ndarray, optional
         Excess of the expected power of white noise.
     weights : ndarray, shape (modes,), optional

@@ -49,3 +49,18 @@ def test_closed_form_is_linear_in_points(surface):
         large = fastest(lambda: fc.dimensions.estimate(surface, "increments"))
     assert large < 8 * small
     assert np.isfinite(large)
+
+
+def test_block_gap_within_twice_the_complete_surface(surface):
+    complete = surface[:512, :512]
+    gapped = complete.copy(deep=True)
+    gapped[128:192, 170:234] = np.nan
+    with threads.limit(1):
+        for part in (complete, gapped):
+            fc.dimensions.estimate(part)
+        pairs = [
+            [fastest(lambda part=part: fc.dimensions.estimate(part), rounds=1) for part in (complete, gapped)]
+            for _ in range(5)
+        ]
+    whole, with_gap = np.median(pairs, axis=0)
+    assert with_gap < 2.0 * whole
