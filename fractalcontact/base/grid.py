@@ -89,12 +89,12 @@ def centres(n: int, spacing: float, origin: float = 0.0) -> Array:
 
 def plane_coords(
     shape: Sequence[int], spacing: Sequence[float], periodic: Sequence[bool], dims: Sequence[str] = ("y", "x")
-) -> dict[str, xr.DataArray]:
+) -> dict[str, xr.Variable]:
     """Return coordinates with their period for a plane or profile that starts at the origin."""
     coords = {}
     for dim, n, step, wraps in zip(dims, shape, spacing, periodic, strict=True):
         attributes = {"units": "m"} | ({"period": float(n * step)} if wraps else {})
-        coords[dim] = xr.DataArray(centres(int(n), float(step)), dims=dim, attrs=attributes)
+        coords[dim] = xr.Variable((dim,), centres(int(n), float(step)), attributes, fastpath=True)
     return coords
 
 
@@ -210,9 +210,10 @@ def surface_faults(
     else:
         if finite:
             yield from _missing_faults(surface.values, argument)
-        if surface.chunks is None:
+        in_memory = surface.chunks is None
+        if in_memory:
             yield from _size_faults(surface.values, argument, decades)
-        if surface.chunks is None and not finite and np.isinf(distinct(surface.values)).any():
+        if in_memory and not finite and np.isinf(distinct(surface.values)).any():
             yield argument, "heights that are finite or NaN", "infinite heights"
     if surface.dims[-len(dims) :] == dims:
         for dim in dims:

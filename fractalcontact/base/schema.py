@@ -10,10 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
+
+from fractalcontact.base.construction import with_variables
 
 CONVENTIONS = "CF-1.11"
 CORE_DIMS = ("y", "x")
@@ -30,6 +33,12 @@ class Quantity:
     long_name: str
     attributes: dict[str, Any] = field(default_factory=dict)
     other_units: tuple[str, ...] = ()
+
+    @cached_property
+    def labels(self) -> dict[str, Any]:
+        """Attributes of a variable of this name."""
+        units = {} if self.units is None else {"units": self.units}
+        return {"long_name": self.long_name} | units | self.attributes
 
 
 OPEN, CONTACT, YIELDED = 0, 1, 2
@@ -550,7 +559,11 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     KeyError
         A name is not in the table.
     """
-    data = data.copy(deep=False)
+    if isinstance(data, xr.Dataset):
+        variables = {name: variable.copy(deep=False) for name, variable in data.variables.items()}
+        data = with_variables(data, variables)
+    else:
+        data = data.copy(deep=False)
     coordinates = data.coords.variables  # not DataArrays, which take 30 microseconds each to make
     for name, coordinate in coordinates.items():
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
@@ -566,11 +579,13 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     for name, variable in data.variables.items():
         if name in coordinates:
             continue
-        notes = {key: variable.attrs[key] for key in NOTES if keep_notes and key in variable.attrs}
-        if name in QUANTITIES and variable.attrs.get("units") in QUANTITIES[str(name)].other_units:
-            notes["units"] = variable.attrs["units"]
+        given = variable.attrs
         _label_variable(str(name), variable, is_coordinate=False)
-        variable.attrs.update(notes)
+        if given:
+            notes = {key: given[key] for key in NOTES if keep_notes and key in given}
+            if given.get("units") in QUANTITIES[str(name)].other_units:
+                notes["units"] = given["units"]
+            variable.attrs.update(notes)
     return data
 
 
@@ -586,11 +601,7 @@ def encoded(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) -> None:
-    quantity = QUANTITIES[name]
-    attributes: dict[str, Any] = {"long_name": quantity.long_name}
-    if quantity.units is not None:
-        attributes["units"] = quantity.units
-    attributes.update(quantity.attributes)
+    attributes = QUANTITIES[name].labels.copy()
     if name in CORE_DIMS and "period" in variable.attrs:
         attributes["period"] = float(variable.attrs["period"])
     variable.attrs = attributes
@@ -612,10 +623,11 @@ def _label_own(name: str, variable: xr.Variable) -> None:
 
 
 def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:
-    if variable.dtype.kind in "US" or variable.dtype == object:
+    kind = variable.dtype.kind
+    if kind in "USO":
         return {"dtype": "S1"}
     encoding: dict[str, Any] = {}
-    if is_coordinate or variable.dtype.kind != "f":
+    if is_coordinate or kind != "f":
         encoding["_FillValue"] = None
     if is_coordinate or not variable.ndim:
         return encoding

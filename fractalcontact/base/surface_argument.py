@@ -36,10 +36,10 @@ def with_surface(
     signature : Signature
         That of the function; nothing is done where it has no argument `surface`, or it has a `spacing`.
     """
-    names = list(signature.parameters)
+    names = signature.parameters
     if SURFACE not in names or SPACING in names:
         return arguments, dict(options), ""
-    place, words = names.index(SURFACE), dict(options)
+    place, words = list(names).index(SURFACE), dict(options)
     value = arguments[place] if place < len(arguments) else words.get(SURFACE)
     spacing = words.pop(SPACING, None)
     surface, notes = usual_form(where, value, spacing)
@@ -109,9 +109,10 @@ def _only_height(dataset: xr.Dataset) -> xr.DataArray | None:
 
 def _ascending_metres(array: xr.DataArray, dim: str) -> tuple[xr.DataArray, list[str]]:
     """Return an array with a coordinate in metres that ascends, and what was done."""
-    if dim not in array.coords or array.coords[dim].dtype.kind not in "fiu" or array.sizes[dim] < 2:
+    axis = array.coords.variables.get(dim)  # not coords[dim], a DataArray, which takes longer
+    if axis is None or axis.dtype.kind not in "fiu" or array.sizes[dim] < 2:
         return array, []
-    axis, notes = array.coords[dim], []
+    notes = []
     unit = axis.attrs.get("units")
     if isinstance(unit, str) and unit in UNITS and unit not in METRES:
         attributes = dict(axis.attrs) | {"units": "m"}

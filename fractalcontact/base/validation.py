@@ -13,7 +13,7 @@ problem; if there is none, all values are valid. A check that needs valid values
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from inspect import Signature
@@ -347,12 +347,9 @@ class Problems:
         return self.require(allowed, argument, expected, value)
 
 
-def check_flags(problems: Problems, signature: Signature, arguments: Mapping[str, Any]) -> set[str]:
-    """Check the arguments that a signature declares as `bool`, and return their names: no word is true."""
-    flags = {name for name, parameter in signature.parameters.items() if parameter.annotation == "bool"}
-    for name in sorted(flags):
-        problems.boolean(name, arguments[name])
-    return flags
+def flags_of(signature: Signature) -> list[str]:
+    """Return the names of the arguments that a signature declares as `bool`, sorted: no word is true."""
+    return sorted(name for name, parameter in signature.parameters.items() if parameter.annotation == "bool")
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges, read_grid
@@ -403,7 +404,7 @@ def _dataset(surface: xr.DataArray, grid: Grid, planes: Sequence[PressedPlane]) 
         variables[name] = ((*leading, "step", "y", "x"), maps.reshape(shape))
     if planes[0].maps:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
-    return xr.Dataset(variables, coords)
+    return make_dataset(variables, coords)
 
 
 def _add_reasons(result: xr.Dataset) -> None:

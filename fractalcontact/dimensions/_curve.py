@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.dimensions._surface_input import Surface
@@ -75,7 +76,7 @@ def curve_dataset(
     axes = zip(surface.dims[-surfaces[0].axes :], surfaces[0].grid.periodic, strict=True)
     periodic = " ".join(str(axis) for axis, is_periodic in axes if is_periodic) or "none"
     data["run_time"] = np.nan  # is set at the end; a variable that is added later takes longer
-    return xr.Dataset(data, coords=coords, attrs={"periodic_axes": periodic})
+    return make_dataset(data, coords, {"periodic_axes": periodic})
 
 
 def window_slope(curve: Curve) -> Array:

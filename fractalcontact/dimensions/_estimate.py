@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.memory import Plane
 from fractalcontact.base.references import joined_references
@@ -203,7 +204,7 @@ def _dataset(
     used = [METHODS[DEFAULT if name == "default" else name].references for name in names]
     references = joined_references(*used)
     coords |= {"method": np.array(names, dtype=str), "increment_lag": spacing}
-    return xr.Dataset(data, coords=coords, attrs={"default_method": DEFAULT, "references": references})
+    return make_dataset(data, coords, {"default_method": DEFAULT, "references": references})
 
 
 def _with_reasons(result: xr.Dataset, names: Sequence[str], estimates: Sequence[Estimate]) -> xr.Dataset:

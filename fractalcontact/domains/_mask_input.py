@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, periodic_axes, read_grid
 from fractalcontact.base.numbers import float_array
@@ -278,9 +279,9 @@ def build_dataset(
     on_grid = planes.plane_coords if on_plane else {}
     of_rows = _row_coords(planes, *rows) if rows else {}
     variables = {**variables, "run_time": ((), np.nan)}  # reserved for `public_result`
-    dataset = xr.Dataset(variables, coords={**leading, **on_grid, **of_rows, **(coords or {})})
+    dataset = make_dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
     for name, attributes in (notes or {}).items():
-        dataset[name].attrs.update(attributes)
+        dataset.variables[name].attrs.update(attributes)
     return dataset
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
+from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import scaled_slopes, shifted
@@ -109,10 +110,10 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     values = {name: np.array([row[name] for row in rows]).reshape(lengths) for name in rows[0]}
     values["missing_points"] = values["missing_points"].astype(np.int64)
     by_modes = all(grid.periodic) and not np.isnan(planes).any()
-    result = xr.Dataset(
+    result = make_dataset(
         {name: (leading, value) for name, value in values.items()} | {"run_time": np.nan},  # is set later
-        coords=leading_coords(surface, leading, _result_names(len(grid.shape))),
-        attrs={"derivatives": "modes" if by_modes else "differences"},
+        leading_coords(surface, leading, _result_names(len(grid.shape))),
+        {"derivatives": "modes" if by_modes else "differences"},
     )
     _explain_missing(result, planes)
     return result
