@@ -46,6 +46,8 @@ _ROUNDING = 1e-22  # of the strongest mode
 _LEFT = 0.05  # of the mean square increment, below which many waves are all there is
 _NONE_LEFT = 1e-8
 _NAMED = 3  # waves in a note
+_MULTIPLES = 12  # of a wave that are looked for at their own places
+_MULTIPLE_WIDTH, _LEAST_RAY = 2.0, 5  # modes beside a multiple that it changes, and modes that must be left
 _FEW = 3
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
@@ -164,7 +166,8 @@ def _is_progression(found: Sequence[Wave]) -> bool:
 def find_waves(surface: Surface) -> list[Wave]:
     """Return the single waves of a complete surface or profile, the strongest first.
 
-    Waves are searched in rounds, as a strong one hides others; none if there are more than a few dozen.
+    Waves are searched in rounds, as a strong one hides others; none if there are more than a few dozen. The
+    multiples of a wave, which the cusps of a turned surface have, are few places, and stand on its ray.
     """
     heights = surface.heights
     window = tuple(
@@ -176,7 +179,9 @@ def find_waves(surface: Surface) -> list[Wave]:
     for _ in range(_ROUNDS):
         part = without_trend(heights[window], plane=not is_periodic)
         tapers = [window_weights(n, None if is_periodic or n == 1 else "hann") for n in part.shape]
-        peaks = _peaks(part * tapers[0][:, None] * tapers[1], surface.plane_spacing, surface.axes)
+        multiples = _multiples(found, part.shape, surface.axes)
+        tapered = part * tapers[0][:, None] * tapers[1]
+        peaks = _peaks(tapered, surface.plane_spacing, surface.axes, multiples)
         if len(found) + len(peaks) > MOST:
             return []
         new = [
@@ -189,10 +194,29 @@ def find_waves(surface: Surface) -> list[Wave]:
     return sorted(found, key=lambda wave: -wave.amplitude)
 
 
+def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Array:
+    """Mark the modes at the multiples of waves, and those next to them."""
+    marked = np.zeros(shape, dtype=bool)
+    near = [(row, column) for row in ((0,) if axes == 1 else (-1, 0, 1)) for column in (-1, 0, 1)]
+    for wave in found:
+        for multiple in range(2, _MULTIPLES + 1):
+            cycles = multiple * np.array(wave.cycles)
+            if float(np.abs(cycles).max()) > 0.5:
+                break
+            for side in (-1, 1):
+                place = np.rint(side * cycles * shape).astype(np.int64)
+                for step in near:
+                    marked[tuple((place + step) % shape)] = True
+    return marked
+
+
 def _peaks(
-    tapered: Array, spacing: tuple[float, float], axes: int
+    tapered: Array, spacing: tuple[float, float], axes: int, multiples: Array
 ) -> list[tuple[tuple[float, float], float]]:
-    """Return the cycles per point (y, x) and the p value of the modes that stand out."""
+    """Return the cycles per point (y, x) and the p value of the modes that stand out.
+
+    Those of `multiples` are tested among themselves, and not against the ray through them.
+    """
     from scipy.ndimage import maximum_filter, uniform_filter
 
     ny, nx = tapered.shape
@@ -222,7 +246,9 @@ def _peaks(
     is_surrounded = (number > 0.1 * np.prod(sizes[0])) & (total > np.finfo(float).tiny)
     ratio = np.where(is_surrounded, white * number / np.where(is_surrounded, total, 1.0), 0.0)
     allowed = (radius >= _LONGEST[axes]) & ~mirrored
-    count, freedom = 0.5 * power.size, _FREEDOM[axes]
+    freedom = _FREEDOM[axes]
+    among = max(1, int(np.count_nonzero(multiples)))
+    count = 0.5 * np.where(multiples, among, power.size)
     least = freedom * ((count / FALSE_ALARM) ** (1.0 / freedom) - 1.0)
     places = np.argwhere(allowed & (ratio > least) & (power == maximum_filter(power, sizes[1], mode="wrap")))
     share = power * (2.0 - np.cos(2.0 * np.pi * y)[:, None] - np.cos(2.0 * np.pi * x))
@@ -230,11 +256,11 @@ def _peaks(
     on_edge = (places[:, 1] == 0) | (2 * places[:, 1] == nx)  # both signs of y are the same wave there
     places = places[~on_edge | (y[places[:, 0]] >= 0.0)]
     rays = np.stack([y[places[:, 0]] * ny, x[places[:, 1]] * nx], axis=1)
-    places = places[_above_rays(white, places, rays)]
+    places = places[multiples[tuple(places.T)] | _above_rays(white, places, rays)]
     return [
         (
             (float(y[row]), float(x[column])),
-            float(min(1.0, count * (1.0 + ratio[row, column] / freedom) ** -freedom)),
+            float(min(1.0, count[row, column] * (1.0 + ratio[row, column] / freedom) ** -freedom)),
         )
         for row, column in places
     ]
@@ -256,17 +282,25 @@ def _whitened(power: Array, radius: Array, axes: int) -> Array:
 
 
 def _above_rays(white: Array, places: Array, rays: Array) -> Array:
-    """Return which modes stand above both parts of the ray through them; `rays` are their mode numbers."""
+    """Return which modes stand above both parts of the ray through them; `rays` are their mode numbers.
+
+    The multiples of a mode, as those of cusps, are left out of its ray, unless little of it would be left.
+    """
     if not len(places):
         return np.zeros(0, dtype=bool)
     peaks = white[tuple(places.T)]
-    along = rays / np.hypot(*rays.T)[:, None]
+    distance = np.hypot(*rays.T)[:, None]
+    along = rays / distance
+    beyond = np.abs(_RADIAL - distance * np.maximum(np.rint(_RADIAL / distance), 1.0)) > _MULTIPLE_WIDTH
+    beyond |= np.count_nonzero(beyond, axis=1, keepdims=True) < _LEAST_RAY
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) * (min(white.shape) > 1)
     means = []
     for side in (-1, 1):
         at = places[:, None, None] + side * _RADIAL[:, None, None] * along[:, None, None]
         at = np.rint(at + np.arange(-1, 2)[:, None] * across[:, None, None]).astype(np.int64)
         ray = white[at[..., 0] % white.shape[0], at[..., 1] % white.shape[1]]
+        if side > 0:
+            ray = ray * beyond[:, :, None]
         number = np.maximum(np.count_nonzero(ray, axis=(1, 2)), 1)
         means.append(np.minimum(ray, 0.25 * peaks[:, None, None]).sum(axis=(1, 2)) / number)
     return np.asarray(peaks > _ABOVE_RAY * np.maximum(*means))

@@ -139,6 +139,26 @@ def test_marks_do_not_change_the_estimate(amplitude):
         assert "removed" not in alone.hurst.attrs["comment"]
 
 
+def test_cusps_of_a_turned_surface_are_found_with_their_multiples():
+    """Parabolic cusps: the k-th of their waves has the amplitude 4 / (pi k)^2 times their height."""
+    numbers, errors = [], []
+    for seed in range(4):
+        surface = brownian((192, 192), 0.6, 40 + seed)
+        angle = np.radians(12.0)
+        along = (surface.x * np.cos(angle) + surface.y * np.sin(angle)) / (17.0 * SPACING)
+        cusps = surface + (3.0 * STEP * 4.0 * ((along + 0.13) % 1.0 - 0.5) ** 2).transpose("y", "x")
+        found = fc.dimensions.waves(cusps)
+        multiples = 17.0 * SPACING / found.wavelength.values
+        np.testing.assert_allclose(multiples, np.rint(multiples), atol=0.03)
+        expected = 3.0 * STEP * 4.0 / (np.pi * np.rint(multiples)) ** 2
+        np.testing.assert_allclose(found.wave_amplitude, expected, atol=0.25 * STEP)
+        numbers.append(found.sizes["wave"])
+        alone, marked = (float(fc.dimensions.estimate(each).hurst[0]) for each in (surface, cusps))
+        errors.append(marked - alone)
+    assert min(numbers) >= 4
+    assert abs(np.mean(errors)) < 0.012
+
+
 def test_marks_on_profiles_and_periodic_surfaces():
     profile = brownian((2048,), 0.5, 20)
     marked = fc.dimensions.estimate(profile + marks(profile, 0.0, 9.0, 5.0))
