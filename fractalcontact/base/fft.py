@@ -51,6 +51,32 @@ def irfft2(
     return _backward(modes, (-2, -1), shape, out, overwrite)
 
 
+class PlaneTransform:
+    """Transforms of planes of one shape: the library is chosen once, and a small plane takes one call of it.
+
+    `rfft2` and `irfft2` take twice as long for 8 x 8 points, and a third more for 32 x 32.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.shape = shape
+        self.in_place = writes_in_place()
+        size, half = shape[0] * shape[1], shape[0] * (shape[1] // 2 + 1)
+        self._r2c = _ducc0().r2c if self.in_place and size <= SMALL else None
+        self._c2r = _ducc0().c2r if self.in_place and half <= SMALL else None
+
+    def forward(self, plane: Array, out: Array | None = None) -> Array:
+        """Return the modes of a plane, in `out` if it is given."""
+        if self._r2c is None:
+            return _forward(plane, (-2, -1), out)
+        return self._r2c(plane, (0, 1), True, 0, out, 1)  # type: ignore[no-any-return]
+
+    def backward(self, modes: Array, out: Array | None = None) -> Array:
+        """Return the plane of modes, which are overwritten, in `out` if it is given."""
+        if self._c2r is None:
+            return _backward(modes, (-2, -1), self.shape, out, overwrite=True)
+        return self._c2r(modes, (0, 1), self.shape[1], False, 2, out, 1, True)  # type: ignore[no-any-return]
+
+
 def rfft(line: Array) -> Array:
     """Transform the last axis of a real array: (..., n) to (..., n//2 + 1)."""
     return _forward(line, (-1,), None)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import is_real
 
 UNIFORM = 1e-6  # largest distance of a centre from its place on a uniform axis, in spacings
@@ -210,7 +211,7 @@ def surface_faults(
     else:
         if finite:
             yield from _missing_faults(surface.values, argument)
-        in_memory = surface.chunks is None
+        in_memory = not has_blocks(surface)
         if in_memory:
             yield from _size_faults(surface.values, argument, decades)
         if in_memory and not finite and np.isinf(distinct(surface.values)).any():

@@ -34,6 +34,7 @@ from fractalcontact.base.errors import InvalidInput, LoadedWarning, TooLittleMem
 from fractalcontact.base.memory import (
     NEGLIGIBLE,
     Estimate,
+    has_blocks,
     loaded_bytes,
     peak_of,
     plane_in,
@@ -172,7 +173,7 @@ def public_result(
 def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:
     """Warn that a function loads the dask arrays among its arguments; masks are read block by block."""
     for argument, value in arguments.items():
-        if argument in MASKS or not isinstance(value, (xr.DataArray, xr.Dataset)) or not value.chunks:
+        if argument in MASKS or not isinstance(value, (xr.DataArray, xr.Dataset)) or not has_blocks(value):
             continue
         message = (
             f"{name}: the dask arrays of `{argument}` are loaded into memory, {value.nbytes / 1e6:.3g} MB"

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from inspect import Signature
+from math import isfinite
 from os import R_OK, PathLike, access, fsencode, fspath
 from pathlib import Path
 from types import TracebackType
@@ -133,6 +134,10 @@ class Problems:
         """Check for one finite real number inside the bounds; `optional` allows None."""
         if value is None and optional:
             return True
+        if type(value) is float and isfinite(value):  # as most are, and a tenth of the time
+            inside = (above is None or value > above) and (at_least is None or value >= at_least)
+            if inside and (below is None or value < below) and (at_most is None or value <= at_most):
+                return True
         if number_of_axes(value) != 0:
             self.add(argument, "one number", value)
             return False

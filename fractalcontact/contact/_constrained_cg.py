@@ -97,7 +97,7 @@ PATIENCE = 40  # iterations without progress
 SMALLEST_FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 MAX_HALVINGS = 20
 MAX_FORCE_CORRECTIONS = 50
-STRIP = 32  # rows at a time, which stay in the cache
+STRIP, STRIP_NODES = 32, 1 << 14  # rows at a time, or nodes if these are more rows: they stay in the cache
 RELEASED: Array = np.empty((0, 0))  # stands in for an array whose memory is free for the next one
 
 
@@ -319,9 +319,11 @@ class ConstrainedCG:
         else:
             closure = self.control.value
             objective -= closure * force
-        scale = max(p_u / force if force > 0 else 0.0, force * self.local_compliance)
+        displacement = p_u / force if force > 0 else 0.0  # mean over the contact
+        scale = max(displacement, force * self.local_compliance)
         rounding = 8 * self.epsilon * (abs(p_u) + abs(p_h) + abs(closure) * force)
-        floor = 64 * self.epsilon * abs(closure) / scale if scale > 0 else 0.0
+        # g is a difference of u, h and the closure; the closure may be near 0, where h counts from it
+        floor = 64 * self.epsilon * (abs(closure) + abs(displacement)) / scale if scale > 0 else 0.0
         return Evaluation(objective, rounding, force, p_u, closure, scale, floor)
 
     def saturated_closure(self) -> float:
@@ -395,6 +397,8 @@ class ConstrainedCG:
         state = (self.h, self.u, self.p, self.p_max, closure, admit, shift)
         written = (free.mask, plane, free.bin_sums, free.bin_counts)
         changes = self.pass_sums(_kernels.select_free_set, bin_columns, *state, *written)[0]  # (3)
+        if changes > 0:
+            free.weight = None
         if self.preconditioned:
             plane, extra = self.preconditioner.apply(plane, free)
         else:
@@ -501,7 +505,7 @@ class ConstrainedCG:
 def subtract_step(start: int, stop: int, x: Array, t: Array, tau: Any) -> None:
     """Compute x -= tau t, over strips of rows that fit the caches."""
     with np.errstate(all="ignore"):  # as the compiled loops
-        for part in strips(start, stop):
+        for part in strips(start, stop, x.shape[1]):
             x[part] -= tau * t[part]
 
 
@@ -510,7 +514,7 @@ def subtract_and_clip(
 ) -> None:
     """Compute out = min(factor max(p - tau t, 0), p_max), over strips of rows."""
     with np.errstate(all="ignore"):  # as the compiled loops
-        for part in strips(start, stop):
+        for part in strips(start, stop, p.shape[1]):
             band = out[part]
             np.multiply(t[part], tau, out=band)
             np.subtract(p[part], band, out=band)
@@ -521,7 +525,8 @@ def subtract_and_clip(
                 np.minimum(band, p_max, out=band)
 
 
-def strips(first: int, stop: int) -> Iterator[slice]:
+def strips(first: int, stop: int, columns: int) -> Iterator[slice]:
     """Yield slices of a few rows."""
-    for row in range(first, stop, STRIP):
-        yield slice(row, min(row + STRIP, stop))
+    rows = max(STRIP, STRIP_NODES // columns)
+    for row in range(first, stop, rows):
+        yield slice(row, min(row + rows, stop))

@@ -6,6 +6,7 @@ The kernels are imported where they run, because options are validated without t
 from __future__ import annotations
 
 from copy import copy
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,6 +15,9 @@ from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+
+SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for the next call
 
 
 class Operator(Protocol):
@@ -43,28 +47,51 @@ class FreeOperator:
     """Half-space loaded inside a window: convolution on a plane padded so that nothing wraps around."""
 
     def __init__(self, table: Array, dtype: Any = np.float64) -> None:
-        shape = table.shape
-        self.padded = (padded_length(shape[0]), padded_length(shape[1]))
+        self.shape = (table.shape[0], table.shape[1])
+        self.padded = (padded_length(self.shape[0]), padded_length(self.shape[1]))
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
+        self.transform = fft.PlaneTransform(self.padded)
+        self.is_small = self.padded[0] * self.padded[1] <= 4 * SMALL
         self.modes: Array | None = None
+        self.planes: tuple[Array, Array] | None = None  # padded, of a small body
         self.transforms = 0
 
     def rounded(self, dtype: Any) -> FreeOperator:
-        """Return the same operator in another precision."""
+        """Return the same operator in another precision, or in the same one with arrays of its own."""
         other = copy(self)
-        other.symbol, other.modes, other.transforms = self.symbol.astype(dtype), None, 0
+        other.symbol = self.symbol.astype(dtype, copy=False)
+        other.modes, other.planes, other.transforms = None, None, 0
         return other
 
-    # `out` is of no use: the displacement is cropped from the padded plane, which is held anyway
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
-        """Return the displacement under `pressure`."""
-        from fractalcontact.contact._kernels import multiply_modes
-
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the displacement under `pressure`; only that of a small body is written into `out`."""
         self.transforms += 1
+        if self.is_small:
+            return self.apply_at_once(pressure, out)
         modes = fft.rfft2_padded(pressure, self.padded, self.modes)
         self.modes = modes if fft.writes_in_place() else None
+        self.multiply(modes)
+        return fft.irfft2_cropped(modes, self.padded, self.shape)
+
+    def apply_at_once(self, pressure: Array, out: Array | None) -> Array:
+        """Return the displacement, from transforms of the whole padded plane: a call each."""
+        if self.planes is None:
+            self.planes = np.zeros(self.padded, pressure.dtype), np.empty(self.padded, pressure.dtype)
+        (ny, nx), (loaded, moved) = self.shape, self.planes
+        loaded[:ny, :nx] = pressure
+        self.modes = modes = self.transform.forward(loaded, self.modes)
+        self.multiply(modes)
+        displacement = self.transform.backward(modes, moved)[:ny, :nx]
+        if out is None:
+            return displacement.copy()
+        out[...] = displacement
+        return out
+
+    def multiply(self, modes: Array) -> None:
+        """Multiply the modes by the symbol, in place."""
+        from fractalcontact.contact._kernels import multiply_modes
+
         in_bands(multiply_modes, modes.shape[0], modes.size, real_parts(modes), self.symbol)
-        return fft.irfft2_cropped(modes, self.padded, (pressure.shape[0], pressure.shape[1]))
 
 
 class PairSum:
@@ -100,10 +127,10 @@ class WavenumberMultiplier:
     """Multiplies the modes of a plane by |q| or 1/|q|, without a table of |q| (another array)."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        self.shape = shape
+        self.shape, self.spacing = shape, spacing
+        self.transform = fft.PlaneTransform(shape)
         self.modes: Array | None = None
-        self.qy2 = fft.wavenumbers(shape[0], spacing[0]) ** 2
-        self.qx2 = fft.wavenumbers(shape[1], spacing[1], real=True) ** 2
+        self.is_small = shape[0] * shape[1] <= SMALL
 
     def apply(
         self, plane: Array, factor: float, *, invert: bool, mean: float, out: Array | None = None
@@ -112,17 +139,48 @@ class WavenumberMultiplier:
 
         Where the FFT library can, it writes into `out`, which may be the plane itself.
         """
+        modes = self.transform.forward(plane, self.modes)
+        if self.is_small:
+            weights = wavenumber_weights(self.shape, self.spacing, factor, invert, mean, plane.dtype.char)
+            parts = modes.view(plane.dtype)
+            np.multiply(parts, weights, out=parts)
+        else:
+            self.multiply(modes, factor, invert, mean)
+        if not self.transform.in_place:
+            return self.transform.backward(modes)
+        self.modes = modes
+        return self.transform.backward(modes, out)
+
+    def multiply(self, modes: Array, factor: float, invert: bool, mean: float) -> None:
+        """Multiply the modes in place, without a table."""
         from fractalcontact.contact._kernels import scale_modes
 
-        dtype = plane.dtype.type
-        modes = fft.rfft2(plane, self.modes)
-        qy2, qx2 = self.qy2.astype(dtype), self.qx2.astype(dtype)
-        weights = (qy2, qx2, dtype(factor), invert, dtype(mean))
+        dtype = modes.real.dtype.type
+        qy2, qx2 = squared_wavenumbers(self.shape, self.spacing)
+        weights = (qy2.astype(dtype), qx2.astype(dtype), dtype(factor), invert, dtype(mean))
         in_bands(scale_modes, modes.shape[0], modes.size, real_parts(modes), *weights)
-        if not fft.writes_in_place():
-            return fft.irfft2(modes, self.shape, overwrite=True)
-        self.modes = modes
-        return fft.irfft2(modes, self.shape, out, overwrite=True)
+
+
+def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
+    """Return the squared wave numbers of the modes of a plane along y and along x."""
+    qy2 = fft.wavenumbers(shape[0], spacing[0]) ** 2
+    return qy2, fft.wavenumbers(shape[1], spacing[1], real=True) ** 2
+
+
+@lru_cache(maxsize=32)
+def wavenumber_weights(
+    shape: tuple[int, int], spacing: tuple[float, float], factor: float, invert: bool, mean: float, kind: str
+) -> Array:
+    """Return factor |q| or factor / |q| (`mean` for the mean), each twice: for real and imaginary part."""
+    dtype = np.dtype(kind).type
+    qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(shape, spacing))
+    q = np.sqrt(qy2[:, None] + qx2[None, :])
+    q[0, 0] = 1
+    weights = dtype(factor) / q if invert else dtype(factor) * q
+    weights[0, 0] = mean
+    weights = np.repeat(weights, 2, axis=1)
+    weights.flags.writeable = False
+    return weights
 
 
 def real_parts(modes: Array) -> Array:

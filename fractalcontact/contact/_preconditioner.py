@@ -19,6 +19,7 @@ which costs a sixteenth of a transform.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,7 +38,7 @@ FADE = 0.04
 MARGIN = 8  # a free body has n/MARGIN more nodes for the extension beyond its edges
 
 
-@dataclass(frozen=True)
+@dataclass
 class FreeSet:
     """The free set I_c on the plane of a preconditioner, and sums over its bins.
 
@@ -47,6 +48,7 @@ class FreeSet:
     mask: Array  # of the plane: the free nodes
     bin_sums: Array  # of the bins: the gap on the set, summed
     bin_counts: Array  # of the bins: the number of free nodes
+    weight: Array | None = None  # of the bins, see `ExtensionPreconditioner`; None where the set has changed
 
     @classmethod
     def empty(cls, plane: tuple[int, int], bin_shape: tuple[int, int], dtype: Any) -> FreeSet:
@@ -86,13 +88,10 @@ class ExtensionPreconditioner:
         self.bin_shape = (-(-self.plane[0] // self.bin_rows), -(-self.plane[1] // self.bin_columns))
         self.multiplier = multiplier or WavenumberMultiplier(self.plane, body.spacing)
         edge = (self.bin_rows * body.spacing[0], self.bin_columns * body.spacing[1])
-        q = np.hypot(
-            fft.wavenumbers(self.bin_shape[0], edge[0])[:, None],
-            fft.wavenumbers(self.bin_shape[1], edge[1], real=True)[None, :],
-        )
-        self.kernel = np.exp(-DECAY * np.sqrt(edge[0] * edge[1]) * q).astype(dtype)
-        q[0, 0] = np.inf
-        self.compliance = (2.0 / q).astype(dtype) if body.periodic else None
+        tables = kept_bin_tables if body.is_small else bin_tables
+        self.kernel, compliance = tables(self.bin_shape, edge, np.dtype(dtype).char)
+        self.compliance = compliance if body.periodic else None
+        self.bins = fft.PlaneTransform(self.bin_shape)
         self.self_compliance = float(np.sqrt(body.spacing[0] * body.spacing[1])) / 2
         extent = np.sqrt(self.plane[0] * body.spacing[0] * self.plane[1] * body.spacing[1])
         # that of a flat block under a rigid flat; a periodic body has no stiffness for its mean
@@ -102,9 +101,9 @@ class ExtensionPreconditioner:
 
     def smooth(self, bins: Array) -> Array:
         """Apply the Poisson kernel G to the bins."""
-        modes = fft.rfft2(bins)
+        modes = self.bins.forward(bins)
         modes *= self.kernel
-        return fft.irfft2(modes, self.bin_shape, overwrite=True)
+        return self.bins.backward(modes)
 
     def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
         """Return the pressure for the gap x on a set, whose sums over the bins are those of x.
@@ -113,8 +112,11 @@ class ExtensionPreconditioner:
         transpose of the extension.
         """
         self.transforms += 1
-        bin_nodes = self.dtype(self.bin_rows * self.bin_columns)
-        weight = 1 / (np.maximum(self.smooth(free_set.bin_counts), 0) + self.dtype(FADE) * bin_nodes)
+        weight = free_set.weight
+        if weight is None:
+            bin_nodes = self.dtype(self.bin_rows * self.bin_columns)
+            weight = 1 / (np.maximum(self.smooth(free_set.bin_counts), 0) + self.dtype(FADE) * bin_nodes)
+            free_set.weight = weight
         extension = self.smooth(free_set.bin_sums)
         extension *= weight
         size = self.plane[0] * self.plane[1]
@@ -123,8 +125,8 @@ class ExtensionPreconditioner:
         pressure = self.multiplier.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
         outside = extension  # the array is not needed any more
         in_bands(_kernels.sum_outside, self.bin_shape[0], size, *grid, pressure, outside)
-        weight *= outside
-        return pressure, self.smooth(weight)
+        outside *= weight
+        return pressure, self.smooth(outside)
 
     def summed_displacement(self, free_set: FreeSet) -> float | None:
         """Return roughly the summed displacement under unit pressure on the set; None for a free body.
@@ -134,9 +136,9 @@ class ExtensionPreconditioner:
         if self.compliance is None:
             return None
         counts = free_set.bin_counts
-        modes = fft.rfft2(counts)
+        modes = self.bins.forward(counts)
         modes *= self.compliance
-        displacement = fft.irfft2(modes, self.bin_shape, overwrite=True) / (self.bin_rows * self.bin_columns)
+        displacement = self.bins.backward(modes) / (self.bin_rows * self.bin_columns)
         count = float(counts.sum())
         size = self.plane[0] * self.plane[1]
         own = self.self_compliance * count * (1.0 - count / size)
@@ -176,6 +178,20 @@ class NodePreconditioner:
     def summed_displacement(self, free_set: FreeSet) -> float | None:  # noqa: ARG002
         """Return None: the mean of a free body needs no correction."""
         return None
+
+
+def bin_tables(bin_shape: tuple[int, int], edge: tuple[float, float], kind: str) -> tuple[Array, Array]:
+    """Return the Poisson kernel over the modes of the bins, and their compliance, 2/|q| but for the mean."""
+    q = np.hypot(
+        fft.wavenumbers(bin_shape[0], edge[0])[:, None],
+        fft.wavenumbers(bin_shape[1], edge[1], real=True)[None, :],
+    )
+    kernel = np.exp(-DECAY * np.sqrt(edge[0] * edge[1]) * q).astype(kind)
+    q[0, 0] = np.inf
+    return kernel, (2.0 / q).astype(kind)
+
+
+kept_bin_tables = lru_cache(maxsize=32)(bin_tables)
 
 
 def stiffness_table(body: Body) -> Array:

@@ -379,10 +379,11 @@ def _dataset(surface: xr.DataArray, grid: Grid, planes: Sequence[PressedPlane]) 
     """Return the Dataset over all planes and steps, made at once: to add a variable later takes 0.3 ms."""
     leading, lengths, path = surface.dims[:-2], surface.shape[:-2], planes[0].path
     columns: dict[str, Any] = {}
-    for name in planes[0].scalars[0]:
-        values = np.array([[step[name] for step in plane.scalars] for plane in planes])
-        dims = ("step", "pressure_class")[: values.ndim - 1]
-        columns[name] = ((*leading, *dims), values.reshape(*lengths, *values.shape[1:]))
+    steps = [step for plane in planes for step in plane.scalars]
+    for name in steps[0]:
+        values = np.array([step[name] for step in steps])
+        dims = ("step", "pressure_class")[: values.ndim]
+        columns[name] = ((*leading, *dims), values.reshape(*lengths, len(path.values), *values.shape[1:]))
     imposed = ("closure",) if path.control == "closure" else ("normal_force", "nominal_pressure")
     columns |= {name: ("step", columns[name][1].reshape(-1, len(path.values))[0]) for name in imposed}
     coords: dict[str, Any] = dict(leading_coords(surface, leading, (*columns, "step")))
@@ -399,11 +400,12 @@ def _dataset(surface: xr.DataArray, grid: Grid, planes: Sequence[PressedPlane]) 
     if path.body.influence == "disc":
         variables["disc_radius"] = path.body.radius * path.units.length
     for name in planes[0].maps:
-        maps = np.stack([one for plane in planes for one in plane.maps[name]])
+        every = [one for plane in planes for one in plane.maps[name]]
+        maps = every[0] if len(every) == 1 else np.stack(every)
         shape = (*lengths, len(path.values), *grid.shape)
         variables[name] = ((*leading, "step", "y", "x"), maps.reshape(shape))
     if planes[0].maps:
-        coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
+        coords |= {dim: surface.coords.variables[dim] for dim in ("y", "x")}
     return make_dataset(variables, coords)
 
 

@@ -8,12 +8,13 @@ powers of two therefore changes no bit of the computation.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.contact import _influence
-from fractalcontact.contact._operator import FreeOperator, Operator, PeriodicOperator
+from fractalcontact.contact._operator import SMALL, FreeOperator, Operator, PeriodicOperator
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -58,6 +59,11 @@ class Body:
         """Scaled area of a cell."""
         return self.spacing[0] * self.spacing[1]
 
+    @property
+    def is_small(self) -> bool:
+        """Whether tables of this body are kept for the next call."""
+        return self.shape[0] * self.shape[1] <= SMALL
+
     def influence_table(self) -> Array:
         """Return the displacement at offset (i, j) from a cell under unit pressure; free bodies only."""
         if self.influence == "disc":
@@ -68,6 +74,8 @@ class Body:
         """Return the elastic operator, displacement from pressure."""
         if self.periodic:
             return PeriodicOperator(self.shape, self.spacing)
+        if self.is_small:
+            return kept_operator(self).rounded(dtype)
         return FreeOperator(self.influence_table(), dtype)
 
 
@@ -111,6 +119,12 @@ class Solution:
     residual: float = 0.0
     reason: str = "converged"
     work: float = 0.0  # sum of pressure times displacement: twice the elastic energy
+
+
+@lru_cache(maxsize=16)
+def kept_operator(body: Body) -> FreeOperator:
+    """Return the operator of a small free body; its table takes as long as a solution."""
+    return FreeOperator(body.influence_table())
 
 
 def make_units(

@@ -14,6 +14,7 @@ usual size of a block that is slid, take double precision alone and start in hal
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
 from fractalcontact.contact._multigrid_start import cold_start
 from fractalcontact.contact._operator import FreeOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
-from fractalcontact.contact._scaled_problem import Control, Problem, Solution
+from fractalcontact.contact._scaled_problem import Body, Control, Problem, Solution
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
@@ -32,7 +33,8 @@ SINGLE_FROM = 384 * 384  # nodes from which single precision first saves time, a
 SINGLE_TOLERANCE = 3e-5  # residual at which double precision takes over
 SINGLE_RANGE = 1e20  # scaled pressures and closures up to which, and down to whose inverse, it may be used
 MAX_EXTRAPOLATION = 2.0  # along the path, in steps
-FEW_NODES = 1000  # candidates up to which sums over pairs are faster than transforms
+# candidates up to which sums over pairs are faster than transforms: at most, and for each node along an edge
+FEW_NODES, FEW_ALONG_AN_EDGE, FEWEST = 1000, 4.5, 64
 FIRST_NODES = 256  # candidates of a first step under force control
 MAX_WINDOW_SHARE = 0.75  # of the extent; a larger window is not worth having
 CANDIDATE_TOLERANCE = 1e-2  # residual at which the closure is accurate enough to verify the candidates
@@ -155,13 +157,14 @@ class WindowSolver:
 
     def solve_on_nodes(self, control: Control) -> Solution | None:
         """Solve by sums over pairs; None where there are too many candidates."""
-        if np.count_nonzero(self.problem.gap <= self.closure_bound(control)) > FEW_NODES:
+        few = self.few_nodes
+        if np.count_nonzero(self.problem.gap <= self.closure_bound(control)) > few:
             return None
         count = self.first_node_count(control)
         start = self.extrapolated_pressure(control)
-        while 0 < count <= FEW_NODES:
+        while 0 < count <= few:
             nodes = np.flatnonzero(self.problem.gap.ravel() <= self.sorted_gap()[count - 1])
-            if nodes.size > FEW_NODES or not self.can_carry(nodes.size, control):
+            if nodes.size > few or not self.can_carry(nodes.size, control):
                 break  # many nodes at exactly this gap, or too few to carry the force below p_max
             solution = self.pair_solution(nodes, control, start, CANDIDATE_TOLERANCE)
             start = self.on_all_nodes(solution.pressure, nodes)
@@ -171,6 +174,11 @@ class WindowSolver:
                 return self.with_displacement(solution, self.on_all_nodes(solution.pressure, nodes))
             count = min(needed, 4 * nodes.size)
         return None
+
+    @property
+    def few_nodes(self) -> int:
+        """Return the number of candidates up to which sums over pairs are faster than transforms."""
+        return min(FEW_NODES, max(FEWEST, int(FEW_ALONG_AN_EDGE * np.sqrt(self.problem.gap.size))))
 
     def closure_bound(self, control: Control) -> float:
         """Return the closure imposed, or that of a flat disc around the whole extent, a lower bound."""
@@ -190,9 +198,9 @@ class WindowSolver:
             return self.count_below(control.closure)
         closure = self.extrapolated_closure(control)
         if closure is None:
-            return min(FIRST_NODES, self.problem.gap.size)
+            return min(FIRST_NODES, self.few_nodes // 2, self.problem.gap.size)
         expected = self.count_below(closure * CLOSURE_MARGIN)
-        if expected > FEW_NODES and self.past_steps:
+        if expected > self.few_nodes and self.past_steps:
             expected = min(expected, 4 * self.count_below(self.past_steps[-1].closure))
         return max(1, expected)
 
@@ -211,7 +219,8 @@ class WindowSolver:
     ) -> Solution:
         """Solve on `nodes` (flat indices) alone; arrays are (1, nodes)."""
         if self._pair_tables is None:
-            self._pair_tables = self.problem.body.influence_table(), stiffness_table(self.problem.body)
+            body = self.problem.body
+            self._pair_tables = kept_pair_tables(body) if body.is_small else pair_tables(body)
         influence, stiffness = self._pair_tables
         nx = self.problem.body.shape[1]
         iy, ix = nodes // nx, nodes % nx
@@ -239,8 +248,8 @@ class WindowSolver:
     def with_displacement(self, solution: Solution, pressure: Array) -> Solution:
         """Return a solution with its pressure, and the displacement under it, on the whole extent."""
         if self._operator is None:
-            tables = self._pair_tables
-            self._operator = FreeOperator(tables[0]) if tables else self.problem.body.operator()
+            tables, body = self._pair_tables, self.problem.body
+            self._operator = FreeOperator(tables[0]) if tables and not body.is_small else body.operator()
         self.transforms += 1
         return replace(solution, pressure=pressure, displacement=self._operator.apply(pressure))
 
@@ -321,6 +330,14 @@ class WindowSolver:
         if not part.body.periodic:
             self._systems[dtype] = system
         return system
+
+
+def pair_tables(body: Body) -> tuple[Array, Array]:
+    """Return the coefficients of sums over pairs: of the displacement, and of its inverse."""
+    return body.influence_table(), stiffness_table(body)
+
+
+kept_pair_tables = lru_cache(maxsize=16)(pair_tables)
 
 
 def first_precision(problem: Problem, control: Control) -> Any:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -200,7 +201,7 @@ class Surface:
 
 def is_lazy(array: xr.DataArray) -> bool:
     """Return whether the heights are not in memory yet (dask)."""
-    return array.chunks is not None
+    return has_blocks(array)
 
 
 def check_surface(

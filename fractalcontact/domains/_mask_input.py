@@ -19,6 +19,7 @@ import xarray as xr
 from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, periodic_axes, read_grid
+from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES
 from fractalcontact.base.threads import thread_count
@@ -242,15 +243,15 @@ def read_planes(
 
 def _flags(mask: xr.DataArray) -> Array:
     """Return where the mask is set, as a C-ordered array; a chunked mask is read chunk by chunk."""
-    if mask.chunks is None:
+    if not has_blocks(mask):
         values = np.ascontiguousarray(mask.values)
         return values if values.dtype.kind == "b" else np.asarray(values > 0)
-    flags = np.empty(mask.shape, bool)
-    stops = [np.cumsum(lengths) for lengths in mask.chunks]
-    for block in np.ndindex(*(len(lengths) for lengths in mask.chunks)):
+    flags, chunks = np.empty(mask.shape, bool), mask.chunks or ()
+    stops = [np.cumsum(lengths) for lengths in chunks]
+    for block in np.ndindex(*(len(lengths) for lengths in chunks)):
         region = tuple(
             slice(int(stop[k]) - lengths[k], int(stop[k]))
-            for stop, lengths, k in zip(stops, mask.chunks, block, strict=True)
+            for stop, lengths, k in zip(stops, chunks, block, strict=True)
         )
         np.greater(mask[region].values, 0, out=flags[region])
     return flags
