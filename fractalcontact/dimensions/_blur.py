@@ -42,6 +42,7 @@ from fractalcontact.dimensions._whittle import QUANTILE
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _POOR = 3.5  # z of the scatter of the blocks beyond which a model does not fit
+_LEAST_AGREEMENT = 1e-4  # probability of the levels of the octaves below which a model does not fit
 _UNEVEN = 4.0  # -z of the mean logarithm beyond which few waves dominate
 _FIRST, _GROWTH = 14.0, 1.5  # first window in numbers of the longest wave, and ratio of successive ones
 _LEAST = 60  # modes of a window
@@ -76,6 +77,8 @@ class BlurredFit:
         Shortest wavelength used, in spacings of x.
     scatter : float
         z of the scatter of the modes about the model.
+    agreement : float
+        Probability that the levels of octaves differ from the model by chance as much as they do.
     flatness : float
         z of the mean logarithm of the modes of each block, or -z of the difference of both axes: negative
         where few waves, or those along one axis, hold most of the power.
@@ -98,6 +101,7 @@ class BlurredFit:
     form: str
     shortest: float
     scatter: float
+    agreement: float
     flatness: float
     gain: float
     penalised: float
@@ -106,7 +110,12 @@ class BlurredFit:
     @property
     def is_good(self) -> bool:
         """Whether the model agrees with the modes."""
-        return self.scatter < _POOR and self.is_even
+        return self.is_close and self.agreement > _LEAST_AGREEMENT and self.is_even
+
+    @property
+    def is_close(self) -> bool:
+        """Whether single blocks of modes scatter about the model by chance."""
+        return self.scatter < _POOR
 
     @property
     def is_even(self) -> bool:
@@ -181,6 +190,7 @@ def fit_blurred(
         form=best.form,
         shortest=float(2.0 * np.pi / np.sqrt(frame.squares[window.inside].max())),
         scatter=scatter,
+        agreement=_blur_fit.agreement(window, best),
         flatness=min(
             _flatness(power, window, _blur_fit.spread_in_blocks(window, best)),
             -abs(_asymmetry(power, window)),
@@ -197,10 +207,10 @@ def chosen_blocks(frame: Frame, surface: Surface, scales: Scales) -> Array:
 
 
 def is_seen(fit: BlurredFit, axes: int, spread: float | None) -> bool:
-    """Return whether blur or noise agrees with the modes better than the surface alone, or is given."""
+    """Return whether blur or noise explains the modes better than the surface alone, or is given."""
     if spread is not None:
         return True
-    return fit.is_good and fit.gain > CLEAR[axes] and fit.high - fit.low < _VAGUE
+    return fit.is_close and fit.is_even and fit.gain > CLEAR[axes] and fit.high - fit.low < _VAGUE
 
 
 def blurred_estimate(

@@ -9,7 +9,7 @@ import numpy as np
 
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST
 from fractalcontact.dimensions._transfer_functions import FILTER, NONE, TRANSFER, Window
-from fractalcontact.dimensions._whittle import misfit
+from fractalcontact.dimensions._whittle import inverse, misfit
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -24,6 +24,8 @@ _LARGEST = 200.0  # squared spread
 _ENDS = 6  # steps to an end of an interval
 _NO_NOISE = 1e-4  # share of every mode below which noise is as good as none
 _STEPS, _TRIES, _DAMPING = 25, 8, 1e-3
+_LEAST_OCTAVE = 12.0  # modes of an octave whose level is tested
+_LEAST_LEVEL = 1e-4  # of the information of a level beside the fitted parameters
 
 
 @dataclass(frozen=True)
@@ -178,15 +180,41 @@ def scatter(window: Window, result: Fit) -> float:
     return float((square.mean() - 1.0) / deviation)
 
 
+def agreement(window: Window, result: Fit) -> float:
+    """Return the probability that octaves of wavenumber differ by chance from a fit as much as they do.
+
+    Score test of a level of each octave beside the fitted parameters: it sees a slow change of the exponent
+    that the scatter of single blocks hides.
+    """
+    from scipy.special import chdtrc
+
+    columns, residual = residuals(window, result)
+    fitted = np.stack([np.ones(residual.size), *columns[_is_free(result)]])
+    octave = np.floor(0.5 * np.log2(window.squares / window.squares.min())).astype(int)
+    modes = np.bincount(octave, window.count)
+    first = int(np.argmax(np.cumsum(modes) >= _LEAST_OCTAVE))
+    last = modes.size - 1 - int(np.argmax(np.cumsum(modes[::-1]) >= _LEAST_OCTAVE))
+    octave = np.clip(octave, first, max(first, last))
+    levels = (octave == np.unique(octave)[:, None]).astype(float)
+    half = 0.5 * window.count
+    levels -= (half * levels) @ fitted.T @ inverse((half * fitted) @ fitted.T) @ fitted
+    values, vectors = np.linalg.eigh((half * levels) @ levels.T)
+    seen = values > _LEAST_LEVEL * values.max()
+    score = vectors[:, seen].T @ (levels @ (half * residual))
+    return float(chdtrc(np.count_nonzero(seen), np.sum(score**2 / values[seen]) / result.correlation))
+
+
+def _is_free(result: Fit) -> Array:
+    """Return whether H, the spread and the noise of a model are fitted."""
+    return np.array([True, result.form != NONE and result.known is None, result.has_noise])
+
+
 def error(window: Window, result: Fit) -> float:
     """Return the standard error of H."""
-    free = [True, result.form != NONE and result.known is None, result.has_noise]
-    columns = residuals(window, result)[0][free]
+    columns = residuals(window, result)[0][_is_free(result)]
     columns = columns - np.average(columns, axis=1, weights=window.count)[:, None]
     information = 0.5 * (window.count * columns) @ columns.T
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-280))
-    inverse = np.linalg.pinv(information * np.outer(scale, scale)) * np.outer(scale, scale)
-    return float(np.sqrt(result.correlation * inverse[0, 0]))
+    return float(np.sqrt(result.correlation * inverse(information)[0, 0]))
 
 
 def interval(window: Window, result: Fit, rise: float, above: float | None = None) -> tuple[float, float]:

@@ -267,6 +267,9 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
         several = several_exponents(fit, blocks, surface)
         if several is not None:
             return several, round(0.5 * several.scale_min / max(surface.spacing))
+        # blur and noise do not explain all octaves, or what they leave is no fractal
+        if not (fit.is_good and fit.low < 1.0) and (run := _longest_run(free, window)):
+            return run
         low, high = alternatives(fit, blocks, is_bent=True)
         if low < estimate.ci_low or high > estimate.ci_high:
             estimate = estimate.holding(low, high, _OR_SECOND)
@@ -296,8 +299,8 @@ def _without_blur(
     is_bent = abs(fit.misfit) > SIGNIFICANT * parts.widening
     run = None
     if is_bent and free.scales is None and free.spread is None:
-        if comparison is not None and is_even:
-            run = _longest_run(free, comparison.window)
+        if comparison is not None and (is_even or fit.hurst >= 1.0):
+            run = _longest_run(free, comparison.window, is_even=is_even)
         elif free.power is None and not free.noise:
             run = _run_beside_gaps(free)
     if run is not None:
@@ -352,19 +355,24 @@ def _allowing_scales(estimate: Estimate, free: _FreeEdges, window: Window, misfi
     return estimate.holding(low, high, note)
 
 
-def _longest_run(free: _FreeEdges, window: Window) -> tuple[Estimate, int] | None:
+def _longest_run(free: _FreeEdges, window: Window, *, is_even: bool = True) -> tuple[Estimate, int] | None:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
-    None if there is no run, or if few waves dominate it.
+    None if there is no run. Where few waves dominate the run, None as well, unless they dominate all modes
+    (`is_even` is false); its interval then holds the exponents of sectors of azimuth.
     """
     run = longest_run(octaves(frame_blocks(window.power, window.frame)))
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None
     dx = free.surface.spacing[1]
     part = _modes(replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst))
+    estimate = run_estimate(run, free.surface)
     if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
-        return None
-    return run_estimate(run, free.surface), max(1, round(0.5 * run.low))
+        if is_even:
+            return None
+        sectors = fit_interval(part, run.fit.hurst, False)[1]
+        estimate = estimate.holding(sectors.ci_low, sectors.ci_high, sectors.note)
+    return estimate, max(1, round(0.5 * run.low))
 
 
 def _run_beside_gaps(free: _FreeEdges) -> tuple[Estimate, int] | None:

@@ -267,7 +267,7 @@ def fit_power(
     amplitude = _amplitude(power, total, means, half_weights)
     return WhittleFit(
         hurst=hurst,
-        standard_error=float(np.sqrt(_inverse(information)[1, 1])),
+        standard_error=float(np.sqrt(inverse(information)[1, 1])),
         amplitude=amplitude,
         noise=0.0 if noise is None else noise * amplitude,
         columns=columns,
@@ -304,7 +304,7 @@ def _score_steps(
     for _ in range(_STEPS):
         total, columns, means = local.at(x, noise)
         residual = power / (_amplitude(power, total, means, half_weights) * total) - means[0]
-        step = _inverse((half_weights * columns) @ columns.T) @ ((half_weights * columns) @ residual)
+        step = inverse((half_weights * columns) @ columns.T) @ ((half_weights * columns) @ residual)
         x_step = float(np.clip(step[1], -2.0, 2.0))
         x += x_step
         if noise is not None:
@@ -326,15 +326,15 @@ def misfit(columns: Array, residual: Array, half_weights: float | Array) -> floa
     """Return z of the score of a change of H with scale, orthogonal to the fitted parameters."""
     bend = columns[1] ** 2
     bend = bend - columns.T @ (
-        _inverse((half_weights * columns) @ columns.T) @ ((half_weights * columns) @ bend)
+        inverse((half_weights * columns) @ columns.T) @ ((half_weights * columns) @ bend)
     )
     variance = float(np.sum(half_weights * bend * bend))
     return float(np.sum(half_weights * bend * residual)) / np.sqrt(variance) if variance > 0 else 0.0
 
 
-def _inverse(information: Array) -> Array:
+def inverse(information: Array) -> Array:
     """Invert a symmetric matrix whose columns have very different scales."""
-    scale = 1.0 / np.sqrt(np.diag(information))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-280))
     return np.asarray(np.linalg.pinv(information * np.outer(scale, scale)) * np.outer(scale, scale))
 
 

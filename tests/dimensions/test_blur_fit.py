@@ -47,3 +47,18 @@ def test_blur_that_is_not_seen_is_in_the_interval():
     assert low < 0.5 < high
     alone = comparison.interval(0.08, blur=False)
     assert alone[0] > 0.5
+
+
+def test_agreement_sees_a_slow_change_of_the_exponent():
+    exact, rng = window(TRANSFER, 0.6, 0.3, 0.02), np.random.default_rng(3)
+    squares = FRAME.squares
+    results = []
+    for slope in (0.0, 1.0):
+        power = exact.power * rng.chisquare(FRAME.count) / FRAME.count
+        modes = Window(FRAME, EVERY, power * np.minimum(squares, 0.6) ** slope)
+        start = _blur_fit.Fit(TRANSFER, 0.4, 0.2, noise=0.05).with_noise(True, modes)
+        fit = _blur_fit.fit(modes, start)
+        assert _blur_fit.scatter(modes, fit) < 3.5
+        results.append(_blur_fit.agreement(modes, fit))
+    assert results[0] > 0.01
+    assert results[1] < 1e-4

@@ -112,6 +112,40 @@ def test_roll_off_leaves_window_of_shorter_waves(hurst, rng):
     assert "no single exponent holds at all scales" in result.hurst.attrs["comment"]
 
 
+def broken(short, long, corner, rng, n):
+    """A crop of a surface with one exponent of waves below `corner` spacings, and another beyond."""
+    wave = np.hypot(*np.meshgrid(*(2 * np.pi * np.fft.fftfreq(2 * n),) * 2)) * corner / (2 * np.pi)
+    wave[0, 0] = np.inf
+    power = np.where(wave > 1.0, wave ** (-2 * short - 2), wave ** (-2 * long - 2))
+    white = np.fft.fft2(np.random.default_rng(rng).standard_normal((2 * n, 2 * n)))
+    return np.fft.ifft2(white * np.sqrt(power)).real[:n, :n]
+
+
+@pytest.mark.parametrize(
+    ("short", "long", "corner", "n"), [(1.3, 0.3, 20, 400), (0.8, 0.3, 16, 800), (1.5, 0.5, 40, 400)]
+)
+def test_blur_that_does_not_fit_gives_way_to_the_window(short, long, corner, n):
+    """Once 1.2 without an interval, and 0.738 [0.727, 0.750], with blur and noise "in the model"."""
+    surface = fc.surfaces.from_array(STEP * broken(short, long, corner, 5 if n == 800 else 4, n), SPACING)
+    result = fc.dimensions.estimate(surface).isel(method=0)
+    assert "the longest run of octaves" in result.hurst.attrs["comment"]
+    assert float(result.scale_min) >= 0.5 * corner * SPACING
+    # a corner inside an octave, and few long waves
+    assert float(result.ci_low) - 0.06 < long < float(result.ci_high) + 0.06
+    assert float(result.ci_high - result.ci_low) < 0.35
+
+
+def test_land_surface_is_answered_with_its_window():
+    """Smooth slopes, integer metres: once 1.08, with a blur of half a spacing, and no interval."""
+    land = fc.surfaces.sample("jacksboro_fault_dem")
+    result = fc.dimensions.estimate(land).isel(method=0)
+    window = fc.dimensions.scaling(land)
+    assert float(result.hurst) == pytest.approx(float(window.window_hurst))
+    assert float(result.scale_min) == pytest.approx(float(window.scale_min))
+    assert 0.0 <= float(result.ci_low) < float(window.window_ci_low) + 1e-9
+    assert float(window.window_ci_high) - 1e-9 < float(result.ci_high) < 0.5
+
+
 @pytest.mark.parametrize("rng", [0, 1])
 def test_sum_of_two_surfaces_has_the_exponent_of_each(rng):
     rough, smooth = (brownian(hurst, rng + seed, (256, 256)) for hurst, seed in ((0.3, 0), (0.9, 100)))

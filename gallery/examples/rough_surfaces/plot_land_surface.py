@@ -24,8 +24,8 @@ print(f"{land.sizes['y']} x {land.sizes['x']} heights, {spacing[0]:.0f} m x {spa
 print(land)
 
 # %%
-# The default estimate over all wavelengths finds no fractal surface here: the exponent is at its limit, 1,
-# and has no interval. The comment says so.
+# No single exponent describes all wavelengths here, nor does one with the blur of an instrument; the default
+# estimate is that of the longest run of octaves that one exponent explains. The comment says so.
 
 result = fc.dimensions.estimate(land).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
@@ -34,9 +34,9 @@ print(json.loads(result.hurst.attrs["comment"])["default"])
 
 # %%
 # The exponent by octave of wavelength shows why: it falls from above 1 at the shortest waves, where the map
-# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is the longest run of octaves
-# that one exponent explains. The published values, means over larger pieces of land, lie between these ends;
-# no long range of scales of this map has them.
+# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is that of the estimate, whose
+# interval is wider because parts of the map are not equally rough. The published values, means over larger
+# pieces of land, lie between these ends; no long range of scales of this map has them.
 
 by_octave = fc.dimensions.scaling(land)
 longest = (float(by_octave.scale_min), float(by_octave.scale_max))
