@@ -79,6 +79,8 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     -----
     Whittle's likelihood of the cosine modes, as in `estimate`. A run is accepted if the likelihood ratio
     against separate exponents and amplitudes of its octaves is below the 99.7 % quantile of chi square.
+    Beside other octaves its interval also holds that of the run without the octave there, as a blur ends
+    gradually.
 
     Examples
     --------
@@ -91,6 +93,7 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     surfaces = read_surfaces(surface)
     records = [octaves(blocks_of(single)) for single in surfaces]
     runs = [longest_run(record) for record in records]
+    intervals = [interval_of_run(run, record) for run, record in zip(runs, records, strict=True)]
     spacing = surfaces[0].spacing[1]
     leading = surface.dims[: surface.ndim - surfaces[0].axes]
     sizes = [surface.sizes[dim] for dim in leading]
@@ -113,8 +116,8 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
             "wavelength",
         ),
         "window_hurst": stacked([run.fit.hurst for run in runs]),
-        "window_ci_low": stacked([run.fit.low for run in runs]),
-        "window_ci_high": stacked([run.fit.high for run in runs]),
+        "window_ci_low": stacked([low for low, _ in intervals]),
+        "window_ci_high": stacked([high for _, high in intervals]),
         "scale_min": stacked([run.low * spacing for run in runs]),
         "scale_max": stacked([run.high * spacing for run in runs]),
     }
@@ -281,7 +284,7 @@ def longest_run(record: Sequence[Octave]) -> Run:
             run = record[first:last]
             if len(run) < max(width, min(2, len(record))):
                 continue
-            fit = fit_power_law(run[0].blocks, np.logical_or.reduce([octave.inside for octave in run]))
+            fit = _joint_fit(run)
             ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
             fits = len(run) == 1 or chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM
             is_fractal = fit.hurst > _LEAST_HURST and fit.low < 1.0
@@ -292,6 +295,26 @@ def longest_run(record: Sequence[Octave]) -> Run:
     if best is None:
         return Run(0, 0, np.nan, np.nan, PowerLaw(np.nan, np.nan, np.nan, 0.0, np.nan))
     return best
+
+
+def interval_of_run(run: Run, record: Sequence[Octave]) -> tuple[float, float]:
+    """Return the interval of a run; beside other octaves it holds that of the run without its octave there.
+
+    A blur ends gradually: the octave next to it is bent by less than chance, and has the most modes.
+    """
+    low, high = run.fit.low, run.fit.high
+    shorter = record[run.first + 1 : run.last] if run.first > 0 else []
+    longer = record[run.first : run.last - 1] if run.last < len(record) else []
+    for part in (shorter, longer):
+        if part:
+            fit = _joint_fit(part)
+            low, high = min(low, fit.low), max(high, fit.high)
+    return low, high
+
+
+def _joint_fit(run: Sequence[Octave]) -> PowerLaw:
+    """Fit one exponent to successive octaves."""
+    return fit_power_law(run[0].blocks, np.logical_or.reduce([octave.inside for octave in run]))
 
 
 def run_estimate(run: Run, surface: Surface) -> Estimate:
