@@ -5,7 +5,8 @@ variables, as long as the analysis of a small mask. With its first array it also
 installed: a quarter of a second. Here numbers and NumPy arrays become variables as they are.
 
 xarray has no public function for this; no other module uses `Dataset._construct_direct`. Parts of another
-kind (dask arrays, labelled arrays, dates, objects) go through the usual constructors.
+kind (dask arrays, labelled arrays, dates, objects) go through the usual constructors, and so does everything
+with a version of xarray that has no such function.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import pandas as pd  # type: ignore[import-untyped]
 import xarray as xr
 from xarray.indexes import Index, PandasIndex
 
+DIRECT = getattr(xr.Dataset, "_construct_direct", None)
 PLAIN = "biufcU"  # kinds of numbers and words that a variable and its index hold unchanged
 Variables = dict[Hashable, xr.Variable]
 
@@ -37,10 +39,12 @@ def make_dataset(
     parts, labels = _parts(variables), _parts(coords, along=True)
     if parts is None or labels is None or any(name in part.dims for name, part in parts.items()):
         return xr.Dataset(variables, coords, attrs)
+    if DIRECT is None:
+        return xr.Dataset(parts, labels, attrs)
     indexes = _index(labels)
-    names = set(labels)
     attrs = None if attrs is None else dict(attrs)
-    return xr.Dataset._construct_direct(parts | labels, names, attrs=attrs, indexes=indexes)
+    made: xr.Dataset = DIRECT(parts | labels, set(labels), attrs=attrs, indexes=indexes)
+    return made
 
 
 def make_array(values: Any, dims: Sequence[str], coords: Mapping[str, Any], name: str) -> xr.DataArray:
@@ -57,13 +61,18 @@ def make_array(values: Any, dims: Sequence[str], coords: Mapping[str, Any], name
 
 def with_variables(dataset: xr.Dataset, variables: Variables) -> xr.Dataset:
     """Return a Dataset with other variables, but the same coordinates, indexes and attributes."""
-    return xr.Dataset._construct_direct(
+    if DIRECT is None:
+        made = dataset.drop_vars(set(dataset.data_vars)).assign(variables)
+        made.encoding = dict(dataset.encoding)
+        return made
+    changed: xr.Dataset = DIRECT(
         variables,
         set(dataset.coords),
         attrs=dict(dataset.attrs),
         indexes=dict(dataset.xindexes),
         encoding=dict(dataset.encoding),
     )
+    return changed
 
 
 def _parts(given: Mapping[str, Any], *, along: bool = False) -> Variables | None:

@@ -113,9 +113,12 @@ def public_result(
             try:
                 bound = signature.bind(*arguments, **options)
             except TypeError as cause:
-                unknown = [word for word in options if word not in signature.parameters]
-                hint = did_you_mean(unknown[0], signature.parameters) if unknown else ""
-                raise TypeError(f"{name}: {cause}{hint}") from None
+                hints = [
+                    f"{word!r} is no argument{did_you_mean(word, signature.parameters)}"
+                    for word in options
+                    if word not in signature.parameters
+                ]
+                raise TypeError(f"{name}: {'; '.join(hints) or cause}") from None
             bound.apply_defaults()
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
             if not in_blocks and (loaded := loaded_bytes(bound.arguments)):

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import fractalcontact as fc
+from fractalcontact.base import construction
 from fractalcontact.base.construction import make_array, make_dataset
 
 X = xr.IndexVariable("x", [0.5, 1.5, 2.5], {"units": "m", "period": 3.0})
@@ -84,6 +86,24 @@ def test_parts_that_do_not_fit_are_refused(variables, coords):
 def test_array_of_other_length_than_its_coordinate_is_refused():
     with pytest.raises(ValueError, match="'x'"):
         make_array(np.zeros(2), ("x",), {"x": X}, "height")
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_version_of_xarray_without_the_direct_way(monkeypatch, case):
+    monkeypatch.setattr(construction, "DIRECT", None)
+    variables, coords = CASES[case]
+    assert_same(make_dataset(variables, coords), xr.Dataset(variables, coords))
+
+
+def test_results_are_the_same_without_the_direct_way(monkeypatch):
+    surface = fc.surfaces.fbm((16, 16), 1e-3, hurst=0.5, rms_increment=1e-6, rng=1)
+    made = fc.contact.press(surface, contact_modulus=1e9, closure=1e-6)
+    monkeypatch.setattr(construction, "DIRECT", None)
+    usual = fc.contact.press(surface, contact_modulus=1e9, closure=1e-6)
+    made, usual = (result.drop_vars("run_time").drop_attrs(deep=False) for result in (made, usual))
+    xr.testing.assert_identical(made, usual)
+    assert list(made.data_vars) == list(usual.data_vars)
+    assert made.encoding == usual.encoding
 
 
 def test_dask_stays_out_of_a_script_without_dask_arrays():
