@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
@@ -20,6 +21,10 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0
 GROUP = 16  # lines: a multiple of the number that ducc0 transforms together
+CHUNK = 1 << 18  # bytes of the lines that go through a chain of transforms at a time, in the cache
+# Rows a multiple of this apart compete for the same few lines of the first-level cache. ducc0 writes 16 rows
+# of single precision at a time: at 1024 points or more in a row that takes three times as long.
+CONFLICT, SHIFT = 4096, 16  # bytes; elements by which the rows of a buffer are longer
 
 
 def library() -> str:
@@ -116,37 +121,115 @@ def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
     return _scipy().dstn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
 
 
+def filtered(
+    plane: Array,
+    padded: tuple[int, int],
+    multiply: Callable[..., None],
+    arguments: tuple[Any, ...],
+    modes: Array | None = None,
+    out: Array | None = None,
+) -> tuple[Array, Array]:
+    """Transform a plane, multiply its modes, and transform back.
+
+    Columns are transformed, multiplied and transformed back while they are in the cache.
+
+    Parameters
+    ----------
+    plane : (ny, nx) array
+    padded : tuple of int
+        Shape (my, mx) to which the plane is padded with zeros; the result is cropped to (ny, nx).
+    multiply : callable
+        ``multiply(start, stop, parts, *arguments)`` changes the columns from `start` to `stop` of the modes,
+        which are given as `real_parts` (my, mx//2 + 1, 2).
+    arguments : tuple
+    modes, out : array, optional
+        Where the modes and the result are written, if the library `writes_in_place`; `out` may be the plane.
+
+    Returns
+    -------
+    result, modes : array
+        The modes are those that `multiply` left, or of no use: an array for the next call.
+    """
+    shape, is_padded = (plane.shape[0], plane.shape[1]), padded != plane.shape
+    if library() != "ducc0":
+        modes = rfft2_padded(plane, padded) if is_padded else rfft2(plane)
+        multiply(0, modes.shape[1], real_parts(modes), *arguments)
+        result = irfft2_cropped(modes, padded, shape) if is_padded else irfft2(modes, shape, overwrite=True)
+        return result, modes
+    modes = _empty_modes(plane, padded) if modes is None else modes
+    out = np.empty_like(plane) if out is None else out
+    if plane.size <= SMALL and not is_padded:
+        _ducc0().r2c(plane, axes=(0, 1), out=modes, nthreads=1)
+        multiply(0, modes.shape[1], real_parts(modes), *arguments)
+        back = {"forward": False, "inorm": 2, "nthreads": 1, "allow_overwriting_input": True}
+        _ducc0().c2r(modes, axes=(0, 1), lastsize=padded[1], out=out, **back)
+        return out, modes
+    rows, columns = _groups(shape[0]), _groups(modes.shape[1])
+    in_bands(_transform_rows, rows, modes.size // 2, plane, padded[1], modes)
+    in_bands(_filter_columns, columns, modes.size, modes, shape[0], multiply, arguments, True)
+    in_bands(_undo_rows, rows, modes.size // 2, modes, padded[1], out)
+    return out, modes
+
+
+def filtered_modes(
+    plane: Array,
+    padded: tuple[int, int],
+    multiply: Callable[..., None],
+    arguments: tuple[Any, ...],
+    modes: Array | None = None,
+) -> Array:
+    """Return the modes of `filtered`, for the case that the plane may turn out not to be needed.
+
+    `irfft2_cropped` makes the plane of them.
+    """
+    if library() != "ducc0":
+        modes = rfft2_padded(plane, padded)
+        multiply(0, modes.shape[1], real_parts(modes), *arguments)
+        return modes
+    modes = _empty_modes(plane, padded) if modes is None else modes
+    in_bands(_transform_rows, _groups(len(plane)), modes.size // 2, plane, padded[1], modes)
+    columns = _groups(modes.shape[1])
+    in_bands(_filter_columns, columns, modes.size, modes, len(plane), multiply, arguments, False)
+    return modes
+
+
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
     """Transform a real plane (ny, nx) padded with zeros to (my, mx): to (my, mx//2 + 1).
 
     The rows of zeros are not transformed along x. `out` is used if the library can write into it.
     """
     if library() == "ducc0":
-        ny, nx = plane.shape
-        rows = np.zeros((ny, padded[1]), dtype=plane.dtype)
-        rows[:, :nx] = plane
-        if out is None:
-            dtype = np.result_type(plane.dtype, np.complex64)
-            out = np.empty((padded[0], padded[1] // 2 + 1), dtype=dtype)
+        ny = plane.shape[0]
+        out = _empty_modes(plane, padded) if out is None else out
         out[ny:] = 0
-        _along(_ducc0().r2c, rows, 1, out[:ny])
+        in_bands(_transform_rows, _groups(ny), out.size // 2, plane, padded[1], out)
         return _along(_ducc0().c2c, out, 0, out)
     threads = _scipy_threads()
     modes = _scipy().rfft(plane, n=padded[1], axis=1, workers=threads)
     return _scipy().fft(modes, n=padded[0], axis=0, workers=threads)  # type: ignore[no-any-return]
 
 
-def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]) -> Array:
-    """Undo `rfft2_padded` and return the corner (ny, nx) of the plane; the modes are overwritten."""
+def irfft2_cropped(
+    modes: Array, padded: tuple[int, int], shape: tuple[int, int], out: Array | None = None
+) -> Array:
+    """Undo `rfft2_padded` and return the corner (ny, nx) of the plane; the modes are overwritten.
+
+    `out` is used if the library can write into it.
+    """
     ny, nx = shape
     if library() == "ducc0":
         _along(_ducc0().c2c, modes, 0, modes, forward=False, inorm=2)
-        rows = np.empty((ny, padded[1]), dtype=modes.real.dtype)
-        _along(_ducc0().c2r, modes[:ny], 1, rows, lastsize=padded[1], forward=False, inorm=2)
-        return np.ascontiguousarray(rows[:, :nx])
+        out = np.empty((ny, nx), dtype=modes.real.dtype) if out is None else out
+        in_bands(_undo_rows, _groups(ny), modes.size // 2, modes, padded[1], out)
+        return out
     threads = _scipy_threads()
     modes = _scipy().ifft(modes, axis=0, workers=threads, overwrite_x=True)[:ny]
     return np.ascontiguousarray(_scipy().irfft(modes, n=padded[1], axis=1, workers=threads)[:, :nx])
+
+
+def real_parts(modes: Array) -> Array:
+    """View complex modes (my, mx) as their real and imaginary parts (my, mx, 2)."""
+    return modes.view(modes.real.dtype).reshape(*modes.shape, 2)
 
 
 def wavenumbers(n: int, spacing: float, *, real: bool = False) -> Array:
@@ -204,15 +287,90 @@ def _along(call: Any, array: Array, axis: int, out: Array, **options: Any) -> Ar
     if array.ndim != 2 or array.size <= SMALL:
         return call(array, axes=(axis,), out=out, nthreads=1, **options)  # type: ignore[no-any-return]
     lines = array.shape[1 - axis]
-    groups = max(1, lines // GROUP)
 
     def transform(start: int, stop: int) -> None:
-        part = slice(start * GROUP, stop * GROUP if stop < groups else lines)
+        part = _lines(start, stop, lines)
         cut = (part, slice(None)) if axis == 1 else (slice(None), part)
         call(array[cut], axes=(axis,), out=out[cut], nthreads=1, **options)
 
-    in_bands(transform, groups, array.size // 2)
+    in_bands(transform, _groups(lines), array.size // 2)
     return out
+
+
+def _groups(lines: int) -> int:
+    """Return the number of groups of lines; the last one has the remaining lines too."""
+    return max(1, lines // GROUP)
+
+
+def _lines(start: int, stop: int, lines: int) -> slice:
+    """Return the lines of the groups from `start` to `stop`."""
+    return slice(start * GROUP, lines if stop >= _groups(lines) else stop * GROUP)
+
+
+def _chunks(start: int, stop: int, lines: int, line_bytes: int) -> Iterator[slice]:
+    """Yield the lines of the groups from `start` to `stop`, some groups at a time."""
+    step = max(1, CHUNK // (GROUP * line_bytes))
+    for first in range(start, stop, step):
+        yield _lines(first, min(first + step, stop), lines)
+
+
+def _transform_rows(start: int, stop: int, plane: Array, width: int, modes: Array) -> None:
+    """Transform groups of rows, padded with zeros to a width."""
+    (ny, nx), call = plane.shape, _ducc0().r2c
+    if nx == width:
+        part = _lines(start, stop, ny)
+        call(plane[part], axes=(1,), out=modes[part], nthreads=1)
+        return
+    buffer = np.zeros((0, 0))
+    for part in _chunks(start, stop, ny, width * plane.itemsize):
+        count = part.stop - part.start
+        if len(buffer) < count:
+            buffer = np.zeros((count, width), dtype=plane.dtype)
+        buffer[:count, :nx] = plane[part]
+        call(buffer[:count], axes=(1,), out=modes[part], nthreads=1)
+
+
+def _filter_columns(
+    start: int,
+    stop: int,
+    modes: Array,
+    filled: int,
+    multiply: Callable[..., None],
+    arguments: tuple[Any, ...],
+    undo: bool,
+) -> None:
+    """Transform groups of columns, whose first rows are filled, multiply them and `undo` the transform."""
+    call, parts = _ducc0().c2c, real_parts(modes)
+    for part in _chunks(start, stop, modes.shape[1], modes.shape[0] * modes.itemsize):
+        columns = modes[:, part]
+        columns[filled:] = 0
+        call(columns, axes=(0,), out=columns, nthreads=1)
+        multiply(part.start, part.stop, parts, *arguments)
+        if undo:
+            call(columns, axes=(0,), out=columns, forward=False, inorm=2, nthreads=1)
+
+
+def _undo_rows(start: int, stop: int, modes: Array, width: int, out: Array) -> None:
+    """Transform groups of rows back, and crop them."""
+    (ny, nx), call = out.shape, _ducc0().c2r
+    options = {"axes": (1,), "lastsize": width, "forward": False, "inorm": 2, "nthreads": 1}
+    conflicts = out.itemsize < np.dtype(np.float64).itemsize and out.strides[0] % CONFLICT == 0
+    if nx == width and not conflicts:
+        part = _lines(start, stop, ny)
+        call(modes[part], out=out[part], **options)
+        return
+    buffer = np.empty((0, 0))
+    for part in _chunks(start, stop, ny, width * out.itemsize):
+        count = part.stop - part.start
+        if len(buffer) < count:
+            buffer = np.empty((count, width + SHIFT), dtype=out.dtype)
+        rows = buffer[:count, :width]
+        call(modes[part], out=rows, **options)
+        out[part] = rows[:, :nx]
+
+
+def _empty_modes(plane: Array, padded: tuple[int, int]) -> Array:
+    return np.empty((padded[0], padded[1] // 2 + 1), dtype=np.result_type(plane.dtype, np.complex64))
 
 
 def _axis_by_axis(call: Any, array: Array, axes: tuple[int, ...], **options: Any) -> Array:
@@ -263,6 +421,9 @@ def _backward(
             modes = _along(_ducc0().c2c, modes, -2, work_array, forward=False, inorm=2)
         if out is None:
             out = np.empty((*modes.shape[:-1], shape[-1]), dtype=modes.real.dtype)
+        if modes.ndim == 2:
+            in_bands(_undo_rows, _groups(modes.shape[0]), modes.size, modes, shape[-1], out)
+            return out
         return _along(_ducc0().c2r, modes, -1, out, lastsize=shape[-1], forward=False, inorm=2)
     plane = _scipy().irfftn(modes, s=shape, axes=axes, workers=_scipy_threads(), overwrite_x=overwrite)
     if out is None:

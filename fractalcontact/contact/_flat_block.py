@@ -162,7 +162,7 @@ def flat_block(body: Body) -> FlatBlock:
     u = operator.apply(p)
     compliance = sum_by_rows(p * u)
     error = float(np.abs(u - compliance).max()) / compliance
-    return FlatBlock(p, u, compliance, iteration, operator.transforms, error)
+    return FlatBlock(p, u, compliance, iteration, round(operator.transforms), error)
 
 
 @lru_cache(maxsize=16)

@@ -53,26 +53,48 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
 
 
 @kernel
-def scale_modes(start, stop, parts, qy2, qx2, factor, invert, mean):  # type: ignore[no-untyped-def]
-    """Multiply modes by factor * |q|, or by factor / |q|; by `mean` where q = 0.
+def scale_modes(start, stop, parts, qy2, qx2, factor, invert, mean, work):  # type: ignore[no-untyped-def]
+    """Multiply columns of modes by factor * |q|, or by factor / |q|; by `mean` where q = 0.
 
-    `parts` (my, mx, 2) are real and imaginary parts.
+    `parts` (my, mx, 2) are real and imaginary parts. Adds up `work` (mx), the products of the modes before
+    and after, unless it is empty.
     """
-    for i in range(start, stop):
-        for j in range(parts.shape[1]):
-            q = np.sqrt(qy2[i] + qx2[j])
-            weight = (factor / q if q > 0 else mean) if invert else (factor * q if q > 0 else mean)
-            parts[i, j, 0] *= weight
-            parts[i, j, 1] *= weight
+    weight, x2, total = np.empty(stop - start, parts.dtype), qx2[start:stop], work[start:stop]
+    total[:] = 0
+    for i in range(parts.shape[0]):
+        row, y2 = parts[i, start:stop], qy2[i]
+        if invert:  # loops of their own for the weights of a row: they are vectorised
+            for j in range(weight.size):
+                weight[j] = factor / np.sqrt(y2 + x2[j])
+        else:
+            for j in range(weight.size):
+                weight[j] = factor * np.sqrt(y2 + x2[j])
+        if start == 0 and y2 == 0:
+            weight[0] = mean
+        for j in range(total.size):
+            real, imaginary = np.float64(row[j, 0]), np.float64(row[j, 1])
+            total[j] += weight[j] * (real * real + imaginary * imaginary)
+        for j in range(weight.size):
+            row[j, 0] *= weight[j]
+            row[j, 1] *= weight[j]
 
 
 @kernel
-def multiply_modes(start, stop, parts, symbol):  # type: ignore[no-untyped-def]
-    """Multiply modes, as real and imaginary parts (my, mx, 2), by a real symbol."""
-    for i in range(start, stop):
-        for j in range(parts.shape[1]):
-            parts[i, j, 0] *= symbol[i, j]
-            parts[i, j, 1] *= symbol[i, j]
+def multiply_modes(start, stop, parts, symbol, work):  # type: ignore[no-untyped-def]
+    """Multiply columns of modes, as real and imaginary parts (my, mx, 2), by a real symbol.
+
+    Adds up `work` (mx), the products of the modes before and after, unless it is empty.
+    """
+    total = work[start:stop]
+    total[:] = 0
+    for i in range(parts.shape[0]):
+        row, weight = parts[i, start:stop], symbol[i, start:stop]
+        for j in range(total.size):
+            real, imaginary = np.float64(row[j, 0]), np.float64(row[j, 1])
+            total[j] += weight[j] * (real * real + imaginary * imaginary)
+        for j in range(weight.size):
+            row[j, 0] *= weight[j]
+            row[j, 1] *= weight[j]
 
 
 @kernel
@@ -198,11 +220,11 @@ def select_free_set(  # type: ignore[no-untyped-def]
                 mask[i, j] = free
             for j in range(nx):
                 row_sum[j] += x[i, j]
-        for j in range(bins.shape[1]):
-            bins[k, j], counts[k, j] = 0, 0
-        for j in range(nx):
-            bins[k, j // columns] += row_sum[j]
-            counts[k, j // columns] += row_count[j]
+        for b in range(bins.shape[1]):  # not over all nodes with j // columns: divisions take long
+            bins[k, b], counts[k, b] = 0, 0
+            for j in range(b * columns, min(b * columns + columns, nx)):
+                bins[k, b] += row_sum[j]
+                counts[k, b] += row_count[j]
         out[k, 0] = changes
 
 
@@ -212,8 +234,9 @@ def fill_outside(start, stop, rows, columns, mask, bins, x):  # type: ignore[no-
     my, mx = mask.shape
     row = np.empty(mx, x.dtype)
     for k in range(start, stop):
-        for j in range(mx):
-            row[j] = bins[k, j // columns]
+        for b in range(bins.shape[1]):
+            for j in range(b * columns, min(b * columns + columns, mx)):
+                row[j] = bins[k, b]
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
                 x[i, j] += 0 * row[j] if mask[i, j] else row[j]
@@ -230,10 +253,10 @@ def sum_outside(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-u
         for i in range(k * rows, min(k * rows + rows, my)):
             for j in range(mx):
                 row[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
-        for j in range(bins.shape[1]):
-            bins[k, j] = 0
-        for j in range(mx):
-            bins[k, j // columns] += row[j]
+        for b in range(bins.shape[1]):
+            bins[k, b] = 0
+            for j in range(b * columns, min(b * columns + columns, mx)):
+                bins[k, b] += row[j]
 
 
 @sum_kernel
@@ -243,8 +266,9 @@ def add_bins(start, stop, rows, columns, mask, bins, h, u, t, closure, x, out): 
     row = np.empty(nx, x.dtype)
     for k in range(start, stop):
         z_sum, z_g, t_sum = 0.0, 0.0, 0.0
-        for j in range(nx):
-            row[j] = bins[k, j // columns]
+        for b in range(bins.shape[1]):
+            for j in range(b * columns, min(b * columns + columns, nx)):
+                row[j] = bins[k, b]
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
                 z = x[i, j] + row[j]
@@ -270,17 +294,6 @@ def search_direction(start, stop, rows, mask, z, mean, beta, h, u, closure, t, o
                 t_sum += value
                 t_g += np.float64(value) * (u[i, j] + h[i, j] - closure)
         out[k, 0], out[k, 1] = t_sum, t_g
-
-
-@sum_kernel
-def curvature(start, stop, rows, t, r, out):  # type: ignore[no-untyped-def]
-    """Sum t r, with r = K t."""
-    for k in range(start, stop):
-        total = 0.0
-        for i in range(k * rows, min(k * rows + rows, t.shape[0])):
-            for j in range(t.shape[1]):
-                total += np.float64(t[i, j]) * r[i, j]
-        out[k, 0] = total
 
 
 @sum_kernel

@@ -24,7 +24,7 @@ SMALLEST = 64  # points along an axis that is not halved any more: below, a coar
 CONTACT_SHARE = (
     3.0  # of the area over nominal pressure / (E* rms slope): theories have 1.6 to 2.5 (page contact)
 )
-COARSE_TOLERANCE = 2e-2  # residual on a coarse grid
+COARSE_TOLERANCE = 0.1  # residual on a coarse grid: from 0.2 on the finest grid takes more iterations
 
 
 def cold_start(problem: Problem, control: Control, dtype: Any) -> tuple[Array, float]:
@@ -75,11 +75,18 @@ def coarsen(problem: Problem, factors: tuple[int, ...]) -> Problem:
     gap = problem.gap
     for axis, factor in enumerate(factors):
         if factor > 1:
-            starts = np.arange(0, gap.shape[axis], factor)
-            cell_nodes = np.diff(np.append(starts, gap.shape[axis]))
-            gap = np.add.reduceat(gap, starts, axis=axis) / np.expand_dims(cell_nodes, 1 - axis)
+            gap = mean_of_neighbours(gap, axis)
     coarse = Body(shape, spacing, body.periodic, body.influence, coarse_radius(body, spacing))
     return Problem(coarse, gap, problem.p_max)
+
+
+def mean_of_neighbours(gap: Array, axis: int) -> Array:
+    """Return the mean of every two nodes along an axis; a last one without neighbour stays."""
+    lines = np.moveaxis(gap, axis, 0)
+    means, others = lines[::2].copy(order="K"), lines[1::2]
+    means[: len(others)] += others
+    means[: len(others)] /= 2
+    return np.moveaxis(means, 0, axis)
 
 
 def coarse_radius(body: Body, spacing: tuple[float, float]) -> float:

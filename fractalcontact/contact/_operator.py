@@ -18,15 +18,24 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for the next call
+NO_WORK: Array = np.empty(0)  # of a filter whose work is not asked for
 
 
 class Operator(Protocol):
-    """Displacement from pressure; counts its pairs of transforms."""
+    """Displacement from pressure; counts its pairs of transforms, half a pair for one way."""
 
-    transforms: int
+    transforms: float
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, both (ny, nx); an operator may write it into `out`."""
+        ...
+
+    def work(self, pressure: Array) -> float:
+        """Return the sum of pressure times displacement; of a large plane by one transform (Parseval)."""
+        ...
+
+    def displacement(self, out: Array | None = None) -> Array:
+        """Return the displacement under the pressure of the last call, which was of `work`."""
         ...
 
 
@@ -35,12 +44,28 @@ class PeriodicOperator:
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.multiplier = WavenumberMultiplier(shape, spacing)
-        self.transforms = 0
+        self.latest: Array | None = None  # displacement that came with the work on a small plane
+        self.transforms = 0.0
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, without its mean."""
         self.transforms += 1
         return self.multiplier.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
+
+    def work(self, pressure: Array) -> float:
+        """Return the sum of pressure times displacement."""
+        if self.multiplier.is_small:
+            self.latest = self.apply(pressure)
+            return product_sum(pressure, self.latest)
+        self.transforms += 0.5
+        return self.multiplier.work(pressure, 2.0, invert=True, mean=0.0)
+
+    def displacement(self, out: Array | None = None) -> Array:
+        """Return the displacement under the pressure of the last call, which was of `work`."""
+        if self.latest is not None:
+            return self.latest
+        self.transforms += 0.5
+        return self.multiplier.plane(out)
 
 
 class FreeOperator:
@@ -52,15 +77,16 @@ class FreeOperator:
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
         self.transform = fft.PlaneTransform(self.padded)
         self.is_small = self.padded[0] * self.padded[1] <= 4 * SMALL
-        self.modes: Array | None = None
+        self.modes: Any = None  # array of the last transform, for the next one
         self.planes: tuple[Array, Array] | None = None  # padded, of a small body
-        self.transforms = 0
+        self.latest: Array | None = None  # displacement that came with the work on a small plane
+        self.transforms = 0.0
 
     def rounded(self, dtype: Any) -> FreeOperator:
         """Return the same operator in another precision, or in the same one with arrays of its own."""
         other = copy(self)
         other.symbol = self.symbol.astype(dtype, copy=False)
-        other.modes, other.planes, other.transforms = None, None, 0
+        other.modes, other.planes, other.latest, other.transforms = None, None, None, 0.0
         return other
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
@@ -68,30 +94,49 @@ class FreeOperator:
         self.transforms += 1
         if self.is_small:
             return self.apply_at_once(pressure, out)
-        modes = fft.rfft2_padded(pressure, self.padded, self.modes)
+        from fractalcontact.contact._kernels import multiply_modes
+
+        weights = (self.symbol, NO_WORK)
+        displacement, modes = fft.filtered(pressure, self.padded, multiply_modes, weights, self.modes)
         self.modes = modes if fft.writes_in_place() else None
-        self.multiply(modes)
-        return fft.irfft2_cropped(modes, self.padded, self.shape)
+        return displacement
 
     def apply_at_once(self, pressure: Array, out: Array | None) -> Array:
         """Return the displacement, from transforms of the whole padded plane: a call each."""
+        from fractalcontact.contact._kernels import multiply_modes
+
         if self.planes is None:
             self.planes = np.zeros(self.padded, pressure.dtype), np.empty(self.padded, pressure.dtype)
         (ny, nx), (loaded, moved) = self.shape, self.planes
         loaded[:ny, :nx] = pressure
         self.modes = modes = self.transform.forward(loaded, self.modes)
-        self.multiply(modes)
+        in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, NO_WORK)
         displacement = self.transform.backward(modes, moved)[:ny, :nx]
         if out is None:
             return displacement.copy()
         out[...] = displacement
         return out
 
-    def multiply(self, modes: Array) -> None:
-        """Multiply the modes by the symbol, in place."""
+    def work(self, pressure: Array) -> float:
+        """Return the sum of pressure times displacement."""
         from fractalcontact.contact._kernels import multiply_modes
 
-        in_bands(multiply_modes, modes.shape[0], modes.size, real_parts(modes), self.symbol)
+        if self.is_small:
+            self.latest = self.apply(pressure)
+            return product_sum(pressure, self.latest)
+        self.transforms += 0.5
+        work = np.empty(self.symbol.shape[1])
+        weights = (self.symbol, work)
+        self.modes = fft.filtered_modes(pressure, self.padded, multiply_modes, weights, self.modes)
+        return sum_of_modes(work, self.padded)
+
+    def displacement(self, out: Array | None = None) -> Array:
+        """Return the displacement under the pressure of the last call, which was of `work`."""
+        if self.latest is not None:
+            return self.latest
+        self.transforms += 0.5
+        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        return fft.irfft2_cropped(modes, self.padded, self.shape, out)
 
 
 class PairSum:
@@ -104,12 +149,23 @@ class PairSum:
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.table, self.iy, self.ix = table, iy, ix
         self.all_nodes = np.arange(iy.size)
-        self.transforms = 0
+        self.latest: Array = np.empty(0)
+        self.transforms = 0.0
 
     # `out` is of no use: these arrays are small
     def apply(self, value: Array, out: Array | None = None) -> Array:  # noqa: ARG002
         """Return the sum over all nodes of table[offset] times value, for every node."""
         return self.sum_at(value, self.all_nodes)
+
+    def work(self, value: Array) -> float:
+        """Return the sum of the values times the sums for them."""
+        self.latest = self.apply(value)
+        return product_sum(value, self.latest)
+
+    # `out` is of no use: these arrays are small
+    def displacement(self, out: Array | None = None) -> Array:  # noqa: ARG002
+        """Return the sums for the values of the last call, which was of `work`."""
+        return self.latest
 
     def sum_at(self, value: Array, targets: Array) -> Array:
         """Return the sum for the nodes `targets` (indices); zero for the others."""
@@ -129,7 +185,7 @@ class WavenumberMultiplier:
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.shape, self.spacing = shape, spacing
         self.transform = fft.PlaneTransform(shape)
-        self.modes: Array | None = None
+        self.modes: Any = None  # array of the last transform, for the next one
         self.is_small = shape[0] * shape[1] <= SMALL
 
     def apply(
@@ -139,26 +195,46 @@ class WavenumberMultiplier:
 
         Where the FFT library can, it writes into `out`, which may be the plane itself.
         """
-        modes = self.transform.forward(plane, self.modes)
         if self.is_small:
-            weights = wavenumber_weights(self.shape, self.spacing, factor, invert, mean, plane.dtype.char)
-            parts = modes.view(plane.dtype)
-            np.multiply(parts, weights, out=parts)
-        else:
-            self.multiply(modes, factor, invert, mean)
+            return self.apply_at_once(plane, factor, invert, mean, out)
+        from fractalcontact.contact._kernels import scale_modes
+
+        weights = (*self.weights(plane.dtype.type, factor, invert, mean), NO_WORK)
+        result, modes = fft.filtered(plane, self.shape, scale_modes, weights, self.modes, out)
+        self.modes = modes if self.transform.in_place else None
+        return result
+
+    def apply_at_once(
+        self, plane: Array, factor: float, invert: bool, mean: float, out: Array | None
+    ) -> Array:
+        """Return the plane filtered by a table, a call for each transform."""
+        modes = self.transform.forward(plane, self.modes)
+        weights = wavenumber_weights(self.shape, self.spacing, factor, invert, mean, plane.dtype.char)
+        parts = modes.view(plane.dtype)
+        np.multiply(parts, weights, out=parts)
         if not self.transform.in_place:
             return self.transform.backward(modes)
         self.modes = modes
         return self.transform.backward(modes, out)
 
-    def multiply(self, modes: Array, factor: float, invert: bool, mean: float) -> None:
-        """Multiply the modes in place, without a table."""
+    def work(self, plane: Array, factor: float, *, invert: bool, mean: float) -> float:
+        """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
         from fractalcontact.contact._kernels import scale_modes
 
-        dtype = modes.real.dtype.type
+        work = np.empty(self.shape[1] // 2 + 1)
+        weights = (*self.weights(plane.dtype.type, factor, invert, mean), work)
+        self.modes = fft.filtered_modes(plane, self.shape, scale_modes, weights, self.modes)
+        return sum_of_modes(work, self.shape)
+
+    def plane(self, out: Array | None = None) -> Array:
+        """Return the plane with the modes of the last call, which was of `work`."""
+        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        return fft.irfft2_cropped(modes, self.shape, self.shape, out)
+
+    def weights(self, dtype: Any, factor: float, invert: bool, mean: float) -> tuple[Any, ...]:
+        """Return the arguments of `scale_modes` in one precision."""
         qy2, qx2 = squared_wavenumbers(self.shape, self.spacing)
-        weights = (qy2.astype(dtype), qx2.astype(dtype), dtype(factor), invert, dtype(mean))
-        in_bands(scale_modes, modes.shape[0], modes.size, real_parts(modes), *weights)
+        return qy2.astype(dtype), qx2.astype(dtype), dtype(factor), invert, dtype(mean)
 
 
 def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
@@ -183,9 +259,21 @@ def wavenumber_weights(
     return weights
 
 
-def real_parts(modes: Array) -> Array:
-    """View complex modes (my, mx) as their real and imaginary parts (my, mx, 2)."""
-    return modes.view(modes.real.dtype).reshape(*modes.shape, 2)
+def product_sum(one: Array, other: Array) -> float:
+    """Return the sum of the products of two small planes."""
+    return float(np.sum(one * other, dtype=np.float64))
+
+
+def sum_of_modes(columns: Array, shape: tuple[int, int]) -> float:
+    """Return the sum over a plane from those over the columns of its modes (Parseval).
+
+    A column stands for itself and its mirror image; the first one is its own, and so is the last one of an
+    even number of points.
+    """
+    total = 2 * float(columns.sum()) - float(columns[0])
+    if shape[1] % 2 == 0:
+        total -= float(columns[-1])
+    return total / (shape[0] * shape[1])
 
 
 def padded_length(n: int) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
-from fractalcontact.contact._operator import convolution_symbol, padded_length, real_parts
+from fractalcontact.contact._operator import convolution_symbol, padded_length
 from fractalcontact.contact._preconditioner import DECAY, FADE, bin_edge, padded_plane
 from fractalcontact.contact._scaled_problem import Body
 
@@ -87,7 +87,7 @@ class WaveVectorMultiplier:
         modes = [fft.rfft2(plane) for plane in planes]
         waves = (self.qy, self.qx, self.signed_qy, self.signed_qx)
         weights = (self.factor, self.excess, self.inverse, self.mean)
-        parts = [real_parts(plane) for plane in modes]
+        parts = [fft.real_parts(plane) for plane in modes]
         in_bands(multiply_by_wave_vectors, modes[0].shape[0], 2 * modes[0].size, *parts, *waves, *weights)
         for plane, out in zip(modes, planes, strict=True):
             fft.irfft2(plane, self.shape, out, overwrite=True)
@@ -111,7 +111,7 @@ class ConvolutionMultiplier:
 
         modes = [fft.rfft2_padded(plane, self.padded) for plane in planes]
         symbols = (self.symbol_xx, self.symbol_yy, self.symbol_xy)
-        parts = [real_parts(plane) for plane in modes]
+        parts = [fft.real_parts(plane) for plane in modes]
         in_bands(multiply_by_symbols, modes[0].shape[0], 2 * modes[0].size, *parts, *symbols)
         for plane, out in zip(modes, planes, strict=True):
             out[...] = fft.irfft2_cropped(plane, self.padded, (out.shape[0], out.shape[1]))

@@ -35,6 +35,7 @@ for shape, dtype in itertools.product(SHAPES, (np.float32, np.float64)):
         padded = tuple(fft.fast_length(2 * n - 1) for n in shape)
         modes = fft.rfft2_padded(plane, padded)
         results += [modes.copy(), fft.irfft2_cropped(modes, padded, shape)]
+        results += [fft.filtered(plane, size, lambda *_: None, ())[0] for size in (shape, padded)]
     assert {array.real.dtype for array in results} == {np.dtype(dtype)}
     print(shape, dtype.__name__, *(hashlib.md5(array.tobytes()).hexdigest()[:8] for array in results))
 """
@@ -106,3 +107,34 @@ def test_library_can_be_selected(monkeypatch):
 def test_wavenumbers_are_radians_per_metre():
     np.testing.assert_allclose(fft.wavenumbers(4, 0.5), 2 * np.pi * np.fft.fftfreq(4, 0.5))
     np.testing.assert_allclose(fft.wavenumbers(5, 0.5, real=True), 2 * np.pi * np.fft.rfftfreq(5, 0.5))
+
+
+@pytest.mark.parametrize("library", [pytest.param("ducc0", marks=needs_ducc0), "scipy"])
+@pytest.mark.parametrize(
+    ("shape", "padded"),
+    [
+        ((5, 8), (5, 8)),
+        ((6, 7), (12, 15)),
+        ((300, 400), (300, 400)),
+        ((70, 1024), (70, 1024)),  # rows of single precision 4096 bytes apart
+        ((130, 500), (260, 1024)),
+    ],
+)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_filter_multiplies_every_mode(monkeypatch, library, shape, padded, dtype):
+    monkeypatch.setenv("FRACTALCONTACT_FFT", library)
+    plane = np.random.default_rng(3).standard_normal(shape).astype(dtype)
+    factors = np.random.default_rng(4).random((padded[0], padded[1] // 2 + 1)).astype(dtype)
+
+    def multiply(start, stop, parts, share):
+        parts[:, start:stop] *= share[:, start:stop, None]
+
+    expected = scipy.fft.irfft2(scipy.fft.rfft2(plane.astype(float), s=padded) * factors, s=padded)
+    expected = expected[: shape[0], : shape[1]]
+    close = {"rtol": 0, "atol": 100 * np.finfo(dtype).eps * np.abs(expected).max()}
+    first, modes = fft.filtered(plane, padded, multiply, (factors,))
+    np.testing.assert_allclose(first, expected, **close)
+    again, _ = fft.filtered(plane, padded, multiply, (factors,), modes, plane)  # into the plane itself
+    np.testing.assert_array_equal(again, first)
+    if fft.writes_in_place():
+        assert again is plane

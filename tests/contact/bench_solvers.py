@@ -275,9 +275,12 @@ def compare(case: Case, names: list[str], options: argparse.Namespace) -> list[d
     met: dict[str, float] = {}
     once: set[str] = set()  # too slow to be repeated
     for name, solve in solves.items():
+        loosest = 3 * options.target if case.start == "path" else options.loosest  # a path draws no curve
+        loosest = min(
+            [loosest, options.loosest, *(tolerance for of, tolerance in options.begin if of == name)]
+        )
         for tolerance in TOLERANCES:
-            loosest = 3 * options.target if case.start == "path" else options.loosest  # a path draws no curve
-            if tolerance > 1.01 * min(loosest, options.loosest):
+            if tolerance > 1.01 * loosest:
                 continue
             seconds, pressures, pairs = timed(solve, tolerance, options)
             error = max(judge(pressure) for pressure in pressures)
@@ -522,6 +525,13 @@ def parsed(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--target", type=float, default=1e-6, help="complementarity to reach")
     parser.add_argument("--loosest", type=float, default=1e-3, help="tolerance where the sweeps begin")
     parser.add_argument("--beyond", type=float, default=0.1, help="share of the target where a sweep ends")
+    parser.add_argument(
+        "--begin",
+        type=lambda text: (text.rpartition("=")[0], float(text.rpartition("=")[2])),
+        action="append",
+        default=[],
+        help="SOLVER=TOLERANCE: where its sweep begins, if that is below --loosest",
+    )
     parser.add_argument(
         "--patience", type=float, default=60.0, help="seconds beyond which a run is not repeated"
     )
