@@ -55,7 +55,7 @@ VALUES = {
     "timedelta": lambda: datetime.timedelta(seconds=1),
     "datetime64": lambda: np.datetime64("2026-01-02"),
     "timedelta64": lambda: np.timedelta64(1, "s"),
-    "not a time": lambda: np.datetime64("NaT"),
+    "not a time": lambda: np.datetime64("NaT", "s"),
     "decimal": lambda: decimal.Decimal("1.5"),
     "fraction": lambda: fractions.Fraction(3, 2),
     "uuid": lambda: uuid.UUID(int=1),

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import os
 import re
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, reading
-from fractalcontact.surfaces._files import NotATable, Table, file_suffix, open_bytes, read_table
+from fractalcontact.surfaces._files import RATIO, NotATable, Table, file_suffix, open_bytes, read_table
 from fractalcontact.surfaces._instruments import PROJECT
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -33,6 +36,7 @@ X = ("x", "points:0", "easting", "east", "e")
 Y = ("y", "points:1", "northing", "north", "n")
 Z = ("z", "points:2", "height", "elevation", "altitude", "h")
 DEGREES = ("lon", "long", "longitude", "lat", "latitude")
+LEAST_RECORD = 54  # bytes of a record of a LAS file without content
 GEOGRAPHIC_MODEL = (1024, 2)  # key and value of a GeoTIFF directory: latitude and longitude
 
 
@@ -262,6 +266,7 @@ def _las(path: Path) -> Points:
 
     try:
         with open_bytes(path) as file:
+            _check_las_size(file, path)
             cloud = laspy.read(file)
         position = np.array(cloud.xyz, dtype=np.float64)
     except UnreadableFile:
@@ -279,6 +284,39 @@ def _las(path: Path) -> Points:
         problems.require(len(position) > 0, "path", f"points in {path.name!r}", "none")
     entries = {"format": path.suffix.lstrip("."), "reader": f"laspy {laspy.__version__}"}
     return Points(position, "m" if system == "metre" else None, None, entries)
+
+
+def _check_las_size(file: IO[bytes], path: Path) -> None:
+    """Refuse a file that states more points or records than it can hold: the library would make them all.
+
+    The places of the counts are those of the ASPRS LAS specification 1.4.
+    """
+    import laspy
+
+    size = file.seek(0, io.SEEK_END)
+    counts = {"records": _unpacked("<I", file, 100)}
+    if _unpacked("<BB", file, 24) >= (1, 4):
+        counts["extended records"] = _unpacked("<I", file, 243)
+    for what, (count,) in counts.items():
+        if count * LEAST_RECORD > size:
+            raise ValueError(f"it states {count} {what} in {size} bytes")
+    file.seek(0)
+    header = laspy.LasHeader.read_from(file)
+    stated = header.point_count * header.point_format.size
+    require_unpacked(WHERE, path.name, stated, unpacked_limit(size, RATIO))
+    if header.are_points_compressed:
+        (table,) = _unpacked("<q", file, header.offset_to_point_data)
+        if table == -1:  # written to a stream: the place of the table ends the file
+            (table,) = _unpacked("<q", file, size - 8)
+        _, chunks = _unpacked("<II", file, table)
+        if chunks > size:
+            raise ValueError(f"it states {chunks} chunks in {size} bytes")
+    file.seek(0)
+
+
+def _unpacked(form: str, file: IO[bytes], place: int) -> tuple[int, ...]:
+    file.seek(place)
+    return struct.unpack(form, file.read(struct.calcsize(form)))
 
 
 def _reference_system(records: Any) -> str:
