@@ -45,6 +45,9 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
         if options.get("plane") == OF_SURFACE:
             options["plane"] = lower
         surface = surfaces.read(locate(str(table.read), folder), **options)
+        if "y" not in surface.dims:
+            remedy = "see fractalcontact.dimensions.estimate"
+            raise InvalidInput("surface", [f"read: expected a surface, got a profile: {remedy}"])
     source = surface.attrs["references"]
     if table.despike:
         surface = surfaces.despike(surface)

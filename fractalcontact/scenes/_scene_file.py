@@ -239,6 +239,7 @@ def _check(scene: Scene, problems: Problems) -> None:
     if "dimensions" in scene.tables:
         keys = [key for key in arguments_of("dimensions.estimate")[0] if key != "methods"]  # from [want]
         _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
+        _check_values(scene.table("dimensions"), "dimensions", problems)
     if "joint" in scene.tables:
         problems.boolean("joint.register", scene.table("joint").get("register", False))
         _check_stages(scene.table("joint"), "joint", joint_keys(), JOINT_STAGES, problems)
@@ -318,6 +319,7 @@ def _check_stages(
     rest = {key: value for key, value in table.items() if key not in own}
     _check_keys(rest, common, name, problems, similar=stages)
     _check_numbers(rest, name, problems)
+    _check_values(rest, name, problems)
     subpackage = "joints" if name == "joint" else name
     for stage, options in own.items():
         row = STAGES[stage if name == "contact" else f"{subpackage}/{stage}"]
@@ -403,6 +405,15 @@ def _check_numbers(table: Table, name: str, problems: Problems) -> None:
             problems.numbers(f"{name}.{key}", table[key], **bounds)
     if "direction" in table:
         _check_direction(table["direction"], f"{name}.direction", problems)
+
+
+def _check_values(table: Table, name: str, problems: Problems) -> None:
+    """Check that no argument is a table, which would be taken for that of a stage and left out."""
+    for key, value in table.items():
+        place = f"{name}.{key}"
+        is_told = any(f"{argument}.".startswith(f"{place}.") for argument in problems.arguments)
+        if isinstance(value, dict) and not is_told:
+            problems.add(place, "a value, not a table", value)
 
 
 def _check_direction(value: Any, place: str, problems: Problems) -> None:

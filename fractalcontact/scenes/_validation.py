@@ -19,6 +19,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.memory import require_memory
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._inputs import (
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
 LARGE = 1 << 18  # points of a generated surface that is not made twice
+COORDINATES = 24.0  # bytes of a coordinate while it is made
 
 
 def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
@@ -178,6 +180,7 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
     shape = shape if isinstance(shape, list) else [shape] * 2
     if math.prod(shape) < LARGE:
         return None
+    require_memory("surface", COORDINATES * sum(shape), f"the coordinates of {shape[0]} x {shape[1]} points")
     return _zeros(shape, np.broadcast_to(table.options["spacing"], 2).tolist())
 
 

@@ -88,11 +88,29 @@ def refused(name, tmp_path, *replacements, **changes):
         ("file", {"surface": {"read": "x" * 300}}, "surface.read"),
         ("roughness", {"title": 3}, "title"),
         ("roughness", {"": [1, 2]}, ""),
+        ("domains", {"contact": {"method": {"a": 1}}}, "contact.method"),
+        ("file", {"dimensions": {"scales": {"a": 1}}}, "dimensions.scales"),
+        ("joint", {"joint": {"block": {"a": 1}}}, "joint.block"),
         ("joint", {"surface": {"shape": [200_000, 200_000]}, "want": {"joints": "rough"}}, "want.joints"),
     ],
 )
 def test_kept_scene_gives_a_clear_error(tmp_path, name, changes, named):
     assert named in refused(name, tmp_path, **changes)
+
+
+@pytest.mark.parametrize("name", ["roughness", "contact", "domains", "joint"])
+def test_profile_is_no_surface_of_a_scene(tmp_path, name):
+    np.save(tmp_path / "profile.npy", rough().values[0])
+    tables = SCENES[name] | {"surface": {"read": "profile.npy", "spacing": 1e-4}}
+    (tmp_path / "study.toml").write_text(toml_of(tables), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="surface: read: expected a surface, got a profile"):
+        fc.scenes.run(tmp_path / "study.toml", progress=False)
+    assert fc.scenes.plan(fc.scenes.load(tmp_path / "study.toml")).memory == {}
+
+
+def test_scene_whose_coordinates_fill_the_memory_is_refused(tmp_path):
+    (problem,) = refused("roughness", tmp_path, surface={"shape": [10**13, 10**13]})
+    assert "memory" in problem
 
 
 def test_scene_beyond_the_memory_is_planned_and_not_run(tmp_path):
