@@ -136,9 +136,44 @@ def slipped():
 
 
 @functools.cache
+def cloud():
+    return np.random.default_rng(13).random((60, 3)) * [1e-2, 1e-2, 1e-3]
+
+
+@functools.cache
+def measured():
+    method = fc.accuracy.Method("m", [4, 8], lambda n: n, lambda n: n, lambda n, _: 1.0 / n)
+    return fc.accuracy.measure({"surfaces": [fc.accuracy.Benchmark("b", "e", "t", (method,))]}, budget=0.1)
+
+
+@functools.cache
+def extremes():
+    """Return what `accuracy.extremes` tells of one case, without the process that it starts."""
+    return fc.accuracy.extremes("one cell")
+
+
+@functools.cache
+def estimators():
+    return fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1)
+
+
+@functools.cache
+def result_of(name):
+    """Return the result of the valid call of a function."""
+    return function_of(name)(**CALLS[name]())
+
+
+@functools.cache
 def file(name):
     PLACE.mkdir(exist_ok=True)
     return fc.save(rough(), PLACE / f"{name}.nc")
+
+
+@functools.cache
+def points_file():
+    PLACE.mkdir(exist_ok=True)
+    np.savetxt(PLACE / "points.xyz", cloud())
+    return PLACE / "points.xyz"
 
 
 GENERATOR = {"shape": (8, 8), "spacing": SPACING, "hurst": 0.5, "rng": 1}
@@ -153,6 +188,9 @@ CALLS = {
     "surfaces.from_array": lambda: {"heights": rough().values, "spacing": SPACING},
     "surfaces.read": lambda: {"path": file("surface")},
     "surfaces.sample": lambda: {"name": "concrete_crack"},
+    "surfaces.read_points": lambda: {"path": points_file()},
+    "surfaces.fit_plane": lambda: {"points": cloud()},
+    "surfaces.from_points": lambda: {"points": cloud(), "spacing": 1e-3},
     "surfaces.level": lambda: {"surface": rough()},
     "surfaces.gaussian_filter": lambda: {"surface": rough(), "cutoff": 4.0 * SPACING},
     "surfaces.texture": lambda: {"surface": rough()},
@@ -175,17 +213,38 @@ CALLS = {
         )
     },
     "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "likelihood"]},
+    "dimensions.hurst_map": lambda: {"surface": rough(), "window": 1.6e-3},
+    "dimensions.scaling": lambda: {"surface": rough(48)},
+    "dimensions.waves": lambda: {"surface": rough()},
     "dimensions.second_variogram": lambda: {"surface": rough()},
     "dimensions.spectrum": lambda: {"surface": periodic()},
     "dimensions.variogram": lambda: {"surface": rough()},
     "contact.ContactOptions": dict,
     "contact.LoadPath": lambda: {"control": "closure", "values": (1e-6,)},
     "contact.effective_modulus": lambda: {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
+    "contact.effective_poisson": lambda: {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
+    "contact.theories": lambda: {"surface": rough(), "contact_modulus": 1e9, "nominal_pressure": [1e4, 1e5]},
     "contact.flat_stiffness": lambda: {"shape": (8, 8), "spacing": SPACING, "contact_modulus": 1e9},
     "contact.press": lambda: PRESS | {"surface": periodic()},
     "contact.partial_slip": lambda: PRESS
     | {"surface": periodic(), "poisson": 0.2, "friction_coefficient": 0.5, "tangential_force": 0.01},
     "joints.Crack": lambda: {"lower": rough(), "upper": rough() + 1e-5, "young": 1e10, "poisson": 0.2},
+    "joints.area_dimension": lambda: {
+        "crack": crack(), "shear": [1e-4], "factors": [1, 2], "normal_force": [1.0, 10.0],
+    },
+    "joints.direct_shear": lambda: {
+        "crack": crack(), "path": 2e-4, "nominal_pressure": [1e6], "hardness": 1e9,
+    },
+    "joints.partial_slip": lambda: {
+        "crack": crack(), "shear": [1e-4], "normal_force": 10.0, "tangential_force": [1.0, -1.0],
+    },
+    "joints.self_weight": lambda: {
+        "crack": crack(), "structure_size": [1.0, 10.0], "unit_weight": 24e3, "shear": [1e-4],
+    },
+    "joints.shear_curve": lambda: {
+        "surface": rough(), "displacement": [0.0, 1e-3], "nominal_pressure": [1e5, 1e6],
+        "wall_strength": 1e8, "residual_friction_angle": 30,
+    },
     "joints.bandis_aperture": lambda: {
         "roughness": 10, "wall_strength": 5e7, "compressive_strength": 1e8,
     },
@@ -229,12 +288,15 @@ CALLS = {
     "save": lambda: {"result": rough(), "path": PLACE / "saved.nc"},
     "open": lambda: {"path": file("opened")},
     "scenes.load": lambda: {"path": "pressed_surface"},
-    "scenes.plan": lambda: {"scene": "rigid_sliding"},
+    "scenes.plan": lambda: {"scene": fc.scenes.load("rigid_sliding")},
     "scenes.validate": lambda: {"scene": "rigid_sliding"},
     "scenes.contents": lambda: {"path": file("contents")},
     "scenes.summary": lambda: {"tree": study()},
     "scenes.paper_table": lambda: {"tree": study()},
     "scenes.reproduce": lambda: {"result": rough()},
+    "scenes.report": lambda: {"result": study(), "path": PLACE / "report.html"},
+    "scenes.tables": lambda: {"result": study()},
+    "scenes.template": lambda: {"question": "roughness", "scan": file("scan"), "folder": PLACE},
     "plotting.surface": lambda: {"surface": rough(), "block": rough()[:8, :8]},
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
     "plotting.contact_domains": lambda: {"result": pressed()},
@@ -265,14 +327,34 @@ CALLS = {
     "plotting.sliding_scheme": lambda: {
         "surface": rough(), "delta": fc.joints.delta_surface(crack(), [1e-4], "W"),
     },
-    "plotting.paper_figure": lambda: {"tree": study(), "number": 3},
+    "plotting.paper_figure": lambda: {"tree": study(), "number": 5},
+    "plotting.area_dimension": lambda: {"result": result_of("joints.area_dimension")},
+    "plotting.datasheet": lambda: {
+        "tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()}), "notes": ["a note"],
+    },
+    "plotting.error_against_time": lambda: {"measured": measured()},
+    "plotting.estimator_errors": lambda: {"bench": estimators()},
+    "plotting.scaling": lambda: {"result": result_of("dimensions.scaling")},
+    "plotting.self_weight": lambda: {"result": result_of("joints.self_weight")},
+    "plotting.shear_curve": lambda: {"result": result_of("joints.direct_shear")},
+    "plotting.slip_loops": lambda: {"result": result_of("joints.partial_slip")},
     "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
-    "accuracy.summary": lambda: {"results": xr.Dataset()},
+    "accuracy.benchmarks": lambda: {"subpackage": "surfaces"},
+    "accuracy.summary": lambda: {"results": estimators()},
+    "accuracy.worst_results": lambda: {"results": extremes()},
     "accuracy.estimators": lambda: {"hurst": 0.5, "sizes": 8, "families": "nothing", "members": 2},
 }  # fmt: skip
 
 # these are refused as they stand, because they would take long or need a file
 REFUSED = ("accuracy.estimators", "domains.read_mask")
+# not called: `scenes.run` takes damaged scenes (`fuzz_scenes`), the next take as long as they are told to,
+# others have no arguments, and the rest are no functions
+LEFT_OUT = {
+    "scenes.run", "accuracy.examine", "accuracy.extremes", "accuracy.measure",
+    "dimensions.methods", "scenes.json_schema", "scenes.paper_criteria",
+    "accuracy.Benchmark", "accuracy.Case", "accuracy.Method", "accuracy.Result", "accuracy.cases",
+    "joints.PARK_PAULAY", "scenes.Scene",
+}  # fmt: skip
 # a damaged argument of this kind is never accepted where it lies on a grid
 LABELLED = ("surface", "mask", "lower", "upper", "gap")
 
@@ -288,7 +370,8 @@ def damaged_call(pick, names=None):
     """Return the name of a function, its arguments, and what was done to each damaged one."""
     name = pick(sorted(names or CALLS))
     arguments = dict(CALLS[name]())
-    parameters = list(inspect.signature(function_of(name)).parameters)
+    signature = inspect.signature(function_of(name))
+    parameters = [word for word, each in signature.parameters.items() if each.kind != each.VAR_KEYWORD]
     done = {}
     for _ in range(pick([1, 1, 1, 1, 2, 3])):
         argument = pick(parameters)
@@ -314,8 +397,10 @@ def _stop(*_):
     raise TooSlow
 
 
-def fault_of(call, *, seconds=20, names=()):
+def fault_of(call, *, seconds=20, names=(), refused=True):
     """Return what is wrong with a call: None for a clear error or a result without infinite numbers.
+
+    With `refused=False` a clear error is wrong, too.
 
     `seconds` are those of the processors, because others may use the machine; a call that waits, for a pipe
     for example, is stopped after ten times as long.
@@ -330,10 +415,10 @@ def fault_of(call, *, seconds=20, names=()):
             warnings.simplefilter("ignore", FractalContactWarning)
             warnings.filterwarnings("ignore", message=".*linear elasticity is an approximation")
             result = call()
-    except InvalidInput as error:
-        return _unnamed(error, names)
-    except FractalContactError:
-        return None
+    except FractalContactError as error:
+        if not refused:
+            return f"refused: {error}"
+        return _unnamed(error, names) if isinstance(error, InvalidInput) else None
     except TooSlow:
         return f"longer than {seconds} s"
     except Exception as error:

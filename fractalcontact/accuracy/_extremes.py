@@ -15,6 +15,7 @@ import xarray as xr
 
 from fractalcontact.accuracy._cases import Case, cases
 from fractalcontact.accuracy._examine import Result, examine
+from fractalcontact.base.errors import FractalContactError
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.signals import Stop
@@ -137,7 +138,7 @@ def _examine_apart(chosen: Sequence[Case]) -> Iterator[tuple[Case, list[Result] 
                 process = context.Process(target=_serve, args=(other_end,), daemon=True)
                 process.start()
                 other_end.close()
-                connection.recv()  # the start of the process does not count
+                _wait_for_start(connection)
             connection.send(case)
             outcome: list[Result] | str
             try:
@@ -154,6 +155,17 @@ def _examine_apart(chosen: Sequence[Case]) -> Iterator[tuple[Case, list[Result] 
     finally:
         if process is not None:
             process.kill()
+
+
+def _wait_for_start(connection: Connection) -> None:
+    """Wait until the child process has started, which does not count for the time of a case."""
+    try:
+        connection.recv()
+    except EOFError as error:
+        remedy = 'a script that calls this needs `if __name__ == "__main__":` around the call'
+        raise FractalContactError(
+            f"fractalcontact.accuracy: no process could be started: {remedy}"
+        ) from error
 
 
 def _serve(connection: Connection) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,39 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.tables import table
+from fractalcontact.base.validation import NONE, Problems
 
 Row = tuple[str, ...]
+Columns = Mapping[str, tuple[tuple[str, ...], str]]
+SUMMARY, WORST = "fractalcontact.accuracy.summary", "fractalcontact.accuracy.worst_results"
+WORDS, NUMBERS, TRUTH = "words", "numbers", "truth values"
+KINDS = {WORDS: "UT", NUMBERS: "iuf", TRUTH: "b"}
+_SETTING, _METHOD, _RESULT = ("method", "setting"), ("method",), ("result",)
+_CASE = ("method", "family", "hurst", "size")
+# dims and type of the variables that are read, of `measure`, `estimators` and `extremes`
+MEASURED: Columns = {
+    **dict.fromkeys(("parameter", "error", "run_time", "first_run_time", "memory"), (_SETTING, NUMBERS)),
+    **dict.fromkeys(("benchmark", "parameter_name", "error_meaning", "truth", "verdict"), (_METHOD, WORDS)),
+    "on_pareto_front": (_SETTING, TRUTH),
+    "method": (_METHOD, WORDS),
+}
+ESTIMATED: Columns = {
+    **dict.fromkeys(("bias", "error_ratio", "interval_coverage", "run_time"), (_CASE, NUMBERS)),
+    "least_error": (_CASE[1:], NUMBERS),
+    **dict.fromkeys(("member_count", "size"), (("size",), NUMBERS)),
+    "hurst": (("hurst",), NUMBERS),
+    "family": (("family",), WORDS),
+    "method": (_METHOD, WORDS),
+}
+RANKED: Columns = {
+    "case": (_RESULT, WORDS),
+    **dict.fromkeys(("error", "run_time"), (_RESULT, NUMBERS)),
+    "passed": (_RESULT, TRUTH),
+}
+EXAMINED: Columns = {
+    **RANKED,
+    **dict.fromkeys(("quantity", "expectation", "outcome"), (_RESULT, WORDS)),
+}
 
 
 def summary(results: Any) -> str:
@@ -37,15 +68,31 @@ def summary(results: Any) -> str:
     >>> print(fc.accuracy.summary(bench).splitlines()[2])
     fbm, 16 x 16 points, 4 surfaces
     """
-    if isinstance(results, xr.DataTree):
+    if isinstance(results, xr.DataTree) and results.children:
+        for part, node in results.children.items():
+            _check(SUMMARY, f"results/{part}", node.to_dataset(), MEASURED)
         return _measured_summary(results)
     if isinstance(results, xr.Dataset) and "error_ratio" in results:
+        _check(SUMMARY, "results", results, ESTIMATED)
         return _estimators_summary(results)
     if isinstance(results, xr.Dataset) and "expectation" in results:
+        _check(SUMMARY, "results", results, EXAMINED)
         return _extremes_summary(results)
     expected = "a result of measure, estimators or extremes"
-    where = "fractalcontact.accuracy.summary"
-    raise InvalidInput(where, [f"results: expected {expected}, got {type(results).__name__}"])
+    raise InvalidInput(SUMMARY, [f"results: expected {expected}, got {type(results).__name__}"])
+
+
+def _check(where: str, argument: str, results: xr.Dataset, columns: Columns) -> None:
+    """Check that a result has the variables that are read, with their dims and types."""
+    with Problems(where) as problems:
+        for name, (dims, what) in columns.items():
+            place = f"{argument}.{name}"
+            if problems.require(name in results.variables, place, f"{what} over {', '.join(dims)}", NONE):
+                own = results.variables[name]
+                problems.require(set(own.dims) == set(dims), place, f"dims {dims}", own.dims)
+                is_text = own.dtype.kind == "O" and all(isinstance(value, str) for value in own.values.flat)
+                kind = "U" if is_text else own.dtype.kind  # words of a file have the type object
+                problems.require(kind in KINDS[what], place, what, f"type {own.dtype}")
 
 
 def _measured_summary(measured: xr.DataTree) -> str:
@@ -156,6 +203,11 @@ def worst_results(results: xr.Dataset) -> xr.Dataset:
     Dataset
         The rows of `results`, one for each case, with the longest `run_time` of the case.
 
+    Raises
+    ------
+    InvalidInput
+        It is no such result.
+
     Examples
     --------
     >>> import fractalcontact as fc
@@ -171,6 +223,10 @@ def worst_results(results: xr.Dataset) -> xr.Dataset:
     >>> print(worst["error"].values, worst["run_time"].values)
     [1.e-09    nan] [0.2 0.1]
     """
+    with Problems(WORST) as problems:
+        is_dataset = isinstance(results, xr.Dataset)
+        problems.require(is_dataset, "results", "a Dataset from `extremes`", type(results).__name__)
+    _check(WORST, "results", results, RANKED)
     cases = results["case"].values
     badness = np.where(results["passed"], np.nan_to_num(results["error"].values, nan=-1.0), np.inf)
     rows, longest = [], []

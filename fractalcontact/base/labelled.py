@@ -14,7 +14,10 @@ import xarray as xr
 from fractalcontact.base.grid import METRES, Fault, axis_faults
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity
 
-PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method", "azimuth", *CORE_DIMS)
+PATH_DIMS = (
+    *("member", "direction", "shear", "step", "axis", "method", "azimuth", "wavelength", "structure_size"),
+    *CORE_DIMS,
+)
 
 
 def tree_faults(value: Any, argument: str) -> Iterator[Fault]:

@@ -49,6 +49,9 @@ REASONS = {
     "interpolation_error": "NaN where a face has no line without gaps that is long enough to measure it",
     "scaled_roughness_coefficient": "NaN where the joint roughness coefficient is negative or missing",
     "uplift_arm": "NaN where there is no uplift",
+    "rotation_error": "NaN where no rotation was fitted, or too few tiles hold observed heights",
+    "aperture": "NaN where the faces do not overlap, or a height is missing",
+    **dict.fromkeys(("shear", "normal_force", "nominal_pressure"), "NaN as in the data that were given"),
 }
 
 

@@ -367,6 +367,16 @@ def reading(where: str, path: str | PathLike[str]) -> Iterator[None]:
         raise UnreadableFile(where, [message]) from error
 
 
+@contextmanager
+def writing(where: str, argument: str, path: str | PathLike[str]) -> Iterator[None]:
+    """Raise `InvalidInput` for an error of the file system in the block: a file in the way, a full disk."""
+    try:
+        yield
+    except OSError as error:
+        message = f"{argument}: expected a place to write, got {Path(path).name!r}: {error.strerror or error}"
+        raise InvalidInput(where, [message]) from error
+
+
 def word_list(value: Any) -> list[Any]:
     """Return one word, or a sequence of words, as a list."""
     return [value] if isinstance(value, str) else list(value)

@@ -13,6 +13,7 @@ import xarray as xr
 
 from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.memory import Plane
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import announce_loading, public_result
@@ -74,8 +75,7 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: 
     if methods is not None and problems.choices("methods", methods, ("default", *METHODS)):
         names = [DEFAULT if name == "default" else name for name in word_tuple(methods)]
         problems.require(bool(names), "methods", "at least one name", methods)
-    if psf is not None:
-        problems.number("psf", psf, at_least=0.0)
+    is_number = psf is not None and problems.number("psf", psf, at_least=0.0)
     is_valid = check_surface(
         problems,
         surface,
@@ -84,6 +84,9 @@ def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, psf: 
         points=True,
         reserved=_NAMES,
     )
+    if is_valid and is_number:
+        extent = max(read_grid(surface, core_dims(surface)).extent)
+        problems.number("psf", psf, at_most=extent)
     check_scales(problems, scales, surface if is_valid else None)
 
 

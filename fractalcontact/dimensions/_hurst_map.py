@@ -75,7 +75,7 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
     grid = read_grid(surface)
     edges = [max(SMALLEST, round(window / spacing)) for spacing in grid.spacing]
     edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
-    length = 0.5 * window if step is None else float(step)
+    length = 0.5 * window if step is None else min(float(step), max(grid.extent))
     steps = [max(1, round(length / spacing)) for spacing in grid.spacing]
     rows, columns = (
         np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)

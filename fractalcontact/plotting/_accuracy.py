@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, require_variables, table, words
+from fractalcontact.plotting._inputs import as_dataset, require_dims, require_variables, table, words
 from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
@@ -170,6 +171,11 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     """
     data = as_dataset(bench, "estimator_errors", "bench")
     require_variables(data, "estimator_errors", ("error_ratio", "interval_coverage"), "bench")
+    dims = {dim: dim for dim in ("method", "family", "hurst", "size")}
+    require_dims(data, "estimator_errors", dims, "bench")
+    with Problems("fc.plotting.estimator_errors") as problems:
+        for dim in dims:
+            problems.require(data.sizes[dim] > 0, f"bench.{dim}", "at least one entry", NONE)
     cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
     size = (2.3 * len(cases) + 1.6, 5.2)
     shown = _style.panels(axes, (2, len(cases)), size, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
@@ -203,6 +209,7 @@ def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: dic
         if not finite.any():
             continue
         ax.plot(hurst[finite], values[row][finite], **style, label=name)
-        if f"{quantity}_low" in case:
-            low, high = (table(case, f"{quantity}_{end}", dims)[row][finite] for end in ("low", "high"))
+        ends = [f"{quantity}_{end}" for end in ("low", "high")]
+        if set(ends) <= set(case.variables):
+            low, high = (table(case, end, dims)[row][finite] for end in ends)
             ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8, label=f"{name}, interval")

@@ -122,7 +122,7 @@ def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width:
         if _style.are_given(axes):
             return None
         zoom = min(shape) * cell * ZOOM if 72 * width < POINTS * shape[1] else 0.0
-    size = round(zoom / cell)
+    size = round(min(zoom, extent[1] - extent[0]) / cell)
     if size < 1 or size >= min(shape):
         return None
     touching = np.asarray(state.transpose(..., "y", "x").values).reshape(-1, *shape)[-1] > 0

@@ -15,7 +15,7 @@ from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, writing
 from fractalcontact.plotting._area_dimension import area_dimension
 from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
 from fractalcontact.plotting._closure import closure_laws, contact_area
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
 Drawing = Callable[[], Any]  # returns Axes, or an array of them
 
+WHERE = "fc.plotting.draw"
 PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
 FORMATS = ("png", "svg", "pdf", "csv")
 LARGE = 1 << 26  # bytes of a study whose figures are drawn one after the other: two at once take more memory
@@ -100,6 +101,11 @@ def draw(
     list of Path
         The files in the order in which they were drawn, the figures of the 1998 paper first.
 
+    Raises
+    ------
+    InvalidInput
+        An argument is not as described, or `folder` cannot be written.
+
     Examples
     --------
     >>> import tempfile
@@ -111,7 +117,7 @@ def draw(
     ...     print([path.name for path in fc.plotting.draw(tree, folder)])
     ['dimensions.png']
     """
-    with Problems("fc.plotting.draw") as problems:
+    with Problems(WHERE) as problems:
         problems.tree("tree", tree)
         problems.path("folder", folder, what="the path of a folder")
         problems.boolean("progress", progress)
@@ -123,7 +129,14 @@ def draw(
             for word in formats:
                 problems.choice("formats", word, FORMATS)
     tree = shown_in(tree, units, "draw")
-    folder = Path(folder)
+    with writing(WHERE, "folder", folder):
+        return _draw_all(tree, Path(folder), progress, paper, formats)
+
+
+def _draw_all(
+    tree: xr.DataTree, folder: Path, progress: bool, paper: bool, formats: Sequence[str]
+) -> list[Path]:
+    """Draw every figure into a folder and return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     drawings = _all_drawings(tree, paper)
     files = [[folder / f"{name}.{suffix}" for suffix in formats] for name, _ in drawings]

@@ -65,11 +65,11 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
     ax.errorbar(x, hurst, bars, ls="", elinewidth=1.0, label="octave, 95 %", **points)
     entries = [_style.legend_line("octave, 95 %", **points)]
-    if np.isfinite(float(data["window_hurst"])):
-        ends = [float(along(float(data[name]))) for name in ("scale_min", "scale_max")]
-        bottom, top = (float(data[f"window_ci_{end}"]) for end in ("low", "high"))
+    window_hurst, bottom, top, *ends = (float(table(data, name, ())) for name in window)
+    if np.isfinite(window_hurst):
+        ends = [float(along(end)) for end in ends]
         ax.fill_between(ends, bottom, top, color=_style.BLUE, alpha=0.35, lw=0, label="one exponent, 95 %")
-        ax.plot(ends, 2 * [float(data["window_hurst"])], color=_style.BLUE, lw=1.2, label="one exponent")
+        ax.plot(ends, 2 * [window_hurst], color=_style.BLUE, lw=1.2, label="one exponent")
         entries.append(Patch(facecolor=_style.BLUE, alpha=0.35, lw=0, label="one exponent"))
     for limit in (0.0, 1.0):
         ax.axhline(limit, color=_style.grey(), lw=0.7, ls=":")

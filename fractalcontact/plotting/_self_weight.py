@@ -70,7 +70,8 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
             name = curve_name(direction or "shear strength", shears, j)
             line = style | {"ls": SHEAR_LINES[j % len(SHEAR_LINES)], "label": name}
             ax.plot(sizes, across(strength[i, j]), **line)
-    basic = data["nominal_pressure"].values * np.tan(np.radians(float(data["basic_friction_angle"])))
+    angle = np.radians(table(data, "basic_friction_angle", ()))
+    basic = table(data, "nominal_pressure", ("structure_size",)) * np.tan(angle)
     ax.plot(sizes, across(basic), label="basic angle alone", **CONSTANT)
     _style.log_scale(ax, x=sizes, y=basic)
     _style.plain_ticks(ax)

@@ -135,11 +135,15 @@ def _block_extent(block: xr.DataArray) -> tuple[float, float, float, float]:
 
 
 def plane_of(data: Any, where: str, name: str, argument: str = "result") -> xr.DataArray:
-    """Return the one plane (y, x) in `data`: the variable `name`, or the first one."""
+    """Return the one plane (y, x) in `data`: the variable `name`, or the only one that there is."""
     dataset = as_dataset(data, where, argument)
-    variable = name if name in dataset.data_vars else next(iter(dataset.data_vars), "")
+    names = list(dataset.data_vars)
+    planes = [each for each in names if {"y", "x"} <= set(dataset[each].dims)] or names[:1]
+    variable = name if name in names else planes[0] if planes else ""
     with Problems(f"fc.plotting.{where}") as problems:
         if problems.require(bool(variable), argument, "a variable with dims (y, x)", NONE):
+            is_one = variable == name or len(planes) == 1
+            problems.require(is_one, argument, "one variable with dims (y, x)", planes)
             plane = dataset[variable]
             place = f"{argument}.{variable}"
             problems.require({"y", "x"} <= set(plane.dims), place, "dims (y, x)", plane.dims)

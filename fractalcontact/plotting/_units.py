@@ -120,6 +120,8 @@ def _variable(data: Any, name: str) -> Any:
 
 
 def _marked(data: Any, units: Units) -> Any:
+    if not hasattr(data, "coords"):  # the figure refuses it
+        return data
     marked = data.copy(deep=False)
     for name in set(units) & set(_names(data)):
         _variable(marked, name).attrs[WANTED] = units[name]

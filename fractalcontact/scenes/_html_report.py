@@ -27,13 +27,14 @@ from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.tables import Note, Part, Table
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes._caveats import member_count, of_member
 from fractalcontact.scenes._report import Summary, compares_with_paper, summary_parts
 from fractalcontact.scenes._tables import tables
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+WHERE = "fractalcontact.scenes.report"
 REPORT = "report.html"
 SURFACE_CELLS = 128  # along the longer side of the surface that can be turned
 MAP_CELLS = 400  # along the longer side of a map
@@ -88,7 +89,7 @@ def report(
     Raises
     ------
     InvalidInput
-        `result` is no study, or `path` is missing and `result` no file.
+        `result` is no study, `path` is missing and `result` no file, or `path` cannot be written.
     UnreadableFile
         There is no such file, or it is not complete.
 
@@ -108,16 +109,21 @@ def report(
     ('report.html', True)
     """
     is_tree = isinstance(result, xr.DataTree)
-    with Problems("fractalcontact.scenes.report") as problems:
-        expected = "a DataTree or a file"
-        problems.require(is_tree or isinstance(result, (str, os.PathLike)), "result", expected, result)
-        problems.require(path is not None or not is_tree, "path", "the file to write", path)
+    with Problems(WHERE) as problems:
+        if not is_tree:
+            problems.path("result", result, what="a DataTree or the path of a file")
+        if path is not None or is_tree:
+            problems.path("path", path, what="the path of the file to write")
+        if figures is not None and problems.require(
+            isinstance(figures, (list, tuple)), "figures", "a sequence of PNG files", figures
+        ):
+            for figure in figures:
+                problems.file("figures", figure)
     tree = result if isinstance(result, xr.DataTree) else _study(result)
     target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
-    if figures is not None:
-        return write_report(tree, target, figures, summary_parts(tree))
-    with tempfile.TemporaryDirectory() as folder:
-        return write_report(tree, target, _drawn(tree, folder), summary_parts(tree))
+    with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
+        pictures = _drawn(tree, folder) if figures is None else figures
+        return write_report(tree, target, pictures, summary_parts(tree))
 
 
 def write_report(
@@ -135,7 +141,7 @@ def write_report(
 
 def _study(path: str | os.PathLike[str]) -> xr.DataTree:
     tree = open_result(path)
-    with Problems("fractalcontact.scenes.report") as problems:
+    with Problems(WHERE) as problems:
         found = type(tree).__name__
         problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", f"a {found}")
     return tree  # type: ignore[no-any-return]
@@ -411,7 +417,7 @@ def _picture_file(path: Path) -> tuple[str, bytes]:
     from PIL import Image
 
     content = io.BytesIO()
-    with Image.open(path) as picture:
+    with reading(WHERE, path), Image.open(path) as picture:
         picture.convert("RGB").save(content, "WEBP", quality=QUALITY, method=EFFORT)
     return path.stem, content.getvalue()
 

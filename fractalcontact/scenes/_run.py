@@ -264,7 +264,10 @@ def _beside_the_result() -> Iterator[None]:
     """Report an error of the file system in the block, in words that say what is complete."""
     try:
         yield
-    except OSError as error:
+    except (OSError, InvalidInput) as raised:
+        error = raised.__cause__ if isinstance(raised, InvalidInput) else raised
+        if not isinstance(error, OSError):
+            raise
         expected = f"figures and a report beside {RESULT}, which is complete; the same run makes them"
         reason = error.strerror or str(error)
         raise InvalidInput(

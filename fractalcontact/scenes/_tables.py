@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, writing
 
 MAP_DIMS = frozenset({"x", "y"})
 SINGLE = "values"
@@ -36,7 +36,7 @@ def tables(result: xr.DataTree | xr.Dataset, folder: str | os.PathLike[str] | No
     Raises
     ------
     InvalidInput
-        `result` is neither a DataTree nor a Dataset.
+        `result` is neither a DataTree nor a Dataset, or `folder` cannot be written.
 
     Examples
     --------
@@ -60,10 +60,10 @@ def tables(result: xr.DataTree | xr.Dataset, folder: str | os.PathLike[str] | No
             name = f"{path}_by_{'_'.join(dims)}" if dims else f"{path}_{SINGLE}"
             frames[name] = _frame(dataset, dims)
     if folder is not None:
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, frame in frames.items():
-            frame.to_csv(folder / f"{name}.csv", index=False)
+        with writing("fractalcontact.scenes.tables", "folder", folder):
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            for name, frame in frames.items():
+                frame.to_csv(Path(folder) / f"{name}.csv", index=False)
     return frames
 
 

@@ -82,25 +82,26 @@ def template(
     """
     options = {key: value for key, value in reading.items() if value is not None}
     with Problems(WHERE) as problems:
-        problems.choice("question", question, QUESTIONS)
+        is_known = problems.choice("question", question, QUESTIONS)
+        is_pressed, is_joint = not is_known or question != "roughness", is_known and question == "joint"
+        problems.path("folder", folder, what="the path of a folder")
         if problems.path("scan", scan):
             problems.require(Path(scan).is_file(), "scan", "an existing file", Path(scan).name)
-        if question != "roughness":
+        if is_pressed:
             problems.number("young", young, above=0)
             problems.boolean("despike", despike)
             problems.boolean("register", register)
             problems.number("poisson", poisson, above=-1, at_most=0.5)
-        if question == "joint" and problems.path("upper", upper):
+        if is_joint and problems.path("upper", upper):
             problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
     facts = _facts(scan, options)
-    is_pressed = question != "roughness"
     prepared = {}
     if is_pressed and despike:
         prepared = {"despike": True, "fill": True}
     elif is_pressed and facts["missing"]:
         prepared = {"fill": True}
     tables = [("surface", _file_table(scan, folder, options | prepared))]
-    if question == "joint":
+    if is_joint:
         if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
@@ -108,11 +109,11 @@ def template(
         tables.append(("upper", _file_table(str(upper), folder, options | prepared)))
     if is_pressed:
         tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
-    if question == "joint":
+    if is_joint:
         tables += _joint(facts, register)
     else:
         tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
-    files = Path(scan).name + (f" and {Path(str(upper)).name}" if question == "joint" else "")
+    files = Path(scan).name + (f" and {Path(str(upper)).name}" if is_joint else "")
     text = [f"title = {json.dumps(f'{question.capitalize()} of {files}')}", ""]
     for name, table in tables:
         text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]

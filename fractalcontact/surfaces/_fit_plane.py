@@ -10,6 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.validation import NONE, Problems
 
@@ -40,10 +41,9 @@ def point_array(points: Any) -> Array | None:
     """Return coordinates as float64, masked ones as NaN; None if they are not real numbers."""
     if isinstance(points, xr.Dataset):
         points = points.get("position", np.empty(0))
-    try:
-        values = np.ma.asanyarray(points)
-    except (TypeError, ValueError):
+    if as_array(points) is None:
         return None
+    values = np.ma.asanyarray(points)
     if values.dtype.kind not in "fiu":
         return None
     return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))

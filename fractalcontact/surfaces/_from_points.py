@@ -13,6 +13,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.lengths import UNITS
+from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._fit_plane import (
@@ -58,10 +59,11 @@ def _check(
     check_frame(problems, plane, None if values is None else shape[1])
     triangles = _triangles(points, triangles)
     if triangles is not None:
-        faces = np.asarray(triangles)
-        valid = faces.dtype.kind in "iu" and faces.ndim == 2 and faces.shape[1] == 3 and len(faces) > 0
+        faces = as_array(triangles)
+        is_table = faces is not None and faces.dtype.kind in "iu" and faces.ndim == 2
+        valid = faces is not None and is_table and faces.shape[1] == 3 and len(faces) > 0
         problems.require(valid, "triangles", "numbers of points, shape (m, 3)", triangles)
-        if valid and values is not None:
+        if faces is not None and valid and values is not None:
             problems.require(shape[1] == 3, "points", "x, y, z for a mesh", f"shape {shape}")
             inside = int(faces.min()) >= 0 and int(faces.max()) < shape[0]
             expected = f"numbers of points from 0 to {shape[0] - 1}"

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 
@@ -44,6 +46,14 @@ def test_hanging_and_crashing_cases_are_reported_and_the_next_is_examined():
     failed = set(results["case"].values[~results["passed"].values])
     assert failed == {"hangs", "crashes", "crashes again"}
     assert set(results["case"].values) - failed == {"a mask of one cell"}
+
+
+def test_script_without_a_guard_is_told(tmp_path):
+    (tmp_path / "script.py").write_text("import fractalcontact as fc\nfc.accuracy.extremes('one cell')\n")
+    words = [sys.executable, str(tmp_path / "script.py")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1].startswith("fractalcontact.base.errors.FractalContactError")
+    assert 'if __name__ == "__main__"' in done.stderr.splitlines()[-1]
 
 
 def test_child_process_gives_the_results_of_examine(two):

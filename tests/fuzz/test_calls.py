@@ -4,6 +4,7 @@ Half a minute with the other tests; `pytest -m fuzz -n2` takes about an hour. A 
 run (`--hypothesis-seed`) and the smallest call; keep it in KEPT.
 """
 
+import importlib
 import inspect
 import random
 
@@ -13,10 +14,13 @@ import pytest
 import xarray as xr
 from fuzz_calls import (
     CALLS,
+    LEFT_OUT,
     REFUSED,
     closed,
     damaged_call,
+    estimators,
     fault_of,
+    file,
     function_of,
     periodic,
     pressed,
@@ -37,8 +41,8 @@ SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "datab
 
 # errors of these name what the argument stands for, or the first argument, which is refused as it stands
 UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure")
-# these return what a file holds
-AS_GIVEN = ("open", "scenes.reproduce")
+# these return what a file or an argument holds
+AS_GIVEN = ("open", "scenes.reproduce", "accuracy.worst_results")
 
 
 def check(pick):
@@ -137,6 +141,26 @@ KEPT = {
                              "closure.step"),
     "bytes as a model": ("joints.hydraulic_aperture", "model", lambda: np.void(b"abc"), "model"),
     "a wall without strength": ("joints.bandis_aperture", "wall_strength", lambda: 5e-324, "wall_strength"),
+    "a number as the file of a report": ("scenes.report", "path", lambda: 3, "path"),
+    "a list as a study": ("scenes.report", "result", list, "result"),
+    "a file that is missing among figures": ("scenes.report", "figures", lambda: ["nowhere.png"], "figures"),
+    "a file as the folder of a report": ("scenes.report", "path", lambda: file("surface") / "a.html", "path"),
+    "a file as the folder of tables": ("scenes.tables", "folder", lambda: file("surface"), "folder"),
+    "a file as the folder of figures": ("plotting.draw", "folder", lambda: file("surface"), "folder"),
+    "a number as the folder of a scene": ("scenes.template", "folder", lambda: 3, "folder"),
+    "two fields in a map": ("plotting.field", "data", lambda: pressed()[["gap", "pressure"]], "data"),
+    "two fields as heights": ("plotting.surface", "surface", lambda: pressed()[["gap", "pressure"]],
+                              "surface"),
+    "a blur of a million kilometres": ("dimensions.estimate", "psf", lambda: 1e9, "psf"),
+    "a list as results": ("accuracy.worst_results", "results", list, "results"),
+    "results without the truth": ("accuracy.summary", "results", lambda: estimators().drop_vars("bias"),
+                                  "results.bias"),
+    "triangles nested too deeply": ("surfaces.from_points", "triangles", VALUES["deep"], "triangles"),
+    "no array as points": ("surfaces.fit_plane", "points", VALUES["class without array"], "points"),
+    "no wavelengths in a figure": ("plotting.scaling", "result", lambda: fc.dimensions.scaling(
+        rough(48)).isel(wavelength=slice(0)), "result.wavelength"),
+    "no sizes in a figure": ("plotting.estimator_errors", "bench", lambda: estimators().isel(size=slice(0)),
+                             "bench.size"),
     "azimuth in time": ("joints.cyclic_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
 }  # fmt: skip
 
@@ -147,6 +171,21 @@ def test_kept_case_gives_a_clear_error(case):
     with pytest.raises(InvalidInput) as caught:
         function_of(name)(**{**CALLS[name](), argument: make()})
     assert any(line.startswith(f"{named}:") for line in caught.value.problems), caught.value
+
+
+def test_every_public_function_is_called():
+    names = {"save", "open"}
+    for subpackage in set(fc.__all__) - names:
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
+        names |= {f"{subpackage}.{name}" for name in module.__all__}
+    assert set(CALLS) | LEFT_OUT == names
+    assert not set(CALLS) & LEFT_OUT
+
+
+@pytest.mark.parametrize("name", sorted(set(CALLS) - set(REFUSED)))
+def test_call_succeeds_as_it_stands(name):
+    assert fault_of(lambda: function_of(name)(**CALLS[name]()), refused=False) is None
+    plt.close("all")
 
 
 def test_transposed_field_is_drawn_like_the_field():

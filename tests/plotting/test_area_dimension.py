@@ -71,6 +71,15 @@ def test_strength_of_every_direction_and_shear():
     render(figure)
 
 
+@pytest.mark.parametrize("dim", ["shear", "direction", "structure_size"])
+def test_strength_at_one_place_is_that_of_the_whole(dim):
+    one = drawn(figure_of(plotting.self_weight(strengths().isel({dim: 0}))).axes[0])
+    whole = drawn(figure_of(plotting.self_weight(strengths().isel({dim: [0]}))).axes[0])
+    assert len(one) == len(whole) > 1
+    for mine, other in zip(one, whole, strict=True):
+        np.testing.assert_array_equal(np.asarray(mine), np.asarray(other))
+
+
 @pytest.mark.parametrize(
     ("draw", "data"), [(plotting.area_dimension, strengths), (plotting.self_weight, areas)]
 )

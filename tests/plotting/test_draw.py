@@ -10,6 +10,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
 
 PAPER = [
     "figure_1_surface",
@@ -101,7 +102,7 @@ def test_failed_write_keeps_old_file(study, tmp_path, monkeypatch):
         raise OSError("disk full")
 
     monkeypatch.setattr(FigureCanvasAgg, "print_png", fails)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InvalidInput, match="disk full"):
         plotting.draw(part(study, "domains/lacunarity"), tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["lacunarity.png"]
     assert (tmp_path / "lacunarity.png").read_bytes() == b"old"
