@@ -111,9 +111,9 @@ def report(
     is_tree = isinstance(result, xr.DataTree)
     with Problems(WHERE) as problems:
         if not is_tree:
-            problems.path("result", result, what="a DataTree or the path of a file")
+            problems.path("result", result, what="a DataTree or a file")
         if path is not None or is_tree:
-            problems.path("path", path, what="the path of the file to write")
+            problems.path("path", path, what="the file to write")
         if figures is not None and problems.require(
             isinstance(figures, (list, tuple)), "figures", "a sequence of PNG files", figures
         ):
