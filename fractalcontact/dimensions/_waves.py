@@ -29,6 +29,10 @@ FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 MOST = 32  # waves; more are a pattern
 _LONGEST = {1: 12.0, 2: 4.0}  # wavenumber steps: longer waves are not told from the form, by number of axes
+_FEW_WAVES, _STRONG = (
+    7.0,
+    3.0,
+)  # waves in a profile from which on those are found that exceed the limit so far
 _NEIGHBOURS, _LINE = (
     13,
     5,
@@ -86,10 +90,10 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
 
     Notes
     -----
-    Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent. At
-    128 x 128 points waves of one rms increment are always found, of 0.3 in a third to two thirds of the
-    surfaces, of 0.1 never. The default method of `estimate` removes what is found. Detection, false alarms
-    and accuracy: page `theory_dimensions`.
+    Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
+    seventh of a profile). At 128 x 128 points waves of one rms increment are always found, of 0.3 in a third
+    to two thirds of the surfaces, of 0.1 never. The default method of `estimate` removes what is found.
+    Detection, false alarms and accuracy: page `theory_dimensions`.
 
     References
     ----------
@@ -245,11 +249,18 @@ def _peaks(
     number, total = around((power > 0.0).astype(float)), around(clipped)
     is_surrounded = (number > 0.1 * np.prod(sizes[0])) & (total > np.finfo(float).tiny)
     ratio = np.where(is_surrounded, white * number / np.where(is_surrounded, total, 1.0), 0.0)
-    allowed = (radius >= _LONGEST[axes]) & ~mirrored
+    # a long wave of a profile has its mirror image among the modes around it: the shorter ones are taken,
+    # whose power law is not known so well, and only a strong wave is told from it
+    longer = (radius >= _FEW_WAVES) & (radius < _LONGEST[axes])
+    for row, column in np.argwhere(longer & ~mirrored):
+        shorter = white[row, column + _RADIAL[0] : column + _ALONG // 2]
+        ratio[row, column] = white[row, column] / max(float(shorter.mean()), np.finfo(float).tiny)
+    allowed = (longer | (radius >= _LONGEST[axes])) & ~mirrored
     freedom = _FREEDOM[axes]
     among = max(1, int(np.count_nonzero(multiples)))
     count = 0.5 * np.where(multiples, among, power.size)
     least = freedom * ((count / FALSE_ALARM) ** (1.0 / freedom) - 1.0)
+    least = np.where(longer, _STRONG * least, least)
     places = np.argwhere(allowed & (ratio > least) & (power == maximum_filter(power, sizes[1], mode="wrap")))
     share = power * (2.0 - np.cos(2.0 * np.pi * y)[:, None] - np.cos(2.0 * np.pi * x))
     places = places[share[tuple(places.T)] > _LEAST_SHARE * share.sum()]

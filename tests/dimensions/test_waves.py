@@ -168,6 +168,17 @@ def test_marks_on_profiles_and_periodic_surfaces():
     assert float(marked.hurst[0]) == pytest.approx(float(fc.dimensions.estimate(surface).hurst[0]), abs=0.01)
 
 
+def test_long_wave_of_a_profile_is_found():
+    """8.4 waves in the profile; the exponent with it would be 0.1 too high."""
+    for seed in range(3):
+        profile = brownian((512,), 0.5, 60 + seed)
+        marked = profile + marks(profile, 0.0, 61.0, 40.0)
+        found = fc.dimensions.waves(marked)
+        assert found.wavelength.values == pytest.approx([61 * SPACING], rel=0.01)
+        alone, removed = (float(fc.dimensions.estimate(each).hurst[0]) for each in (profile, marked))
+        assert removed == pytest.approx(alone, abs=0.04)
+
+
 def test_sum_of_waves_is_left_alone():
     surface = fc.surfaces.weierstrass((1024,), SPACING, hurst=0.5, rms_height=STEP)
     assert "removed" not in fc.dimensions.estimate(surface).hurst.attrs["comment"]

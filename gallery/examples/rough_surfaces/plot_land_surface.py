@@ -8,8 +8,9 @@ Society of America A 7) report a mean dimension of 2.586 from spectra in two dim
 spectra of profiles, thus exponents H of 0.414 and 0.513. Lovejoy and others (1995, *The l(1/2) law and
 multifractal topography*, Nonlinear Processes in Geophysics 2, doi:10.5194/npg-2-16-1995) derive H = 1/2.
 
-This example measures another piece of land, valleys and ridges at the Jacksboro fault in Tennessee. The map,
-of the United States Geological Survey, is installed with matplotlib: nothing is fetched.
+This example measures another piece of land, valleys and ridges at the Jacksboro fault in Tennessee, of
+which no published dimension was found. The map, of the United States Geological Survey, is installed with
+matplotlib: nothing is fetched.
 """
 
 import json

@@ -10,7 +10,8 @@ scales*, Journal of Geophysical Research, doi:10.1029/2011JB009041). The dimensi
 
 This example measures a natural fracture in gneiss (Cunha and others, 2024), a file of the folder that the
 environment variable ``FRACTALCONTACT_DATA`` names; the page :doc:`/measured_surfaces` has its address,
-licence and checksum. Without the file a synthetic surface of H = 0.81 stands in for it.
+licence and checksum. No published dimension of this fracture itself was found: the comparison is with other
+rocks. Without the file a synthetic surface of H = 0.81 stands in for it.
 """
 
 import json
