@@ -117,3 +117,38 @@ def _index(coords: Variables) -> dict[Hashable, Index]:
             indexes[name] = index = PandasIndex(pd.Index(part.values, name=name), name, part.dtype)
             coords.update(index.create_variables({name: part}))
     return indexes
+
+
+def joined_along(dim: str, datasets: Sequence[xr.Dataset]) -> xr.Dataset | None:
+    """Return Datasets joined along a dim; attributes, and the variables that lack the dim, are of the first.
+
+    None where their variables are not alike, or those along the dim are no numbers in memory: `xarray.concat`
+    joins these, and takes ten times as long.
+    """
+    first, every = datasets[0], [dict(dataset.variables) for dataset in datasets]
+    if (
+        DIRECT is None
+        or dim not in every[0]
+        or any(variables.keys() != every[0].keys() for variables in every)
+    ):
+        return None
+    joined: Variables = {}
+    for name, variable in sorted(every[0].items(), key=lambda entry: entry[0] in first.coords):  # these last
+        parts = [variables[name] for variables in every]
+        if any(part.dims != variable.dims or part.dtype != variable.dtype for part in parts):
+            return None
+        if dim not in variable.dims:
+            joined[name] = variable.copy(deep=False)
+            continue
+        arrays = [part.values if isinstance(part, xr.IndexVariable) else part.data for part in parts]
+        if variable.dtype.kind not in "biuf" or any(type(array) is not np.ndarray for array in arrays):
+            return None
+        values = np.concatenate(arrays, axis=variable.dims.index(dim))
+        joined[name] = xr.Variable(variable.dims, values, variable.attrs, fastpath=True)
+    along: Variables = {dim: joined[dim]}
+    indexes = dict(first.xindexes) | _index(along)
+    names, attrs = set(first.coords), dict(first.attrs)
+    whole: xr.Dataset = DIRECT(
+        joined | along, names, attrs=attrs, indexes=indexes, encoding=dict(first.encoding)
+    )
+    return whole

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance
+from fractalcontact.base.construction import joined_along
 from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
@@ -130,15 +131,17 @@ def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
     """Join results along a dim; their run times are added, and their provenance is that of the whole."""
     if len(results) == 1:
         return results[0]
-    joined = xr.concat(
-        results,
-        dim=dim,
-        data_vars="minimal",
-        coords="minimal",
-        compat="override",
-        join="override",
-        combine_attrs="override",
-    )
+    joined = joined_along(dim, results)
+    if joined is None:
+        joined = xr.concat(
+            results,
+            dim=dim,
+            data_vars="minimal",
+            coords="minimal",
+            compat="override",
+            join="override",
+            combine_attrs="override",
+        )
     if "run_time" in joined and dim not in joined["run_time"].dims:
         total = sum(result["run_time"].values for result in results)
         joined["run_time"] = results[0]["run_time"].copy(data=total)

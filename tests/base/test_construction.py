@@ -9,7 +9,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base import construction
-from fractalcontact.base.construction import make_array, make_dataset
+from fractalcontact.base.construction import joined_along, make_array, make_dataset
 
 X = xr.IndexVariable("x", [0.5, 1.5, 2.5], {"units": "m", "period": 3.0})
 CASES = {
@@ -117,3 +117,45 @@ def test_dask_stays_out_of_a_script_without_dask_arrays():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def member(number, **changes):
+    variables = {
+        "force": (("member", "step"), [[1.0, 2.0 + number]], {"units": "N"}),
+        "count": ("member", [number]),
+        "area": 3.0,
+    } | changes
+    coords = {"member": [number], "step": [0, 1], "closure": (("member", "step"), [[0.5, 0.1 * number]])}
+    return xr.Dataset(variables, coords, {"title": f"member {number}"})
+
+
+def joined_by_xarray(results, dim):
+    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "override"}
+    return xr.concat(results, dim=dim, combine_attrs="override", **how)
+
+
+@pytest.mark.parametrize("dim", ["member", "step"])
+def test_results_are_joined_as_by_xarray(dim):
+    results = [member(number) for number in range(3)]
+    if dim == "step":
+        results = [result.assign_coords(step=[2 * k, 2 * k + 1]) for k, result in enumerate(results)]
+    joined = joined_along(dim, results)
+    assert_same(joined, joined_by_xarray(results, dim))
+    assert float(joined["force"].isel(member=-1).sel(step=joined["step"][-1])) == 4.0
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        member(1, count=("member", [1.0])),
+        member(1, force=(("step", "member"), [[1.0], [2.0]])),
+        member(1, area=("member", [3.0])),
+        member(1, more=1.0),
+        member(1).drop_vars("area"),
+        member(1).drop_vars("member"),
+        member(1, count=("member", np.array(["one"]))),
+    ],
+)
+def test_results_that_are_not_alike_are_left_to_xarray(other):
+    assert joined_along("member", [member(0), other]) is None
+    assert joined_along("member", [other, member(0)]) is None
