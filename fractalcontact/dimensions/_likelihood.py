@@ -24,6 +24,7 @@ from fractalcontact.dimensions._blur import (
 from fractalcontact.dimensions._blur_fit import Comparison, compare
 from fractalcontact.dimensions._exponent_by_scale import (
     frame_blocks,
+    interval_of_run,
     longest_run,
     octaves,
     run_estimate,
@@ -361,12 +362,13 @@ def _longest_run(free: _FreeEdges, window: Window, *, is_even: bool = True) -> t
     None if there is no run. Where few waves dominate the run, None as well, unless they dominate all modes
     (`is_even` is false); its interval then holds the exponents of sectors of azimuth.
     """
-    run = longest_run(octaves(frame_blocks(window.power, window.frame)))
+    record = octaves(frame_blocks(window.power, window.frame))
+    run = longest_run(record)
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None
     dx = free.surface.spacing[1]
     part = _modes(replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst))
-    estimate = run_estimate(run, free.surface)
+    estimate = run_estimate(run, free.surface).holding(*interval_of_run(run, record))
     if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
         if is_even:
             return None

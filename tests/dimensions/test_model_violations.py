@@ -130,9 +130,9 @@ def test_blur_that_does_not_fit_gives_way_to_the_window(short, long, corner, n):
     result = fc.dimensions.estimate(surface).isel(method=0)
     assert "the longest run of octaves" in result.hurst.attrs["comment"]
     assert float(result.scale_min) >= 0.5 * corner * SPACING
-    # a corner inside an octave, and few long waves
+    # a corner inside an octave, and few long waves: the interval holds those of the run without an octave
     assert float(result.ci_low) - 0.06 < long < float(result.ci_high) + 0.06
-    assert float(result.ci_high - result.ci_low) < 0.35
+    assert float(result.ci_high - result.ci_low) < 0.65
 
 
 def test_land_surface_is_answered_with_its_window():
@@ -142,8 +142,8 @@ def test_land_surface_is_answered_with_its_window():
     window = fc.dimensions.scaling(land)
     assert float(result.hurst) == pytest.approx(float(window.window_hurst))
     assert float(result.scale_min) == pytest.approx(float(window.scale_min))
-    assert 0.0 <= float(result.ci_low) < float(window.window_ci_low) + 1e-9
-    assert float(window.window_ci_high) - 1e-9 < float(result.ci_high) < 0.5
+    assert 0.0 <= float(result.ci_low) <= max(float(window.window_ci_low), 0.0) + 1e-9
+    assert float(window.window_ci_high) - 1e-9 <= float(result.ci_high) < 0.6
 
 
 @pytest.mark.parametrize("rng", [0, 1])
