@@ -47,6 +47,7 @@ ACCEPTABLE = (
     0.05  # scatter about a law, over the range of the closures: beyond, the law does not describe them
 )
 ROUNDING = 1e-12  # of that range: a smaller residual is rounding
+ROUNDED_DIGITS = 1e-14  # of the bulk part: the interface closes by no more than rounding
 CURVE_POINTS = 400  # of half pressures inside an interval
 STEEPEST = 40.0  # greatest exponent of a local power law, per length of its three points in log pressure
 GREATEST_CORRECTION = 0.2  # of the logarithm of a stiffness: beyond, the closure is too uneven for a law
@@ -135,10 +136,14 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     pressure = closure["nominal_pressure"].broadcast_like(interface).transpose(*interface.dims)
     steps, outer = interface.shape[-1], interface.dims[:-1]
     seat = None if seating_pressure is None else float(seating_pressure)
+    bulk = closure["bulk_closure"].values if "bulk_closure" in closure else np.zeros(1)
+    rounding = ROUNDED_DIGITS * float(
+        np.fmax.reduce(np.abs(bulk), axis=None)
+    )  # the interface is a difference
     fits, flags, stiffnesses, seated = [], [], [], []
     for w, p in zip(interface.values.reshape(-1, steps), pressure.values.reshape(-1, steps), strict=True):
         counted = w if seat is None else w - closure_at(seat, p, w)
-        fit, flag = fit_laws(p, counted, seat)
+        fit, flag = fit_laws(p, counted, seat, rounding)
         fits.append(fit)
         flags.append(flag)
         seated.append(counted)
@@ -163,13 +168,18 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     return result
 
 
-def fit_laws(pressure: Array, closure: Array, seat: float | None = None) -> tuple[dict[str, float], np.int8]:
-    """Return constants, intervals and misfits of both laws, their score, and the flag of the better one."""
+def fit_laws(
+    pressure: Array, closure: Array, seat: float | None = None, rounding: float = 0.0
+) -> tuple[dict[str, float], np.int8]:
+    """Return constants, intervals and misfits of both laws, their score, and the flag of the better one.
+
+    A closure that varies by no more than `rounding` has no law.
+    """
     fit = dict.fromkeys((*FITS, *ENDS, "law_score"), math.nan)
     steps = first_loading(pressure, closure)
     if seat is not None:
         steps = steps[pressure[steps] > seat]
-    if steps.size < FEWEST_STEPS or not np.ptp(closure[steps]) > 0:
+    if steps.size < FEWEST_STEPS or not np.ptp(closure[steps]) > rounding:
         return fit, UNDECIDED
     p, w = pressure[steps], closure[steps]
     exponential = fit_exponential(p, w)
