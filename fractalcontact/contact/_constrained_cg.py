@@ -222,8 +222,11 @@ class ConstrainedCG:
         self.max_transforms = MAX_TRANSFORMS * min(max(512**2 / self.h.size, 1.0), SMALLER_PLANES)
         np.clip(start, 0, self.p_max, out=self.p, casting="same_kind")
 
-    def solve(self, tolerance: float, *, certify: bool = True) -> Solution:
-        """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement."""
+    def solve(self, tolerance: float, *, certify: bool = True, patience: int = PATIENCE) -> Solution:
+        """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement.
+
+        `patience` is the number of iterations without progress after which it gives up.
+        """
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
         while iteration <= MAX_ITERATIONS and self.transforms() <= self.max_transforms:
@@ -243,8 +246,8 @@ class ConstrainedCG:
             progress.update(residual, evaluation.objective, least_fall)
             at_rounding = residual <= evaluation.residual_floor
             iteration += 1
-            patience = PATIENCE // 8 if at_rounding else PATIENCE
-            if progress.stalled <= patience and self.find_step(evaluation, inside, outside):  # (3) to (8)
+            waits = PATIENCE // 8 if at_rounding else patience
+            if progress.stalled <= waits and self.find_step(evaluation, inside, outside):  # (3) to (8)
                 self.take_step()  # (9), (10)
             elif at_rounding or not self.preconditioned:
                 reason = "rounding" if at_rounding else "stagnated"

@@ -39,6 +39,7 @@ FIRST_NODES = 256  # candidates of a first step under force control
 MAX_WINDOW_SHARE = 0.75  # of the extent; a larger window is not worth having
 CANDIDATE_TOLERANCE = 1e-2  # residual at which the closure is accurate enough to verify the candidates
 ROUNDING_SHARE = 1e-13  # of the greatest pressure: less is rounding
+LONG_PATIENCE = 200  # iterations without progress, where a first solution has stagnated
 OVERLAP_KEPT = 1e3  # overlap of yielded nodes over the greatest displacement; more changes no other node
 LEAST_CLOSURE = 1e-100  # scaled: above the gap of the nodes where a surface is flat
 CLOSURE_MARGIN = 1.1  # candidates for this much more than the expected closure
@@ -88,7 +89,7 @@ class WindowSolver:
         self._systems = {}
 
     def solve_from_the_closure(self, control: Control, rough: Solution) -> Solution:
-        """Go on with gaps that count from the closure, which have more digits; return the better solution.
+        """Go on, longer, with gaps that count from the closure; return the better solution.
 
         A spike that yields, or one far above a plane, is higher than the bodies deform by up to ten orders of
         magnitude, and the gaps of the other nodes, counted from its top, lose as many digits. The overlap of
@@ -103,7 +104,8 @@ class WindowSolver:
             replace(self.problem, gap=gap), np.float64, self.problem.local_compliance
         )
         shifted = control if control.closure is None else Control(closure=control.closure - rough.closure)
-        fine = ConstrainedCG(system, shifted, rough.pressure).solve(self.tolerance)
+        run = ConstrainedCG(system, shifted, rough.pressure)
+        fine = run.solve(self.tolerance, patience=LONG_PATIENCE)
         self.add_work(fine)
         stays = (fine.pressure[is_cut] >= self.problem.p_max).all()
         if not (stays and fine.residual < rough.residual):

@@ -16,6 +16,13 @@ def spikes(seed, shape, share, height):
     return (rng.random(shape) < share) * rng.random(shape) * height
 
 
+def spikes_107():
+    rng = np.random.default_rng([107, 19])
+    shape = int(rng.integers(16, 129)), int(rng.integers(16, 129))
+    rng.random(5)  # what the other numbers of the case were drawn with
+    return (rng.random(shape) < 0.005) * rng.random(shape) * 5.4e-4
+
+
 def ball(shape, spacing, radius):
     y, x = ((np.arange(n) - (n - 1) / 2) * spacing for n in shape)
     return -(y[:, None] ** 2 + x**2) / (2 * radius)
@@ -39,6 +46,10 @@ CASES = {
     ),
     "spikes, spacings 1 to 476, periodic, of more than 1500 pairs": (
         spikes(8, (160, 160), 0.0015, 6.2e-5), (3.3e-6, 1.57e-3), True, 3.7e8, 0.09, 40.0,
+    ),
+    "spikes, spacings 1 to 1000, periodic, of forty iterations without progress": (
+        spikes_107(), (1.4452577381206096e-06, 1.4452577381206096e-03), True, 912272163.2286087,
+        7059.614688657333, 40.0,
     ),
     "two levels, hardness twice the pressure, free": (
         levels(3, (49, 26), 0.1, 3.6e-4), (1e-4, 1e-4), False, 1e9, 7.8, 2.0,
