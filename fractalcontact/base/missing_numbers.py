@@ -51,7 +51,7 @@ REASONS = {
     "uplift_arm": "NaN where there is no uplift",
     "rotation_error": "NaN where no rotation was fitted, or too few tiles hold observed heights",
     "aperture": "NaN where the faces do not overlap, or a height is missing",
-    **dict.fromkeys(("shear", "normal_force", "nominal_pressure"), "NaN as in the data that were given"),
+    **dict.fromkeys(("shear", "azimuth", "normal_force", "nominal_pressure"), "NaN as in the data given"),
 }
 
 
