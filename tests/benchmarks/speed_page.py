@@ -213,7 +213,7 @@ def draw_ratios(rows: list[Row], target: Path) -> None:
     import matplotlib.pyplot as plt
 
     head, lines = load_table(rows)
-    figure, axes = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained", sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(8, 3.9), layout="constrained", sharey=True)
     colours = ("#56B4E9", "#0072B2", "#002B5C")
     for ax, boundary in zip(axes, ("periodic", "free"), strict=True):
         for threads, style in (("1", "-"), ("2", "--")):
@@ -229,7 +229,7 @@ def draw_ratios(rows: list[Row], target: Path) -> None:
         ax.minorticks_off()
         _size_axis(ax, sorted({int(line[2]) for line in lines}))
     axes[0].set_ylabel("fastest other solver / this one")
-    axes[0].legend(loc="upper left")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     figure.savefig(target, dpi=130)
     plt.close(figure)
 
