@@ -20,6 +20,7 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.memory import require_memory
+from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._inputs import (
@@ -297,9 +298,9 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
     block = crack.lower.isel(y=rows, x=columns)
     gap = block.copy(data=np.broadcast_to(0.0, block.shape))
     options = joint_options(scene, "closure")
-    path = next((np.atleast_1d(options[key]) for key in LOADS if key in options), np.zeros(1))
-    if path.dtype.kind not in "fiu":  # a problem of the closure, which is listed there
-        path = np.zeros(path.size)
+    path = next((real_numbers(options[key]) for key in LOADS if key in options), None)
+    if path is None or path.ndim > 1:  # a problem of the closure, which is listed there
+        path = np.zeros(1)
     return gap.expand_dims(step=path.size).assign_coords(nominal_pressure=("step", path.astype(float)))
 
 

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, TypeVar
 
 import numpy as np
@@ -322,7 +323,11 @@ def _loaded(function: Callable[[Path], T], path: Path) -> T:
         return function(path)
     except UnreadableFile:
         raise
-    except ValueError as error:
+    except (
+        ValueError,
+        SyntaxError,
+        TokenError,
+    ) as error:  # two by NumPy, of a header
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
 
 

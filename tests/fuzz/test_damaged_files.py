@@ -74,6 +74,16 @@ def test_counts_beyond_a_point_cloud_are_refused(tmp_path, name, place, value):
         fc.surfaces.read(tmp_path / name)
 
 
+@pytest.mark.parametrize("end", [b"', (", b"", b"((("])
+def test_header_of_an_array_that_never_ends_is_refused(tmp_path, end):
+    data = content("a.npy")
+    size = 10 + data[8] + 256 * data[9]
+    header = (data[10:40] + end).ljust(size - 11) + b"\n"
+    (tmp_path / "a.npy").write_bytes(data[:10] + header + data[size:])
+    with pytest.raises(UnreadableFile, match="'a.npy' is corrupt"):
+        fc.surfaces.read(tmp_path / "a.npy", spacing=1e-5)
+
+
 def test_chunks_beyond_a_packed_point_cloud_are_refused(tmp_path):
     pytest.importorskip("laspy")
     data = bytearray(content("a.laz"))

@@ -89,6 +89,7 @@ def refused(name, tmp_path, *replacements, **changes):
         ("roughness", {"title": 3}, "title"),
         ("roughness", {"": [1, 2]}, ""),
         ("domains", {"contact": {"method": {"a": 1}}}, "contact.method"),
+        ("two faces", {"joint": {"normal_force": [1.0, 10.0, [1]]}}, "joint.normal_force"),
         ("file", {"dimensions": {"scales": {"a": 1}}}, "dimensions.scales"),
         ("joint", {"joint": {"block": {"a": 1}}}, "joint.block"),
         ("joint", {"surface": {"shape": [200_000, 200_000]}, "want": {"joints": "rough"}}, "want.joints"),
