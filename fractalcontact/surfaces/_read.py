@@ -323,11 +323,7 @@ def _loaded(function: Callable[[Path], T], path: Path) -> T:
         return function(path)
     except UnreadableFile:
         raise
-    except (
-        ValueError,
-        SyntaxError,
-        TokenError,
-    ) as error:  # two by NumPy, of a header
+    except (ValueError, SyntaxError, TokenError) as error:  # two of them for a header
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
 
 
