@@ -51,7 +51,9 @@ REASONS = {
     "uplift_arm": "NaN where there is no uplift",
     "rotation_error": "NaN where no rotation was fitted, or too few tiles hold observed heights",
     "aperture": "NaN where the faces do not overlap, or a height is missing",
-    **dict.fromkeys(("shear", "azimuth", "normal_force", "nominal_pressure"), "NaN as in the data given"),
+    **dict.fromkeys(("dilatancy_angle", "friction_angle"), "NaN where the dilatancy is missing"),
+    **dict.fromkeys(("shear", "azimuth", "closure", "normal_force"), "NaN as in the data given"),
+    "nominal_pressure": "NaN as in the data given",
 }
 
 

@@ -27,6 +27,13 @@ def test_no_window_is_drawn_where_there_is_none(result):
     assert ax.get_legend_handles_labels()[1] == ["octave, 95 %"]
 
 
+@pytest.mark.parametrize("name", ["hurst", "ci_low", "ci_high"])
+def test_missing_numbers_are_left_out(result, name):
+    ax = plotting.scaling(result.assign({name: result[name] * np.nan}))
+    low, high = ax.get_ylim()
+    assert low < high
+
+
 @pytest.mark.parametrize(
     "name", ["window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max"]
 )
