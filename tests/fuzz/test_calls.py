@@ -39,8 +39,8 @@ QUICK, LONG = 400, 60_000
 SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 
 
-# errors of these name what the argument stands for, or the first argument, which is refused as it stands
-UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure")
+# errors of these name what the argument stands for, the file, or the first argument, refused as it stands
+UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure", "scenes.load", "scenes.template")
 # these return what a file or an argument holds
 AS_GIVEN = ("open", "scenes.reproduce", "accuracy.worst_results")
 
