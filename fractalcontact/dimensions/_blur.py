@@ -16,6 +16,7 @@ modes where it matters are left out. The window is the largest with which a mode
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -50,10 +51,14 @@ _WIDE = 1.1  # squared spread beyond which the forms do not differ
 _EDGE = 0.07  # share of the power of the edges beyond which a mode is left out
 _OCTAVES, _WEAK = 5, 3.0  # longest octaves compared with a fit, and -z beyond which they are too weak
 _WHITE = 0.5  # share of the waves below the noise that the edges must not disturb
+_NOISE_COST = (
+    6.0  # deviance that noise must bring, beside Akaike's penalty, to have half the weight in the mean
+)
+_SLIGHT = 1e-3  # relative weight below which a model is left out
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
-_WINDOW = "the modes that a model of blur and noise fits"
+BLUR_WINDOW = "the modes that a model of blur and noise fits"
 _CORNER = 0.75  # of the Nyquist wavenumber: waves beyond it along every axis give a first guess of noise
 
 
@@ -64,7 +69,7 @@ class BlurredFit:
     Attributes
     ----------
     hurst, standard_error, low, high : float
-        Estimate with its interval, within the range of the table.
+        Mean of the models, weighted by their likelihood, with its interval, within the range of the table.
     amplitude : float
         Factor on the expected power of the surface.
     spread : float
@@ -178,15 +183,17 @@ def fit_blurred(
         if fit.has_noise and excess < limit:
             ends = _blur_fit.interval(window, fit, limit - excess)
             low, high = min(low, ends[0]), max(high, ends[1])
+    hurst, error = _mean(window, fits)
+    at_mean = _blur_fit.fit(window, best, hurst=hurst)
     plain = [fit.penalised for fit in fits if fit.form == NONE and fit.has_noise == noise]
     return BlurredFit(
-        hurst=best.hurst,
-        standard_error=_blur_fit.error(window, best),
-        low=low,
-        high=high,
-        amplitude=best.amplitude,
-        spread=float(np.sqrt(best.square)),
-        noise=best.noise * best.amplitude if best.has_noise else np.nan,
+        hurst=hurst,
+        standard_error=error,
+        low=min(low, hurst),
+        high=max(high, hurst),
+        amplitude=at_mean.amplitude,
+        spread=float(np.sqrt(at_mean.square)),
+        noise=at_mean.noise * at_mean.amplitude if best.has_noise else np.nan,
         form=best.form,
         shortest=float(2.0 * np.pi / np.sqrt(frame.squares[window.inside].max())),
         scatter=scatter,
@@ -199,6 +206,22 @@ def fit_blurred(
         penalised=best.penalised,
         inside=window.inside,
     )
+
+
+def _mean(window: Window, fits: Sequence[Fit]) -> tuple[float, float]:
+    """Return the mean exponent of some models and its standard error, weighted by their likelihood.
+
+    Noise is penalised more than by Akaike: fitted where there is none, it doubles the error.
+    """
+    costs = np.array([fit.penalised + _NOISE_COST * fit.has_noise for fit in fits])
+    weights = np.exp(-0.5 * (costs - costs.min()))
+    weights = np.where(weights > _SLIGHT, weights, 0.0) / weights[weights > _SLIGHT].sum()
+    exponents = np.array([fit.hurst for fit in fits])
+    mean = float(weights @ exponents)
+    errors = np.array(
+        [_blur_fit.error(window, fit) if w else 0.0 for fit, w in zip(fits, weights, strict=True)]
+    )
+    return mean, float(np.sqrt(weights @ (errors**2 + (exponents - mean) ** 2)))
 
 
 def chosen_blocks(frame: Frame, surface: Surface, scales: Scales) -> Array:
@@ -238,7 +261,7 @@ def blurred_estimate(
         rms_increment=float(np.sqrt(2.0 * half_square)) * surface.unit if fit.hurst < 1.0 else np.nan,
         noise_height=float(np.sqrt(fit.noise)) * surface.unit if has_noise else np.nan,
         blur_spread=fit.spread * surface.spacing[1] if fit.form != NONE else np.nan,
-        window=_WINDOW if scales is None else ASKED,
+        window=BLUR_WINDOW if scales is None else ASKED,
         note=f"the surface shows {' and '.join(parts)}, which is in the model" if parts else "",
     )
 

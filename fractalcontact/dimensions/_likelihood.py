@@ -14,6 +14,7 @@ import numpy as np
 
 from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur import (
+    BLUR_WINDOW,
     CLEAR,
     BlurredFit,
     blurred_estimate,
@@ -58,7 +59,8 @@ from fractalcontact.dimensions._whittle import (
 Array = np.ndarray[Any, np.dtype[Any]]
 SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 
-_PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are fitted
+_PLAIN = 10.0  # decrease of the penalised deviance at which blur and noise are as likely as neither
+_DOUBT = 4.4  # difference from it below which both have more than a tenth of the weight
 _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
 # and a rougher second surface make it positive, and are harder to see than a blur
@@ -84,6 +86,10 @@ _SEPARABLE = (
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
     "another family than its own: see fractalcontact.surfaces.fill"
+)
+_OR_PLAIN = (
+    "blur, noise or a second exponent is not certain: the exponent is averaged with that of none, and the "
+    "interval holds both"
 )
 _OR_SECOND = (
     "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
@@ -177,11 +183,12 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
         parts = compared_parts(hurst, stride)
         if ground := _ground(free, parts, hurst, comparison.misfit):
             return ground
-        if spread is not None or _shows_blur(comparison, parts):
+        if spread is not None or _shows_blur(free, comparison, parts):
             blurred = _blurred_fit(free, comparison)
     if comparison is not None and blurred is not None and is_seen(blurred, surface.axes, spread):
         estimate, lag = _with_blur(free, comparison, blurred)
         estimate = _allowing_rounding(estimate, comparison, free)
+        estimate = _or_neither(estimate, free, comparison, parts)
     else:
         modes = _modes(free)
         if modes.number < LEAST_MODES:
@@ -236,12 +243,12 @@ def _comparison(free: _FreeEdges) -> Comparison | None:
     return compare(Window(frame, inside, frame.mean(free.power)), free.pilot, noise=free.noise)
 
 
-def _shows_blur(comparison: Comparison, parts: Heterogeneity) -> bool:
+def _shows_blur(free: _FreeEdges, comparison: Comparison, parts: Heterogeneity) -> bool:
     """Return whether blur or noise is to be fitted; unequal parts count for fewer modes, and look like it."""
-    gain = comparison.gain / parts.widening**2
+    gain, least = comparison.gain / parts.widening**2, _PLAIN - (_DOUBT if free.is_default else 0.0)
     if abs(comparison.misfit) > SIGNIFICANT * parts.widening:
-        return gain > _PLAIN
-    return not parts.note and gain > (_PLAIN if comparison.plain.hurst < 1.0 else CLEAR[2])
+        return gain > least
+    return not parts.note and gain > (least if comparison.plain.hurst < 1.0 else CLEAR[2])
 
 
 def _blurred_fit(free: _FreeEdges, comparison: Comparison) -> BlurredFit | None:
@@ -275,6 +282,22 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
         if low < estimate.ci_low or high > estimate.ci_high:
             estimate = estimate.holding(low, high, _OR_SECOND)
     return estimate, round(_BEYOND * fit.spread)
+
+
+def _or_neither(
+    estimate: Estimate, free: _FreeEdges, comparison: Comparison, parts: Heterogeneity
+) -> Estimate:
+    """Return the mean of an estimate with blur or noise and that with neither, where both are likely."""
+    gain = comparison.gain / parts.widening**2
+    if not free.is_default or abs(gain - _PLAIN) > _DOUBT or comparison.plain.hurst >= 1.0:
+        return estimate
+    modes = _modes(free)
+    fit = modes.fit(free.pilot, noise=False)
+    neither = _without_blur(free, modes, fit, parts, comparison, is_even=True)[0]
+    if estimate.window == BLUR_WINDOW and neither.window == _FREE_WINDOW:
+        share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _PLAIN))))
+        return estimate.averaged(neither, share, _OR_PLAIN)
+    return estimate if gain > _PLAIN else neither.holding(estimate.ci_low, estimate.ci_high, _OR_PLAIN)
 
 
 def _allowing_rounding(estimate: Estimate, comparison: Comparison, free: _FreeEdges) -> Estimate:

@@ -66,6 +66,14 @@ class Estimate:
         low, high = min(self.ci_low, low), max(self.ci_high, high)
         return replace(self, ci_low=low, ci_high=high, note=joined(self.note, note))
 
+    def averaged(self, other: Estimate, share: float, note: str) -> Estimate:
+        """Return the mean with another estimate, of the weight `share`; the interval holds both."""
+        hurst = (1.0 - share) * self.hurst + share * other.hurst
+        square = (1.0 - share) * self.standard_error**2 + share * other.standard_error**2
+        square += share * (1.0 - share) * (self.hurst - other.hurst) ** 2
+        held = self.holding(other.ci_low, other.ci_high, note)
+        return replace(held, hurst=hurst, standard_error=float(np.sqrt(square)))
+
     def gridded(self, finest: float) -> Estimate:
         """Widen the interval by what gridding may have done to the power of the window.
 
