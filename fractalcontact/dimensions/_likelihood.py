@@ -46,7 +46,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._second_exponent import alternatives, several_exponents
+from fractalcontact.dimensions._second_exponent import alternatives, fit_knee, several_exponents
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import Window
 from fractalcontact.dimensions._waves import without_waves
@@ -336,6 +336,9 @@ def _without_blur(
     is_slight = not _SLIGHT[0] < fit.misfit < _SLIGHT[1] and abs(fit.misfit) <= SIGNIFICANT
     if comparison is not None and free.is_default and is_slight and fit.hurst < 1.0:
         estimate = _allowing_scales(estimate, free, comparison.window, fit.misfit)
+    elif comparison is not None and free.is_default and fit.hurst < 1.0:
+        knee = fit_knee(octaves(frame_blocks(comparison.window.power, comparison.window.frame)))
+        estimate = estimate if knee is None else estimate.holding(*knee.held)
     return estimate, 1
 
 

@@ -8,7 +8,7 @@ fractional Brownian surfaces, and one exponent in a run of octaves with others b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,11 @@ _TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two e
 _UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
 _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
+_SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
+_KNEE_PARAMETERS, _LEAST_LONG = 5, 12.0  # of two power laws and their place; modes of the longer waves
+_KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
+_KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 
 
@@ -74,6 +78,7 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
     record = octaves(blocks)
     run = longest_run(record)
     is_shortened = _is_shortened(fit, blocks)
+    knee = fit_knee(record, fit.inside)
     if not is_shortened:
         two = fit_two_exponents(blocks, fit.inside)
         # the deviance of the blur does not count the amplitude as a parameter
@@ -83,6 +88,12 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
             if gain < -_TWO_ALONE or not fit.is_good:
                 return estimate
             return estimate.holding(fit.low, fit.high, _OR_NOISE)
+    if not is_shortened and knee is not None and LOWEST < knee.run.fit.hurst < 1.0:
+        gain = knee.penalised - 2.0 - fit.penalised
+        if gain < -_DECISIVE:
+            estimate = _knee_estimate(knee, surface)
+            is_decided = gain < -_UNDECIDED or not fit.is_good
+            return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
     gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
@@ -108,11 +119,74 @@ def alternatives(fit: BlurredFit, blocks: Blocks, *, is_bent: bool) -> tuple[flo
     if two is not None and has_second:
         half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
         ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
+    knee = fit_knee(octaves(blocks), fit.inside)
+    if knee is not None and knee.penalised - 2.0 - fit.penalised < _ALIKE:
+        ranges.append((knee.run.fit.low, knee.run.fit.high))
     if has_second or not is_bent:
         shortest = octaves(blocks)[0].fit
         ranges.append((shortest.low, shortest.high))
     lows, highs = zip(*ranges, strict=True) if ranges else ((np.inf,), (-np.inf,))
     return max(min(lows), 0.0), min(max(highs), 1.0)
+
+
+@dataclass(frozen=True)
+class Knee:
+    """Two exponents that change at the edge of an octave: the run of the shorter waves, and the longer ones.
+
+    Attributes
+    ----------
+    run : Run
+        The octaves of the shorter waves.
+    longer : PowerLaw
+    penalised : float
+        Deviance with Akaike's penalty.
+    gain : float
+        Decrease of the deviance against one exponent.
+    """
+
+    run: Run
+    longer: PowerLaw
+    penalised: float
+    gain: float
+
+    @property
+    def held(self) -> tuple[float, float]:
+        """The interval of the shorter waves where a knee may be there; (inf, -inf) otherwise."""
+        return (self.run.fit.low, self.run.fit.high) if self.gain > _KNEE_SEEN else (np.inf, -np.inf)
+
+
+def _knee_estimate(knee: Knee, surface: Surface) -> Estimate:
+    """Return the estimate of the shorter of the waves on either side of a knee."""
+    law, end = knee.longer, knee.run.high * surface.spacing[1]
+    note = (
+        f"no single exponent holds at all scales: {knee.run.fit.hurst:.2f} is that of waves shorter than "
+        f"{end:.3g} m, {law.hurst:.2f} [{law.low:.2f}, {law.high:.2f}] that of longer ones (see `scaling`)"
+    )
+    return replace(run_estimate(knee.run, surface), window=_KNEE_WINDOW, note=note)
+
+
+def fit_knee(record: Sequence[Octave], inside: Array | None = None) -> Knee | None:
+    """Fit one exponent to the shorter waves of some octaves, and another to the longer ones.
+
+    Among the blocks `inside`; None if there are too few waves.
+    """
+    blocks, best = record[0].blocks, None
+    octaves_inside = np.logical_or.reduce([octave.inside for octave in record])
+    inside = octaves_inside if inside is None else octaves_inside & inside
+    for k in range(1, len(record)):
+        short = np.logical_or.reduce([octave.inside for octave in record[:k]]) & inside
+        long = inside & ~short
+        if record[k - 1].high < _SHORTEST_KNEE * (1 - 1e-9) or blocks.count[long].sum() < _LEAST_LONG:
+            continue
+        shorter, longer = (fit_power_law(blocks, part) for part in (short, long))
+        deviance = shorter.deviance + longer.deviance
+        if best is None or deviance < best[0]:
+            best = deviance, Run(0, k, record[0].low, record[k - 1].high, shorter), longer
+    if best is None:
+        return None
+    deviance, run, longer = best
+    single = fit_power_law(blocks, inside).deviance
+    return Knee(run, longer, deviance + 2.0 * _KNEE_PARAMETERS, single - deviance)
 
 
 def _is_shortened(fit: BlurredFit, blocks: Blocks) -> bool:
