@@ -54,7 +54,6 @@ _WHITE = 0.5  # share of the waves below the noise that the edges must not distu
 _NOISE_COST = (
     6.0  # deviance that noise must bring, beside Akaike's penalty, to have half the weight in the mean
 )
-_SLIGHT = 1e-3  # relative weight below which a model is left out
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
@@ -68,8 +67,10 @@ class BlurredFit:
 
     Attributes
     ----------
-    hurst, standard_error, low, high : float
+    hurst, low, high : float
         Mean of the models, weighted by their likelihood, with its interval, within the range of the table.
+    standard_error : float
+        That of the likeliest model.
     amplitude : float
         Factor on the expected power of the surface.
     spread : float
@@ -183,12 +184,12 @@ def fit_blurred(
         if fit.has_noise and excess < limit:
             ends = _blur_fit.interval(window, fit, limit - excess)
             low, high = min(low, ends[0]), max(high, ends[1])
-    hurst, error = _mean(window, fits)
+    hurst = _mean(fits)
     at_mean = _blur_fit.fit(window, best, hurst=hurst)
     plain = [fit.penalised for fit in fits if fit.form == NONE and fit.has_noise == noise]
     return BlurredFit(
         hurst=hurst,
-        standard_error=error,
+        standard_error=_blur_fit.error(window, best),
         low=min(low, hurst),
         high=max(high, hurst),
         amplitude=at_mean.amplitude,
@@ -208,20 +209,14 @@ def fit_blurred(
     )
 
 
-def _mean(window: Window, fits: Sequence[Fit]) -> tuple[float, float]:
-    """Return the mean exponent of some models and its standard error, weighted by their likelihood.
+def _mean(fits: Sequence[Fit]) -> float:
+    """Return the mean exponent of some models, weighted by their likelihood.
 
     Noise is penalised more than by Akaike: fitted where there is none, it doubles the error.
     """
     costs = np.array([fit.penalised + _NOISE_COST * fit.has_noise for fit in fits])
     weights = np.exp(-0.5 * (costs - costs.min()))
-    weights = np.where(weights > _SLIGHT, weights, 0.0) / weights[weights > _SLIGHT].sum()
-    exponents = np.array([fit.hurst for fit in fits])
-    mean = float(weights @ exponents)
-    errors = np.array(
-        [_blur_fit.error(window, fit) if w else 0.0 for fit, w in zip(fits, weights, strict=True)]
-    )
-    return mean, float(np.sqrt(weights @ (errors**2 + (exponents - mean) ** 2)))
+    return float(np.average([fit.hurst for fit in fits], weights=weights))
 
 
 def chosen_blocks(frame: Frame, surface: Surface, scales: Scales) -> Array:

@@ -337,7 +337,8 @@ def _without_blur(
     if comparison is not None and free.is_default and is_slight and fit.hurst < 1.0:
         estimate = _allowing_scales(estimate, free, comparison.window, fit.misfit)
     elif comparison is not None and free.is_default and fit.hurst < 1.0:
-        knee = fit_knee(octaves(frame_blocks(comparison.window.power, comparison.window.frame)))
+        window = comparison.window
+        knee = fit_knee(octaves(frame_blocks(window.power, window.frame)), window.inside)
         estimate = estimate if knee is None else estimate.holding(*knee.held)
     return estimate, 1
 

@@ -71,7 +71,7 @@ class Estimate:
         hurst = (1.0 - share) * self.hurst + share * other.hurst
         square = (1.0 - share) * self.standard_error**2 + share * other.standard_error**2
         square += share * (1.0 - share) * (self.hurst - other.hurst) ** 2
-        held = self.holding(other.ci_low, other.ci_high, note)
+        held = self.holding(other.ci_low, other.ci_high, joined(other.note, note))
         return replace(held, hurst=hurst, standard_error=float(np.sqrt(square)))
 
     def gridded(self, finest: float) -> Estimate:

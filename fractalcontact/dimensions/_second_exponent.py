@@ -21,6 +21,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     PowerLaw,
     Run,
     fit_power_law,
+    interval_of_run,
     longest_run,
     octaves,
     run_estimate,
@@ -42,7 +43,7 @@ _UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
 _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
-_KNEE_PARAMETERS, _LEAST_LONG = 5, 12.0  # of two power laws and their place; modes of the longer waves
+_KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
@@ -91,7 +92,7 @@ def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Esti
     if not is_shortened and knee is not None and LOWEST < knee.run.fit.hurst < 1.0:
         gain = knee.penalised - 2.0 - fit.penalised
         if gain < -_DECISIVE:
-            estimate = _knee_estimate(knee, surface)
+            estimate = _knee_estimate(knee, record, surface)
             is_decided = gain < -_UNDECIDED or not fit.is_good
             return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
@@ -155,32 +156,33 @@ class Knee:
         return (self.run.fit.low, self.run.fit.high) if self.gain > _KNEE_SEEN else (np.inf, -np.inf)
 
 
-def _knee_estimate(knee: Knee, surface: Surface) -> Estimate:
+def _knee_estimate(knee: Knee, record: Sequence[Octave], surface: Surface) -> Estimate:
     """Return the estimate of the shorter of the waves on either side of a knee."""
     law, end = knee.longer, knee.run.high * surface.spacing[1]
     note = (
         f"no single exponent holds at all scales: {knee.run.fit.hurst:.2f} is that of waves shorter than "
         f"{end:.3g} m, {law.hurst:.2f} [{law.low:.2f}, {law.high:.2f}] that of longer ones (see `scaling`)"
     )
-    return replace(run_estimate(knee.run, surface), window=_KNEE_WINDOW, note=note)
+    estimate = run_estimate(knee.run, surface).holding(*interval_of_run(knee.run, record))
+    return replace(estimate, window=_KNEE_WINDOW, note=note)
 
 
-def fit_knee(record: Sequence[Octave], inside: Array | None = None) -> Knee | None:
-    """Fit one exponent to the shorter waves of some octaves, and another to the longer ones.
+def fit_knee(record: Sequence[Octave], inside: Array) -> Knee | None:
+    """Fit one exponent to the shorter of some waves, and a smaller one to the longer waves.
 
-    Among the blocks `inside`; None if there are too few waves.
+    None if there are too few waves, or none that are smooth on rough longer ones: a sum of two surfaces is
+    never so.
     """
     blocks, best = record[0].blocks, None
-    octaves_inside = np.logical_or.reduce([octave.inside for octave in record])
-    inside = octaves_inside if inside is None else octaves_inside & inside
     for k in range(1, len(record)):
         short = np.logical_or.reduce([octave.inside for octave in record[:k]]) & inside
         long = inside & ~short
-        if record[k - 1].high < _SHORTEST_KNEE * (1 - 1e-9) or blocks.count[long].sum() < _LEAST_LONG:
+        numbers = blocks.count[short].sum(), blocks.count[long].sum()
+        if record[k - 1].high < _SHORTEST_KNEE * (1 - 1e-9) or min(numbers) < _LEAST_KNEE:
             continue
         shorter, longer = (fit_power_law(blocks, part) for part in (short, long))
         deviance = shorter.deviance + longer.deviance
-        if best is None or deviance < best[0]:
+        if shorter.hurst > longer.hurst and (best is None or deviance < best[0]):
             best = deviance, Run(0, k, record[0].low, record[k - 1].high, shorter), longer
     if best is None:
         return None

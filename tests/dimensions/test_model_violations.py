@@ -76,7 +76,7 @@ def test_defects_widen_interval_to_true_exponent(name, method):
     hurst, defect, words = DEFECTS[name]
     for seed in (1, 3):
         result, low, high, note = estimated(defect(seed), method)
-        assert abs(result - hurst) > 0.02  # the estimate itself is wrong ...
+        assert abs(result - hurst) > 0.01  # the estimate itself is wrong ...
         assert low - 0.05 <= hurst <= high + 0.05  # ... and its interval is not that of one that is right
         assert any(word in note for word in words.split("|"))
 
@@ -144,6 +144,17 @@ def test_land_surface_is_answered_with_its_window():
     assert float(result.scale_min) == pytest.approx(float(window.scale_min))
     assert 0.0 <= float(result.ci_low) <= max(float(window.window_ci_low), 0.0) + 1e-9
     assert float(window.window_ci_high) - 1e-9 <= float(result.ci_high) < 0.6
+
+
+def test_smooth_short_waves_on_rough_long_ones():
+    """Once .5 to .6, with a blur of half a spacing and noise: coverage .70 of these surfaces."""
+    inside = 0
+    for rng in range(12):
+        heights = STEP * broken(0.8, 0.3, 16, rng, 128)
+        result = fc.dimensions.estimate(fc.surfaces.from_array(heights, SPACING)).isel(method=0)
+        inside += bool(result.ci_low <= 0.8 <= result.ci_high)
+        assert float(result.ci_high - result.ci_low) < 0.6
+    assert inside >= 10
 
 
 @pytest.mark.parametrize("rng", [0, 1])
