@@ -296,6 +296,8 @@ def _or_neither(
     neither = _without_blur(free, modes, fit, parts, comparison, is_even=True)[0]
     if estimate.window == BLUR_WINDOW and neither.window == _FREE_WINDOW:
         share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _PLAIN))))
+        if share > 0.5:
+            return neither.averaged(estimate, 1.0 - share, _OR_PLAIN)
         return estimate.averaged(neither, share, _OR_PLAIN)
     return estimate if gain > _PLAIN else neither.holding(estimate.ci_low, estimate.ci_high, _OR_PLAIN)
 
