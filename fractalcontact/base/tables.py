@@ -50,7 +50,7 @@ def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
         tablefmt="simple",
         disable_numparse=True,
         maxcolwidths=widths if body else None,
-        maxheadercolwidths=[size - GAP for size in widths] if body else None,  # heads are padded
+        maxheadercolwidths=[max(size - GAP, 1) for size in widths] if body else None,  # heads are padded
     )
     return "\n".join(line.rstrip() for line in text.replace(GLUE, " ").splitlines())
 

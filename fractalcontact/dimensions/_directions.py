@@ -228,7 +228,7 @@ def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scal
     has_constant_direction = bool((compared.means <= limit).any())
     anisotropy, is_beyond_model = None, False
     instrument = None
-    if np.linalg.matrix_rank(varied.vectors) == 2 and len(varied.vectors) > LEAST_LAGS:
+    if len(varied.vectors) > LEAST_LAGS and np.linalg.matrix_rank(varied.vectors) == 2:
         anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
         # where the power law bends, the waves decide: the lags of the lattice differ in length
         is_bent = abs(anisotropy.curvature_z) > SIGNIFICANT

@@ -16,7 +16,7 @@ import zipfile
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -108,12 +108,20 @@ def _write_part(result: xr.Dataset, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(path.parent)
         with written_whole(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, **{_HEADER: np.array([text, checksum])}, **arrays)  # type: ignore[arg-type]
+            _write_arrays(file, {_HEADER: np.array([text, checksum])} | arrays)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidInput(
             "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
         ) from error
+
+
+def _write_arrays(file: IO[bytes], arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
+    """Write an npz file; unlike older `np.savez`, close the archive also where the disk is full."""
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, values in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, values)
 
 
 def _read_part(path: Path) -> xr.Dataset:
