@@ -255,7 +255,8 @@ def _size_faults(heights: Array, argument: str, decades: int) -> Iterator[Fault]
 
 
 def _within(length: float, decades: int) -> bool:
-    return 10.0**-decades <= length <= 10.0**decades
+    rounded = 1.0 + UNIFORM  # a spacing is computed from centres
+    return 10.0**-decades <= length * rounded and length <= rounded * 10.0**decades
 
 
 def _decades(decades: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -176,22 +177,23 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     with Problems("fc.plotting.estimator_errors") as problems:
         for dim in dims:
             problems.require(data.sizes[dim] > 0, f"bench.{dim}", "at least one entry", NONE)
-    cases = [(family, size) for family in words(data["family"]) for size in data["size"].values]
+    families, sizes = words(data["family"]), data["size"].values
+    cases = list(product(range(len(families)), range(len(sizes))))
     size = (2.3 * len(cases) + 1.6, 5.2)
     shown = _style.panels(axes, (2, len(cases)), size, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
     styles = {
         name.replace("_", " "): _method_style(number) | {"ls": "-" if number < len(_style.cycle()) else "--"}
         for number, name in enumerate(words(data["method"]))
     }
-    for (upper, lower), (family, size) in zip(shown.T, cases, strict=True):
-        case = data.sel(family=family, size=size)
+    for (upper, lower), (i, j) in zip(shown.T, cases, strict=True):
+        case = data.isel(family=i, size=j)
         for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
             _curves_against_hurst(ax, case, quantity, styles)
         upper.set_yscale("log")
         upper.axhline(1.0, color=_style.ink(), lw=0.9, ls=":")
         lower.axhline(0.95, color=_style.ink(), lw=0.9, ls=":")
         _style.plain_ticks(upper)
-        upper.set_title(f"{family}, n = {size}")
+        upper.set_title(f"{families[i]}, n = {sizes[j]}")
         label_axis(lower.xaxis, "true Hurst exponent", PLAIN)
     label_axis(shown[0, 0].yaxis, "rms error / Cramér-Rao bound", PLAIN)
     label_axis(shown[1, 0].yaxis, "interval coverage", PLAIN)

@@ -222,8 +222,8 @@ def _uplift_lines(water: xr.Dataset) -> Iterator[str]:
     yield "Uplift, over the linear diagram"
     last = water.isel(step=-1) if "step" in water.dims else water
     shears = np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]
-    for shear in shears:
-        row = last.sel(shear=shear) if "shear" in last.dims else last
+    for i, shear in enumerate(shears):
+        row = last.isel(shear=i) if "shear" in last.dims else last
         place = "" if shear is None else f"at shear {quantity_text(float(shear), 'm')}: "
         force = row["uplift_force"]
         joint = float(force.sel(diagram="joint"))

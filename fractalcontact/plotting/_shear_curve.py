@@ -59,24 +59,24 @@ def shear_curve(
     result = shown_in(result, units, "shear_curve")
     data = [_read(result)] + ([] if beside is None else [_read(beside)])
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
-    pressures = np.unique(np.concatenate([each["nominal_pressure"].values for each in data]))
-    colours = dict(zip(pressures.tolist(), _style.sequence_colours(pressures.size), strict=True))
+    every = np.concatenate([each["nominal_pressure"].values for each in data])
+    pressures, places = np.unique(every, return_inverse=True)  # NaN, which equals no key, has a place too
+    colours = _style.sequence_colours(pressures.size)
+    of_test, of_other = np.split(places, [data[0].sizes["nominal_pressure"]])
     displacements = np.concatenate([each["shear_displacement"].values.ravel() for each in data])
     along = scale_of(data[0]["shear_displacement"], displacements)
     stress = scale_of(data[0]["nominal_pressure"], pressures)
     for ax, name in zip(shown, SHOWN, strict=True):
         across = scale_of(data[0][name], np.concatenate([each[name].values.ravel() for each in data]))
-        for each, style in zip(data, ({}, BESIDE), strict=False):
+        for each, own, style in zip(data, (of_test, of_other), ({}, BESIDE), strict=False):
             for i, pressure in enumerate(each["nominal_pressure"].values.tolist()):
                 x = np.broadcast_to(each["shear_displacement"].values, each[name].shape)[i]
                 label = f"{each.attrs.get('title', name)}, normal stress {stress.text(pressure)}"
-                ax.plot(along(x), across(each[name].values[i]), color=colours[pressure], label=label, **style)
+                ax.plot(along(x), across(each[name].values[i]), color=colours[own[i]], label=label, **style)
         label_axis(ax.yaxis, name_of(data[0][name]), across)
         label_axis(ax.xaxis, name_of(data[0]["shear_displacement"]), along)
     labels = [f"{value:.3g}" for value in stress(pressures)]
-    entries = [
-        _style.legend_line(text, color=colours[key]) for text, key in zip(labels, colours, strict=True)
-    ]
+    entries = [_style.legend_line(text, color=each) for text, each in zip(labels, colours, strict=True)]
     if beside is not None:
         entries += [
             _style.legend_line(each.attrs.get("title", ""), **style)

@@ -534,8 +534,8 @@ def _at_shears(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
         return
     shears = np.atleast_1d(data["shear"].values)
     scale = scale_for("m", shears)
-    for shear in shears:
-        yield scale.text(shear), data.sel(shear=shear) if "shear" in data.dims else data
+    for i, shear in enumerate(shears):
+        yield scale.text(shear), data.isel(shear=i) if "shear" in data.dims else data
 
 
 def _at_directions(data: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

@@ -161,7 +161,10 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
                 lower = surfaces.get("surface")
-                surfaces[name] = read_surface(table, scene.folder, lower) if flat is None else flat
+                made = read_surface(table, scene.folder, lower) if flat is None else flat
+                # a generator may reach sizes that float64 does not hold
+                if problems.surface(name, made, finite=False, smallest=1, leading=True):
+                    surfaces[name] = made
     return surfaces
 
 

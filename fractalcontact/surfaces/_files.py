@@ -25,6 +25,7 @@ HEADER = 200  # lines; no format has a longer header
 COMMENTS = ("//", "%")
 DECIMAL = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 HEADED = re.compile(r"(?P<name>[^\s\[(][^\[(\s]*(?: [^\[(\s]+)*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?(?=\s|$)")
+NUMPY = {"npy": np.lib.format.MAGIC_PREFIX, "npz": b"PK"}  # how these files start
 MISSING = ("", "nan", "na", "n/a", "null", "none", "--", "-nan")
 
 
@@ -272,6 +273,7 @@ def read_npy(path: Path) -> Array:
     """
     with open_bytes(path) as file:
         content = io.BytesIO(file.read())
+    _require_format(content, "npy")
     npy = np.lib.format
     is_first = npy.read_magic(content) == (1, 0)
     shape, _, dtype = (npy.read_array_header_1_0 if is_first else npy.read_array_header_2_0)(content)
@@ -282,9 +284,19 @@ def read_npy(path: Path) -> Array:
     return np.asarray(npy.read_array(content, allow_pickle=False))
 
 
+def _require_format(file: IO[bytes], name: str) -> None:
+    """Raise ValueError for a numpy file of the other format, which `numpy.load` reads as what it is."""
+    head = file.read(max(map(len, NUMPY.values())))
+    file.seek(0)
+    for other, start in NUMPY.items():
+        if other != name and head.startswith(start):
+            raise ValueError(f"expected an {name} file, got an {other} file")
+
+
 def read_npz(path: Path) -> dict[str, Array]:
     """Return the arrays of an npz file by name; raise ValueError if it is damaged or has no numbers."""
     with open_bytes(path) as file:
+        _require_format(file, "npz")
         check_unpacked(path.name, file)
         try:
             with np.load(file, allow_pickle=False) as archive:

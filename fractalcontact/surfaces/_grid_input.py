@@ -10,14 +10,14 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.construction import make_array
-from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-LONGEST = 1e100  # m: squares and cubes of it can be represented
+SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m
 COPIES = 2  # of the heights: the result and one work array
 
 
@@ -39,12 +39,12 @@ def axis_sizes(shape: Any) -> tuple[int, ...]:
 
 def check_length(problems: Problems, argument: str, value: Any, *, optional: bool = False) -> bool:
     """Check for a length in metres."""
-    return problems.number(argument, value, above=0, at_most=LONGEST, optional=optional)
+    return problems.number(argument, value, at_least=SHORTEST, at_most=LONGEST, optional=optional)
 
 
 def check_spacing(problems: Problems, spacing: Any, axes: int | None = None) -> bool:
     """Check for the spacing in metres: one length, or one for each axis, y first; None allows 1 or 2 axes."""
-    if not problems.numbers("spacing", spacing, above=0, at_most=LONGEST):
+    if not problems.numbers("spacing", spacing, at_least=SHORTEST, at_most=LONGEST):
         return False
     expected = "one length in metres" + (" or (y, x)" if axes != 1 else "")
     return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)

@@ -119,6 +119,15 @@ def test_sizes_without_representable_squares_are_refused(use, size):
             use(fc.surfaces.from_array(heights, size))
 
 
+@pytest.mark.parametrize("size", [1e-100, 1e100])
+def test_the_limits_of_a_spacing_belong_to_it(size):
+    surface = fc.surfaces.from_array(np.random.default_rng(1).random((24, 24)), size)
+    assert fc.surfaces.describe(surface).rms_height > 0
+    for beyond in (size**1.2, [1.0, size**1.2]):
+        with pytest.raises(InvalidInput, match=r"spacing: expected a finite number >= 1e-100 and <= 1e\+100"):
+            fc.surfaces.from_array(surface.values, beyond)
+
+
 def test_too_small_range_is_refused_and_a_constant_surface_is_not():
     heights = np.where(np.eye(8) > 0, 1e-120, 0.0)
     with pytest.raises(InvalidInput, match="heights of 0 or"):

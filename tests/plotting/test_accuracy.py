@@ -49,3 +49,13 @@ def test_intervals_lie_within_the_axes():
     for ax, (first, _, last) in zip((upper, lower), ends.values(), strict=True):
         low, high = ax.get_ylim()
         assert low < first < last < high
+
+
+def test_panels_of_cases_with_equal_or_unknown_sizes():
+    dims = ("method", "family", "hurst", "size")
+    coords = {"method": ["default"], "family": ["fbm", "fbm"], "hurst": [0.3, 0.8], "size": [128.0, np.nan]}
+    ratio = np.arange(1.0, 9.0).reshape(1, 2, 2, 2)
+    bench = xr.Dataset({"error_ratio": (dims, ratio), "interval_coverage": (dims, ratio / 10)}, coords)
+    upper, _ = plotting.estimator_errors(bench)
+    drawn = [ax.lines[0].get_ydata().tolist() for ax in upper]
+    assert drawn == [[1, 3], [2, 4], [5, 7], [6, 8]]

@@ -49,6 +49,20 @@ def test_a_criterion_beside_a_test_shares_colours_and_units(test_result, criteri
     render(figure)
 
 
+def test_an_unknown_normal_stress_has_its_own_colour(test_result, criterion):
+    unknown = test_result.assign_coords(nominal_pressure=[2e6, np.nan])
+    unknown.nominal_pressure.attrs = test_result.nominal_pressure.attrs
+    for result in (unknown, unknown.isel(nominal_pressure=[1]), unknown.isel(nominal_pressure=[1, 1])):
+        stress = figure_of(plotting.shear_curve(result, beside=criterion)).axes[0]
+        assert len(stress.lines) == result.sizes["nominal_pressure"] + 2
+        for i in range(result.sizes["nominal_pressure"]):
+            one = result.isel(nominal_pressure=i)
+            assert holds(drawn(stress), one.shear_displacement, one.shear_stress)
+        assert stress.lines[result.sizes["nominal_pressure"] - 1].get_label().endswith("normal stress -")
+    first, second, beside, _ = figure_of(plotting.shear_curve(unknown, beside=criterion)).axes[0].lines
+    assert first.get_color() == beside.get_color() != second.get_color()
+
+
 def test_peaks_are_points_on_the_envelope(face, test_result):
     envelope = fc.joints.strength_envelope(
         face, nominal_pressure=[1e6, 3e7], wall_strength=1e8, basic_friction_angle=30

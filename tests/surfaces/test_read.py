@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import re
 import struct
 import sys
 
@@ -487,6 +488,18 @@ def test_npz_is_read_like_npy(tmp_path):
     np.testing.assert_array_equal(one, MAP / 1e3)
     top = fc.surfaces.read(tmp_path / "a.npz", spacing=1e-4, first_row="top")
     np.testing.assert_array_equal(top, MAP[::-1])
+
+
+@pytest.mark.parametrize("end", ["", ".gz"])
+@pytest.mark.parametrize(("name", "other"), [("npz", "npy"), ("npy", "npz")])
+def test_numpy_file_under_the_name_of_the_other_format_is_refused(tmp_path, name, other, end):
+    content = io.BytesIO()
+    (np.save if other == "npy" else np.savez)(content, MAP)
+    path = tmp_path / f"a.{name}{end}"
+    path.write_bytes(gzip.compress(content.getvalue()) if end else content.getvalue())
+    message = f"'{path.name}' is corrupt (expected an {name} file, got an {other} file)"
+    with pytest.raises(UnreadableFile, match=re.escape(message)):
+        fc.surfaces.read(path, spacing=1e-4)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
