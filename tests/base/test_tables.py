@@ -38,3 +38,11 @@ def test_table_is_not_wider_than_the_screen(monkeypatch):
 def test_narrow_table_is_the_same_at_any_width():
     rows = [("method", "error"), ("fast", "1e-08")]
     assert table(rows, 40) == table(rows, 400)
+
+
+def test_column_without_words():
+    assert [line.split() for line in table([("", "error"), ("", "1e-08")]).splitlines()[::2]] == [
+        ["error"],
+        ["1e-08"],
+    ]
+    assert table([("",), ("",)]).split() == ["--"]
