@@ -51,7 +51,8 @@ def _check(
         fc.contact.LoadPath.from_keywords, normal_force=normal_force, nominal_pressure=nominal_pressure
     )
     check_pressing(problems, crack, load, "flat_block", (), solver)
-    if isinstance(crack, Crack):
+    are_numbers = factors is None or problems.numbers("factors", factors, at_least=1)
+    if are_numbers and isinstance(crack, Crack):
         _check_factors(problems, crack.layout.cells, factors)
 
 
@@ -59,7 +60,7 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
     if factors is None:
         expected = f"a block of cells with common divisors (got {cells[0]} x {cells[1]})"
         problems.require(len(default_factors(cells)) > 1, "factors", expected, None)
-    elif problems.numbers("factors", factors, at_least=1):
+    else:
         values = float_array(factors)
         largest = min(cells) // 3
         valid = (values == np.round(values)) & (values <= largest)

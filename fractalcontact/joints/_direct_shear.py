@@ -59,15 +59,19 @@ def _check(
     problems.number("distance", distance, above=0, optional=True)
     if keep is not None:
         problems.choices("keep", keep, MAPS)
-    stresses_are_valid = problems.number("hardness", hardness, **bounds)
-    if problems.numbers("nominal_pressure", nominal_pressure, **bounds) and stresses_are_valid:
-        greatest = float(float_array(nominal_pressure).max())
-        problems.require(greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest)
-        if check_crack(problems, crack):
-            load = problems.construct(fc.contact.LoadPath, "nominal_pressure", nominal_pressure)
-            check_pressing(problems, crack, load, "flat_block", (), {"hardness": hardness, **solver})
+    hardness_is_valid, load = problems.number("hardness", hardness, **bounds), None
+    if problems.numbers("nominal_pressure", nominal_pressure, **bounds):
+        load = problems.construct(fc.contact.LoadPath, "nominal_pressure", nominal_pressure)
+        if hardness_is_valid:
+            greatest = float(float_array(nominal_pressure).max())
+            problems.require(
+                greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest
+            )
+    check_crack(problems, crack)
+    known = {"hardness": hardness} if hardness_is_valid else {}
+    check_pressing(problems, crack, load, "flat_block", (), known | solver)
     path_is_valid = problems.numbers("path", path, at_least=-LARGEST, at_most=LARGEST)
-    if isinstance(crack, Crack) and check_direction(problems, direction) and path_is_valid:
+    if check_direction(problems, direction) and path_is_valid and isinstance(crack, Crack):
         _check_path(problems, crack, _turning_points(path), read_direction(direction))
 
 

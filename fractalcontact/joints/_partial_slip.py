@@ -52,8 +52,9 @@ def _check(
     nominal_pressure: Any,
     **solver: Any,
 ) -> None:
-    if check_direction(problems, direction):
-        check_sliding(problems, crack, shear, direction)
+    if not check_direction(problems, direction):
+        direction = "E"  # any direction, to check the crack and the shear as well
+    check_sliding(problems, crack, shear, direction)
     problems.number("friction_coefficient", friction_coefficient, above=0, optional=True)
     problems.numbers("tangential_force", tangential_force)
     problems.choice("method", method, METHODS)

@@ -48,9 +48,10 @@ def _check(
     problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST)
     problems.number("damage_coefficient", damage_coefficient, at_least=1, at_most=2, optional=True)
     problems.number("normal_stiffness", normal_stiffness, above=0, at_most=LARGEST, optional=True)
-    if check_direction(problems, direction):
-        with problems.collect():
-            roughness_coefficient.validate(surface, direction=direction)
+    if not check_direction(problems, direction):
+        direction = "E"  # any direction, to check the surface as well
+    with problems.collect():
+        roughness_coefficient.validate(surface, direction=direction)
 
 
 @public_result(
