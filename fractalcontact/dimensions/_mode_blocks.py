@@ -189,13 +189,26 @@ def frame(shape: tuple[int, ...], spacing: tuple[float, ...]) -> Frame:
     if len(shape) == 1:
         logs = np.log(_profile_power(shape[0]))[:, centres[0] - 2]
     elif min(shape) <= _LARGEST:
-        logs = np.log(_power_at(shape, spacing, centres))[:, index[0], index[1]]
+        power = _power_at(shape, spacing, centres)[:, index[0], index[1]]
+        logs = _logarithm(power, Frame(shape, spacing, starts, index, count, waves, count))
     else:
         logs = (
             _extrapolated(shape, spacing, centres, index)
             + Frame(shape, spacing, starts, index, count, waves, count).densities
         )
     return Frame(shape, spacing, starts, index, count, waves, logs)
+
+
+def _logarithm(power: Array, frame: Frame) -> Array:
+    """Return the logarithm of expected power at the nodes: (nodes, blocks).
+
+    Where spacings differ ten thousandfold, sums over the covariance cancel and may end below zero. The power
+    over the spectral density is then taken from the other blocks.
+    """
+    if power.min() > 0.0:
+        return np.asarray(np.log(power))
+    ratio = np.log(np.where(power > 0.0, power, np.nan)) - frame.densities
+    return np.asarray(np.where(power > 0.0, ratio, np.nanmedian(ratio, axis=1)[:, None]) + frame.densities)
 
 
 def _extrapolated(shape: tuple[int, ...], spacing: tuple[float, ...], centres: Any, index: Any) -> Array:
@@ -211,9 +224,8 @@ def _extrapolated(shape: tuple[int, ...], spacing: tuple[float, ...], centres: A
     grid = np.unravel_index(range(unique[0].size * unique[1].size), (unique[0].size, unique[1].size))
     waves = _waves(small, spacing, [u[i] for u, i in zip(unique, grid, strict=True)])
     table = Frame(small, spacing, (), grid, np.empty(0), waves, np.empty(0))
-    ratio = np.log(_power_at(small, spacing, unique)) - table.densities.reshape(
-        NODES.size, *(u.size for u in unique)
-    )
+    power = _power_at(small, spacing, unique).reshape(NODES.size, -1)
+    ratio = (_logarithm(power, table) - table.densities).reshape(NODES.size, *(u.size for u in unique))
     places = [np.searchsorted(u, e)[i] for u, e, i in zip(unique, ends, index, strict=True)]
     return np.asarray(ratio[:, places[0], places[1]])
 

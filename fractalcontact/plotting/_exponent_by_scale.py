@@ -61,7 +61,7 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     along = scale_of(data["wavelength"])
     x = along(data["wavelength"].values)
     hurst, low, high = (table(data, name, ("wavelength",)) for name in ("hurst", "ci_low", "ci_high"))
-    bars = [hurst - low, high - hurst]
+    bars = np.maximum([hurst - low, high - hurst], 0.0)  # of an interval beside its value one end shows
     points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
     ax.errorbar(x, hurst, bars, ls="", elinewidth=1.0, label="octave, 95 %", **points)
     entries = [_style.legend_line("octave, 95 %", **points)]

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import result_of
 from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from fractalcontact.plotting._style import AxesArray, Panels
     from fractalcontact.plotting._units import Units
 
@@ -89,4 +88,6 @@ def shear_curve(
 def _read(result: Any) -> xr.Dataset:
     names = (*SHOWN, "shear_displacement", "nominal_pressure")
     data = result_of(result, "shear_curve", names, ("nominal_pressure",))
+    along = (data["shear_displacement"], data["nominal_pressure"])
+    data = data.assign({name: xr.broadcast(data[name], *along)[0] for name in SHOWN})
     return data.transpose("nominal_pressure", ..., missing_dims="ignore")
