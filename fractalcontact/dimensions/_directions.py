@@ -43,7 +43,7 @@ from fractalcontact.dimensions._second_differences import (
     SecondDifferences,
     lattice_directions,
 )
-from fractalcontact.dimensions._second_exponent import several_exponents
+from fractalcontact.dimensions._second_exponent import Explanations, several_exponents
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -301,9 +301,10 @@ class _Instrument:
         fit = fit_blurred(power, frame)
         if fit is None or not (fit.is_good and fit.gain > CLEAR[2] and fit.hurst < 1.0):
             return None
-        if several_exponents(fit, frame_blocks(frame.mean(power), frame), surface) is not None:
+        means = frame.mean(power)
+        if several_exponents(Explanations(fit, frame_blocks(means, frame)), surface) is not None:
             return None
-        every = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
+        every = Window(frame, np.ones(frame.count.size, dtype=bool), means)
         sharp, blurred = (every.signal(form, fit.hurst, fit.spread**2)[0] for form in (NONE, fit.form))
         return cls(frame, sharp, blurred, float(np.nan_to_num(fit.noise)), fit.standard_error)
 

@@ -46,7 +46,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._second_exponent import alternatives, fit_knee, several_exponents
+from fractalcontact.dimensions._second_exponent import Explanations, alternatives, fit_knee, several_exponents
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import Window
 from fractalcontact.dimensions._waves import without_waves
@@ -271,14 +271,14 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
     longest = 2.0 * np.pi / float(np.sqrt(window.squares.min())) * surface.spacing[1]
     estimate = blurred_estimate(fit, surface, free.scales, fit.amplitude, longest)
     if free.is_default:
-        blocks = frame_blocks(window.power, window.frame)
-        several = several_exponents(fit, blocks, surface)
+        explained = Explanations(fit, frame_blocks(window.power, window.frame))
+        several = several_exponents(explained, surface)
         if several is not None:
             return several, round(0.5 * several.scale_min / max(surface.spacing))
         # blur and noise do not explain all octaves, or what they leave is no fractal
         if not (fit.is_good and fit.low < 1.0) and (run := _longest_run(free, window)):
             return run
-        low, high = alternatives(fit, blocks, is_bent=True)
+        low, high = alternatives(explained, is_bent=True)
         if low < estimate.ci_low or high > estimate.ci_high:
             estimate = estimate.holding(low, high, _OR_SECOND)
     return estimate, round(_BEYOND * fit.spread)
@@ -377,7 +377,8 @@ def _allowing_scales(estimate: Estimate, free: _FreeEdges, window: Window, misfi
     fit = fit_blurred(free.power, window.frame)
     if fit is None:
         return estimate
-    low, high = alternatives(fit, frame_blocks(window.power, window.frame), is_bent=False)
+    explained = Explanations(fit, frame_blocks(window.power, window.frame))
+    low, high = alternatives(explained, is_bent=False)
     note = (
         f"the exponent may change with scale ({misfit:+.1f} standard deviations): the interval holds those "
         "that blur, noise or a second exponent would give"

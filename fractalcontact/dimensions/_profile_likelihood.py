@@ -33,7 +33,7 @@ from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
-from fractalcontact.dimensions._second_exponent import several_exponents
+from fractalcontact.dimensions._second_exponent import Explanations, several_exponents
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
 
@@ -113,7 +113,7 @@ def _profile_modes(
     fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=chosen_blocks(frame, surface, scales))
     if fit is not None and is_seen(fit, surface.axes, spread):
         if scales is None and spread is None and not noise:
-            several = several_exponents(fit, blocks, surface)
+            several = several_exponents(Explanations(fit, blocks), surface)
             if several is not None:
                 return several, none
         amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)

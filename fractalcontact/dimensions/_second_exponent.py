@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,61 +71,95 @@ class TwoExponents:
     penalised: float
 
 
-def several_exponents(fit: BlurredFit, blocks: Blocks, surface: Surface) -> Estimate | None:
+@dataclass(frozen=True)
+class Explanations:
+    """Blur and noise, and several exponents, as explanations of the same waves; each is fitted once.
+
+    Attributes
+    ----------
+    fit : BlurredFit
+    blocks : Blocks
+    """
+
+    fit: BlurredFit
+    blocks: Blocks
+
+    @cached_property
+    def record(self) -> list[Octave]:
+        """The octaves of wavelength, the shortest first."""
+        return octaves(self.blocks)
+
+    @cached_property
+    def is_shortened(self) -> bool:
+        """Whether the longest waves do not belong to blur and noise."""
+        wavelength = self.blocks.wavelength
+        return float(wavelength[self.fit.inside].max()) < 0.99 * float(wavelength.max())
+
+    @cached_property
+    def two(self) -> TwoExponents | None:
+        """Two exponents; None if they are not fitted, because blur and noise leave out the longest waves."""
+        return None if self.is_shortened else fit_two_exponents(self.blocks, self.fit.inside)
+
+    @cached_property
+    def knee(self) -> Knee | None:
+        """One exponent of the shorter waves, and a smaller one of the longer waves."""
+        return fit_knee(self.record, self.fit.inside)
+
+    def excess(self, penalised: float) -> float:
+        """Return a penalised deviance less that of blur and noise, which does not count the amplitude."""
+        return penalised - 2.0 - self.fit.penalised
+
+
+def several_exponents(explained: Explanations, surface: Surface) -> Estimate | None:
     """Return the estimate where the exponent changes with scale; None if blur and noise are likelier.
 
     A roll-off at long waves, or a second exponent, bends the spectrum as blur and noise do. They differ
     where blur and noise describe only the shorter waves, and in the likelihood.
     """
-    record = octaves(blocks)
-    run = longest_run(record)
-    is_shortened = _is_shortened(fit, blocks)
-    knee = fit_knee(record, fit.inside)
-    if not is_shortened:
-        two = fit_two_exponents(blocks, fit.inside)
-        # the deviance of the blur does not count the amplitude as a parameter
-        gain = np.inf if two is None else two.penalised - 2.0 - fit.penalised
-        if two is not None and gain < -_DECISIVE and two.rough.hurst > _LEAST_EXPONENT:
-            estimate = _two_estimate(two, record[0], blocks, surface)
-            if gain < -_TWO_ALONE or not fit.is_good:
-                return estimate
-            return estimate.holding(fit.low, fit.high, _OR_NOISE)
-    if not is_shortened and knee is not None and LOWEST < knee.run.fit.hurst < 1.0:
-        gain = knee.penalised - 2.0 - fit.penalised
-        if gain < -_DECISIVE:
-            estimate = _knee_estimate(knee, record, surface)
-            is_decided = gain < -_UNDECIDED or not fit.is_good
+    fit, record, two = explained.fit, explained.record, explained.two
+    if two is not None and two.rough.hurst > _LEAST_EXPONENT:
+        excess = explained.excess(two.penalised)
+        if excess < -_DECISIVE:
+            estimate = _two_estimate(two, record[0], explained.blocks, surface)
+            is_decided = excess < -_TWO_ALONE or not fit.is_good
             return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
+    knee = None if explained.is_shortened else explained.knee
+    if knee is not None and LOWEST < knee.run.fit.hurst < 1.0:
+        excess = explained.excess(knee.penalised)
+        if excess < -_DECISIVE:
+            estimate = _knee_estimate(knee, record, surface)
+            is_decided = excess < -_UNDECIDED or not fit.is_good
+            return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
+    run = longest_run(record)
     if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
         return None
-    gain = penalised_deviance(record, run, fit.inside) - 2.0 - fit.penalised
-    if gain >= (_SHORTENED if is_shortened else -_DECISIVE):
+    excess = explained.excess(penalised_deviance(record, run, fit.inside))
+    if excess >= (_SHORTENED if explained.is_shortened else -_DECISIVE):
         return None
     estimate = run_estimate(run, surface)
-    if not (fit.is_good and gain > -_UNDECIDED):
+    if not (fit.is_good and excess > -_UNDECIDED):
         return estimate
     return estimate.holding(fit.low if fit.low > LOWEST else 0.0, fit.high, _OR_NOISE)
 
 
-def alternatives(fit: BlurredFit, blocks: Blocks, *, is_bent: bool) -> tuple[float, float]:
+def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, float]:
     """Return the range of exponents of explanations that are nearly as likely; (inf, -inf) if there are none.
 
     They are blur and noise, two exponents, and, unless a single exponent is excluded (`is_bent`), that of the
     shortest octave. In a small surface noise and a second exponent of the shorter waves are much alike.
     """
+    fit, two, knee = explained.fit, explained.two, explained.knee
     ranges: list[tuple[float, float]] = []
     if fit.is_good and fit.gain > _POSSIBLE:
         ranges.append((fit.low, fit.high))
-    two = None if _is_shortened(fit, blocks) else fit_two_exponents(blocks, fit.inside)
-    has_second = two is not None and two.penalised - 2.0 - fit.penalised < _ALIKE
+    has_second = two is not None and explained.excess(two.penalised) < _ALIKE
     if two is not None and has_second:
         half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
         ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
-    knee = fit_knee(octaves(blocks), fit.inside)
-    if knee is not None and knee.penalised - 2.0 - fit.penalised < _ALIKE:
+    if knee is not None and explained.excess(knee.penalised) < _ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
     if has_second or not is_bent:
-        shortest = octaves(blocks)[0].fit
+        shortest = explained.record[0].fit
         ranges.append((shortest.low, shortest.high))
     lows, highs = zip(*ranges, strict=True) if ranges else ((np.inf,), (-np.inf,))
     return max(min(lows), 0.0), min(max(highs), 1.0)
@@ -189,11 +224,6 @@ def fit_knee(record: Sequence[Octave], inside: Array) -> Knee | None:
     deviance, run, longer = best
     single = fit_power_law(blocks, inside).deviance
     return Knee(run, longer, deviance + 2.0 * _KNEE_PARAMETERS, single - deviance)
-
-
-def _is_shortened(fit: BlurredFit, blocks: Blocks) -> bool:
-    """Return whether the longest waves do not belong to a fit."""
-    return float(blocks.wavelength[fit.inside].max()) < 0.99 * float(blocks.wavelength.max())
 
 
 def _two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: Surface) -> Estimate:
