@@ -22,7 +22,7 @@ from fractalcontact.joints._closure import (
     warn_steep,
     warn_unconverged,
 )
-from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints._compass import checked_direction, read_direction
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -44,8 +44,7 @@ def _check(
     nominal_pressure: Any,
     **solver: Any,
 ) -> None:
-    if not check_direction(problems, direction):
-        direction = "E"  # any direction, to check the crack and the shear as well
+    direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
     load = problems.construct(
         fc.contact.LoadPath.from_keywords, normal_force=normal_force, nominal_pressure=nominal_pressure

@@ -38,6 +38,11 @@ def check_direction(problems: Problems, value: Any) -> bool:
     return problems.require(valid, "direction", EXPECTED, value)
 
 
+def checked_direction(problems: Problems, value: Any) -> Any:
+    """Check a direction and return it; in place of a wrong one "E", to check the other arguments with."""
+    return value if check_direction(problems, value) else "E"
+
+
 def check_directions(problems: Problems, value: Any) -> bool:
     """Check for one direction or a sequence of them, in which each occurs once."""
     if not is_single(value) and not isinstance(value, (list, tuple, np.ndarray)):

@@ -16,7 +16,7 @@ from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints._compass import checked_direction, read_direction
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import delta_surface
 
@@ -34,8 +34,7 @@ DIFFERENCE_QUOTIENT = (
 
 
 def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, window: Any) -> None:
-    if not check_direction(problems, direction):
-        direction = "E"  # any direction, to check the crack and the shear as well
+    direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
     if window is not None and problems.numbers("window", window, above=0):
         ends = float_array(window)

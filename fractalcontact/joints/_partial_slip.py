@@ -18,7 +18,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._closure import Pressing, ShearedContact, check_pressing
-from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints._compass import checked_direction, read_direction
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -52,8 +52,7 @@ def _check(
     nominal_pressure: Any,
     **solver: Any,
 ) -> None:
-    if not check_direction(problems, direction):
-        direction = "E"  # any direction, to check the crack and the shear as well
+    direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
     problems.number("friction_coefficient", friction_coefficient, above=0, optional=True)
     problems.numbers("tangential_force", tangential_force)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints._compass import checked_direction, read_direction
 from fractalcontact.joints._roughness_coefficient import LARGEST_JRC, SAMPLE_LENGTH, roughness_coefficient
 from fractalcontact.joints._strength_criteria import scaled_constants
 from fractalcontact.joints._strength_envelope import FITTED_STRESS, LARGEST, LARGEST_ANGLE, SMALLEST
@@ -48,8 +48,7 @@ def _check(
     problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST)
     problems.number("damage_coefficient", damage_coefficient, at_least=1, at_most=2, optional=True)
     problems.number("normal_stiffness", normal_stiffness, above=0, at_most=LARGEST, optional=True)
-    if not check_direction(problems, direction):
-        direction = "E"  # any direction, to check the surface as well
+    direction = checked_direction(problems, direction)
     with problems.collect():
         roughness_coefficient.validate(surface, direction=direction)
 
