@@ -156,14 +156,13 @@ def filtered(
         multiply(0, modes.shape[1], real_parts(modes), *arguments)
         result = irfft2_cropped(modes, padded, shape) if is_padded else irfft2(modes, shape, overwrite=True)
         return result, modes
+    if plane.size <= SMALL and not is_padded:
+        transform = PlaneTransform(shape)
+        modes = transform.forward(plane, modes)
+        multiply(0, modes.shape[1], real_parts(modes), *arguments)
+        return transform.backward(modes, out), modes
     modes = _empty_modes(plane, padded) if modes is None else modes
     out = np.empty_like(plane) if out is None else out
-    if plane.size <= SMALL and not is_padded:
-        _ducc0().r2c(plane, axes=(0, 1), out=modes, nthreads=1)
-        multiply(0, modes.shape[1], real_parts(modes), *arguments)
-        back = {"forward": False, "inorm": 2, "nthreads": 1, "allow_overwriting_input": True}
-        _ducc0().c2r(modes, axes=(0, 1), lastsize=padded[1], out=out, **back)
-        return out, modes
     rows, columns = _groups(shape[0]), _groups(modes.shape[1])
     in_bands(_transform_rows, rows, modes.size // 2, plane, padded[1], modes)
     in_bands(_filter_columns, columns, modes.size, modes, shape[0], multiply, arguments, True)
