@@ -51,9 +51,8 @@ _WIDE = 1.1  # squared spread beyond which the forms do not differ
 _EDGE = 0.07  # share of the power of the edges beyond which a mode is left out
 _OCTAVES, _WEAK = 5, 3.0  # longest octaves compared with a fit, and -z beyond which they are too weak
 _WHITE = 0.5  # share of the waves below the noise that the edges must not disturb
-_NOISE_COST = (
-    6.0  # deviance that noise must bring, beside Akaike's penalty, to have half the weight in the mean
-)
+# deviance that noise must bring beside Akaike's penalty, to have half the weight in the mean of the models
+_AGAINST_NOISE = 6.0
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
@@ -214,7 +213,7 @@ def _mean(fits: Sequence[Fit]) -> float:
 
     Noise is penalised more than by Akaike: fitted where there is none, it doubles the error.
     """
-    costs = np.array([fit.penalised + _NOISE_COST * fit.has_noise for fit in fits])
+    costs = np.array([fit.penalised + _AGAINST_NOISE * fit.has_noise for fit in fits])
     weights = np.exp(-0.5 * (costs - costs.min()))
     return float(np.average([fit.hurst for fit in fits], weights=weights))
 

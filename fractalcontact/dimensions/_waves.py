@@ -29,10 +29,8 @@ FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 MOST = 32  # waves; more are a pattern
 _LONGEST = {1: 12.0, 2: 4.0}  # wavenumber steps: longer waves are not told from the form, by number of axes
-_FEW_WAVES, _STRONG = (
-    7.0,
-    3.0,
-)  # waves in a profile from which on those are found that exceed the limit so far
+# a longer wave of a profile is found if it runs through it so often, and is so many times above the limit
+_FEW_WAVES, _STRONG = 7.0, 3.0
 _NEIGHBOURS, _LINE = (
     13,
     5,

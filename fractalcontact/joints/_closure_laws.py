@@ -47,7 +47,7 @@ ACCEPTABLE = (
     0.05  # scatter about a law, over the range of the closures: beyond, the law does not describe them
 )
 ROUNDING = 1e-12  # of that range: a smaller residual is rounding
-ROUNDED_DIGITS = 1e-14  # of the bulk part: the interface closes by no more than rounding
+ROUNDED_DIGITS = 1e-14  # of the bulk part, from which the closure of the interface is a difference
 CURVE_POINTS = 400  # of half pressures inside an interval
 STEEPEST = 40.0  # greatest exponent of a local power law, per length of its three points in log pressure
 GREATEST_CORRECTION = 0.2  # of the logarithm of a stiffness: beyond, the closure is too uneven for a law
@@ -137,9 +137,7 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     steps, outer = interface.shape[-1], interface.dims[:-1]
     seat = None if seating_pressure is None else float(seating_pressure)
     bulk = closure["bulk_closure"].values if "bulk_closure" in closure else np.zeros(1)
-    rounding = ROUNDED_DIGITS * float(
-        np.fmax.reduce(np.abs(bulk), axis=None)
-    )  # the interface is a difference
+    rounding = ROUNDED_DIGITS * float(np.fmax.reduce(np.abs(bulk), axis=None))
     fits, flags, stiffnesses, seated = [], [], [], []
     for w, p in zip(interface.values.reshape(-1, steps), pressure.values.reshape(-1, steps), strict=True):
         counted = w if seat is None else w - closure_at(seat, p, w)
