@@ -4,11 +4,11 @@ from ._json_schema import json_schema as json_schema
 from ._paper import paper_criteria as paper_criteria
 from ._paper import paper_table as paper_table
 from ._plan import plan as plan
-from ._report import summary as summary
 from ._reproduce import reproduce as reproduce
 from ._run import run as run
 from ._scene import Scene as Scene
 from ._scene_file import load as load
+from ._summary import summary as summary
 from ._tables import tables as tables
 from ._template import template as template
 from ._validation import validate as validate

@@ -29,7 +29,7 @@ from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes._caveats import member_count, of_member
-from fractalcontact.scenes._report import Summary, compares_with_paper, summary_parts
+from fractalcontact.scenes._summary import Summary, compares_with_paper, summary_parts
 from fractalcontact.scenes._tables import tables
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -28,10 +28,10 @@ from fractalcontact.scenes._html_report import REPORT, write_report
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
-from fractalcontact.scenes._report import Summary, summary_parts, summary_text
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
+from fractalcontact.scenes._summary import Summary, summary_parts, summary_text
 from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validate
 
