@@ -43,7 +43,7 @@ from fractalcontact.dimensions._whittle import QUANTILE
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _POOR = 3.5  # z of the scatter of the blocks beyond which a model does not fit
-_LEAST_AGREEMENT = 1e-4  # probability of the levels of the octaves below which a model does not fit
+LEAST_AGREEMENT = 1e-4  # probability of the levels of the octaves below which a model does not fit
 _UNEVEN = 4.0  # -z of the mean logarithm beyond which few waves dominate
 _FIRST, _GROWTH = 14.0, 1.5  # first window in numbers of the longest wave, and ratio of successive ones
 _LEAST = 60  # modes of a window
@@ -115,7 +115,7 @@ class BlurredFit:
     @property
     def is_good(self) -> bool:
         """Whether the model agrees with the modes."""
-        return self.is_close and self.agreement > _LEAST_AGREEMENT and self.is_even
+        return self.is_close and self.agreement > LEAST_AGREEMENT and self.is_even
 
     @property
     def is_close(self) -> bool:

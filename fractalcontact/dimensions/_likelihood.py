@@ -16,13 +16,14 @@ from fractalcontact.dimensions import _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur import (
     BLUR_WINDOW,
     CLEAR,
+    LEAST_AGREEMENT,
     BlurredFit,
     blurred_estimate,
     chosen_blocks,
     fit_blurred,
     is_seen,
 )
-from fractalcontact.dimensions._blur_fit import Comparison, compare
+from fractalcontact.dimensions._blur_fit import Comparison, agreement, compare
 from fractalcontact.dimensions._exponent_by_scale import (
     frame_blocks,
     interval_of_run,
@@ -189,6 +190,8 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
         estimate, lag = _with_blur(free, comparison, blurred)
         estimate = _allowing_rounding(estimate, comparison, free)
         estimate = _or_neither(estimate, free, comparison, parts)
+    elif comparison is not None and (several := _without_aliases(free, comparison, blurred, parts)):
+        estimate, lag = several
     else:
         modes = _modes(free)
         if modes.number < LEAST_MODES:
@@ -271,10 +274,10 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
     longest = 2.0 * np.pi / float(np.sqrt(window.squares.min())) * surface.spacing[1]
     estimate = blurred_estimate(fit, surface, free.scales, fit.amplitude, longest)
     if free.is_default:
-        explained = Explanations(fit, frame_blocks(window.power, window.frame))
+        explained = Explanations.likelier(fit, window.power, window.frame)
         several = several_exponents(explained, surface)
         if several is not None:
-            return several, round(0.5 * several.scale_min / max(surface.spacing))
+            return several, _lag(several, surface)
         # blur and noise do not explain all octaves, or what they leave is no fractal
         if not (fit.is_good and fit.low < 1.0) and (run := _longest_run(free, window)):
             return run
@@ -282,6 +285,30 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
         if low < estimate.ci_low or high > estimate.ci_high:
             estimate = estimate.holding(low, high, _OR_SECOND)
     return estimate, round(_BEYOND * fit.spread)
+
+
+def _without_aliases(
+    free: _FreeEdges, comparison: Comparison, fit: BlurredFit | None, parts: Heterogeneity
+) -> tuple[Estimate, int] | None:
+    """Return the estimate of waves without aliases that have several exponents, and a lag; None otherwise.
+
+    `fit` is that of blur and noise. It is made, if it is not there, where one exponent does not agree with
+    the octaves of all modes.
+    """
+    window = comparison.window
+    if not free.is_default or parts.note or agreement(window, comparison.plain) > LEAST_AGREEMENT:
+        return None
+    fit = _blurred_fit(free, comparison) if fit is None else fit
+    if fit is None:
+        return None
+    explained = Explanations.likelier(fit, window.power, window.frame)
+    several = None if explained.has_aliases else several_exponents(explained, free.surface)
+    return None if several is None else (several, _lag(several, free.surface))
+
+
+def _lag(estimate: Estimate, surface: Surface) -> int:
+    """Return a lag inside the window of an estimate."""
+    return round(0.5 * estimate.scale_min / max(surface.spacing))
 
 
 def _or_neither(

@@ -9,7 +9,7 @@ Hurst exponents, once for each shape, and interpolated by a polynomial.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -130,6 +130,12 @@ class Frame:
         near = np.exp(-(NODES[:, None, None] + 0.5 * self.axes) * self.alias_logs)
         tails = np.array([self.tail(h, 0.0)[0] for h in NODES])
         return np.asarray(np.log(near.sum(axis=1) + tails[:, None]))
+
+    @cached_property
+    def unaliased(self) -> Frame:
+        """The same blocks of surfaces that have no waves beyond the sampling, and so no aliases."""
+        density = -(NODES[:, None] + 0.5 * self.axes) * np.log(self.squares)
+        return replace(self, logs=self.logs - self.densities + density)
 
     def tail(self, hurst: float, square: float) -> tuple[float, float, float]:
         """Return the power of far aliases under a Gaussian blur, and its derivatives by H and `square`."""

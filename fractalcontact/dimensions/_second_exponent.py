@@ -2,7 +2,8 @@
 
 Three explanations are compared by their penalised deviance: blur and noise (`_blur`), the sum of two
 fractional Brownian surfaces, and one exponent in a run of octaves with others beside it
-(`_exponent_by_scale`).
+(`_exponent_by_scale`). Several exponents are also compared with waves that have no aliases, as in a crop of a
+periodic surface: nothing beyond the sampling, and often a corner in the spectrum.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ from fractalcontact.dimensions._exponent_by_scale import (
     PowerLaw,
     Run,
     fit_power_law,
+    frame_blocks,
     interval_of_run,
     longest_run,
     octaves,
     run_estimate,
 )
-from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, node_weights
-from fractalcontact.dimensions._records import NORMAL, Estimate
+from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
+from fractalcontact.dimensions._records import NORMAL, Estimate, joined
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -42,12 +44,15 @@ _SHORTENED = 12.0  # its increase up to which they do so where blur leaves the l
 _TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two exponents
 _UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
+_AGAINST_SINGLE = 6.0  # decrease by which several exponents without aliases replace a single one
+_FAR = 30.0  # penalised deviance of a run beyond which aliases are not missing
 _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
+_NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 
 
@@ -63,12 +68,15 @@ class TwoExponents:
         Wavelength in spacings at which both have the same power.
     penalised : float
         Deviance with Akaike's penalty.
+    is_sharp : bool
+        Whether every wave has the power of the stronger surface instead of their sum.
     """
 
     rough: PowerLaw
     smooth: PowerLaw
     crossover: float
     penalised: float
+    is_sharp: bool
 
 
 @dataclass(frozen=True)
@@ -79,10 +87,48 @@ class Explanations:
     ----------
     fit : BlurredFit
     blocks : Blocks
+    has_aliases : bool
+        Whether the expected power of the blocks has aliases. Without them the second exponent may also begin
+        suddenly, at a corner of the spectrum.
+    rival : Explanations, optional
+        Those of waves without aliases, which are less likely.
     """
 
     fit: BlurredFit
     blocks: Blocks
+    has_aliases: bool = True
+    rival: Explanations | None = None
+
+    @classmethod
+    def likelier(cls, fit: BlurredFit, means: Array, frame: Frame) -> Explanations:
+        """Return those of waves with aliases, unless several exponents without aliases are likelier.
+
+        Crops of periodic surfaces have no waves beyond the sampling. `means` are the mean squares of the
+        blocks of `frame`.
+        """
+        aliased = cls(fit, frame_blocks(means, frame))
+        if not fit.is_even:
+            return aliased
+        unaliased = cls(fit, frame_blocks(means, frame.unaliased), has_aliases=False)
+        shortest = unaliased.record[0].fit
+        if shortest.low > 1.0 or shortest.high < 0.0 or unaliased.run_excess > _FAR:
+            return aliased
+        excess = np.inf if aliased.choice is None else aliased.choice[1] - _DECISIVE
+        if unaliased.choice is not None and unaliased.choice[1] < excess:
+            return unaliased
+        return replace(aliased, rival=unaliased)
+
+    @cached_property
+    def inside(self) -> Array:
+        """Blocks on which the explanations are compared: those of blur and noise, without aliases all."""
+        return self.fit.inside if self.has_aliases else np.ones(self.blocks.count.size, dtype=bool)
+
+    @cached_property
+    def reference(self) -> float:
+        """Penalised deviance of blur and noise; octaves of blocks that they leave out have their own law."""
+        parts = [octave.inside & self.inside & ~self.fit.inside for octave in self.record]
+        laws = [fit_power_law(self.blocks, part) for part in parts if np.any(part)]
+        return self.fit.penalised + 2.0 + sum(law.deviance + 4.0 for law in laws)
 
     @cached_property
     def record(self) -> list[Octave]:
@@ -98,16 +144,75 @@ class Explanations:
     @cached_property
     def two(self) -> TwoExponents | None:
         """Two exponents; None if they are not fitted, because blur and noise leave out the longest waves."""
-        return None if self.is_shortened else fit_two_exponents(self.blocks, self.fit.inside)
+        if self.has_aliases:
+            return None if self.is_shortened else fit_two_exponents(self.blocks, self.inside)
+        fits = [fit_two_exponents(self.blocks, self.inside, is_sharp=sharp) for sharp in (False, True)]
+        rough = [fit for fit in fits if fit is not None and fit.rough.hurst > _LEAST_EXPONENT]
+        return min(rough, key=lambda fit: fit.penalised, default=None)
 
     @cached_property
     def knee(self) -> Knee | None:
         """One exponent of the shorter waves, and a smaller one of the longer waves."""
-        return fit_knee(self.record, self.fit.inside)
+        return fit_knee(self.record, self.inside)
+
+    @property
+    def likely_knee(self) -> Knee | None:
+        """The knee; None with aliases if blur and noise leave out the longest waves."""
+        return None if self.is_shortened and self.has_aliases else self.knee
+
+    @cached_property
+    def run(self) -> Run:
+        """The longest run of octaves with one exponent."""
+        return longest_run(self.record)
+
+    @cached_property
+    def run_excess(self) -> float:
+        """`excess` of the run, with other exponents beside it."""
+        return self.excess(penalised_deviance(self.record, self.run, self.inside))
+
+    @cached_property
+    def single(self) -> float:
+        """`excess` of one exponent, which is among blur and noise with aliases; infinite then."""
+        if self.has_aliases:
+            return np.inf
+        return self.excess(fit_power_law(self.blocks, self.inside).deviance + 4.0)
+
+    @cached_property
+    def choice(self) -> tuple[str, float] | None:
+        """Several exponents that are likelier than blur and noise, kind and `excess`; None if none are."""
+        return self._choice(min(-_DECISIVE, self.single - _AGAINST_SINGLE))
+
+    @property
+    def possible(self) -> list[tuple[float, float]]:
+        """The interval of several exponents without aliases that are nearly as likely as blur and noise."""
+        choice = self._choice(min(_ALIKE, self.single - _ALIKE))
+        if choice is None:
+            return []
+        if choice[0] == "two" and self.two is not None:
+            half_width = min(self.two.rough.high - self.two.rough.hurst, _WIDEST)
+            return [(self.two.rough.hurst - half_width, self.two.rough.hurst + half_width)]
+        run = self.knee.run if choice[0] == "knee" and self.knee is not None else self.run
+        return [interval_of_run(run, self.record)]
+
+    def _choice(self, limit: float) -> tuple[str, float] | None:
+        two, knee, run = self.two, self.likely_knee, self.run
+        excess = np.inf if two is None else self.excess(two.penalised)
+        if two is not None and two.rough.hurst > _LEAST_EXPONENT and excess < limit:
+            return "two", excess
+        excess = np.inf if knee is None else self.excess(knee.penalised)
+        if knee is not None and LOWEST < knee.run.fit.hurst < 1.0 and excess < limit:
+            return "knee", excess
+        if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
+            return None
+        if self.has_aliases:
+            limit = _SHORTENED if self.is_shortened else limit
+        elif run.first > 0 or run.last == len(self.record):
+            return None  # only the shortest waves show that there are no aliases
+        return ("run", self.run_excess) if self.run_excess < limit else None
 
     def excess(self, penalised: float) -> float:
-        """Return a penalised deviance less that of blur and noise, which does not count the amplitude."""
-        return penalised - 2.0 - self.fit.penalised
+        """Return a penalised deviance less that of blur and noise."""
+        return penalised - self.reference
 
 
 def several_exponents(explained: Explanations, surface: Surface) -> Estimate | None:
@@ -116,28 +221,19 @@ def several_exponents(explained: Explanations, surface: Surface) -> Estimate | N
     A roll-off at long waves, or a second exponent, bends the spectrum as blur and noise do. They differ
     where blur and noise describe only the shorter waves, and in the likelihood.
     """
-    fit, record, two = explained.fit, explained.record, explained.two
-    if two is not None and two.rough.hurst > _LEAST_EXPONENT:
-        excess = explained.excess(two.penalised)
-        if excess < -_DECISIVE:
-            estimate = _two_estimate(two, record[0], explained.blocks, surface)
-            is_decided = excess < -_TWO_ALONE or not fit.is_good
-            return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
-    knee = None if explained.is_shortened else explained.knee
-    if knee is not None and LOWEST < knee.run.fit.hurst < 1.0:
-        excess = explained.excess(knee.penalised)
-        if excess < -_DECISIVE:
-            estimate = _knee_estimate(knee, record, surface)
-            is_decided = excess < -_UNDECIDED or not fit.is_good
-            return estimate if is_decided else estimate.holding(fit.low, fit.high, _OR_NOISE)
-    run = longest_run(record)
-    if run.last - run.first < 2 or not LOWEST < run.fit.hurst < 1.0:
+    if explained.choice is None:
         return None
-    excess = explained.excess(penalised_deviance(record, run, fit.inside))
-    if excess >= (_SHORTENED if explained.is_shortened else -_DECISIVE):
-        return None
-    estimate = run_estimate(run, surface)
-    if not (fit.is_good and excess > -_UNDECIDED):
+    kind, excess = explained.choice
+    fit, two, knee = explained.fit, explained.two, explained.knee
+    if kind == "two" and two is not None:
+        estimate = _two_estimate(two, explained.record[0], explained.blocks, surface)
+    elif kind == "knee" and knee is not None:
+        estimate = _knee_estimate(knee, explained.record, surface)
+    else:
+        estimate = run_estimate(explained.run, surface)
+    if not explained.has_aliases:
+        estimate = replace(estimate, note=joined(estimate.note, _NO_ALIASES))
+    if not fit.is_good or excess < (-_TWO_ALONE if kind == "two" else -_UNDECIDED):
         return estimate
     return estimate.holding(fit.low if fit.low > LOWEST else 0.0, fit.high, _OR_NOISE)
 
@@ -158,6 +254,8 @@ def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, floa
         ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
     if knee is not None and explained.excess(knee.penalised) < _ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
+    if explained.rival is not None:
+        ranges += explained.rival.possible
     if has_second or not is_bent:
         shortest = explained.record[0].fit
         ranges.append((shortest.low, shortest.high))
@@ -241,15 +339,16 @@ def _two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: 
         scale_max=two.crossover * dx,
         window=_TWO_WINDOW,
         note=f"two exponents: {rough.hurst:.2f} of waves shorter than {two.crossover * dx:.3g} m, and "
-        f"{smooth.hurst:.2f} [{smooth.low:.2f}, {smooth.high:.2f}] of longer ones, as in a sum of two "
-        "surfaces (see `scaling`)",
+        f"{smooth.hurst:.2f} [{smooth.low:.2f}, {smooth.high:.2f}] of longer ones"
+        f"{'' if two.is_sharp else ', as in a sum of two surfaces'} (see `scaling`)",
     )
 
 
-def fit_two_exponents(blocks: Blocks, inside: Array) -> TwoExponents | None:
+def fit_two_exponents(blocks: Blocks, inside: Array, *, is_sharp: bool = False) -> TwoExponents | None:
     """Fit the sum of two fractional Brownian surfaces to some blocks; None without a crossover in them.
 
-    The exponents and the wavenumber at which both have the same power are found by damped scoring.
+    The exponents and the wavenumber at which both have the same power are found by damped scoring. With
+    `is_sharp` every wave has the power of the stronger one instead of their sum.
     """
     if blocks.frame is None:
         return None
@@ -258,7 +357,7 @@ def fit_two_exponents(blocks: Blocks, inside: Array) -> TwoExponents | None:
     modes, best = float(count.sum()), None
     for place in (0.25, 0.5, 0.75):
         start = np.array([0.3, 0.8, (1.0 - place) * waves.min() + place * waves.max()])
-        fit = _scored(logs, power, count, waves, start)
+        fit = _scored(logs, power, count, waves, start, is_sharp=is_sharp)
         if best is None or fit[0] < best[0]:
             best = fit
     if best is None:
@@ -271,11 +370,12 @@ def fit_two_exponents(blocks: Blocks, inside: Array) -> TwoExponents | None:
         PowerLaw(float(hurst), float(hurst - error), float(hurst + error), modes, deviance)
         for hurst, error in zip((rough, smooth), errors[:2], strict=True)
     ]
-    return TwoExponents(laws[0], laws[1], float(2.0 * np.pi / np.exp(crossing)), deviance + 2.0 * 4)
+    crossover = float(2.0 * np.pi / np.exp(crossing))
+    return TwoExponents(laws[0], laws[1], crossover, deviance + 2.0 * 4, is_sharp)
 
 
 def _scored(
-    logs: Array, power: Array, count: Array, waves: Array, values: Array
+    logs: Array, power: Array, count: Array, waves: Array, values: Array, *, is_sharp: bool
 ) -> tuple[float, Array, Array]:
     """Return deviance, parameters (both exponents, logarithm of the crossover) and information.
 
@@ -289,8 +389,9 @@ def _scored(
         at = np.argmin(np.abs(waves - values[2]))
         # both powers are equal at the wavenumber; there they fall as q^(-2 H - axes)
         shift = first[at] - second[at] + 2.0 * (values[1] - values[0]) * (values[2] - waves[at])
-        total = np.logaddexp(first, second + shift)
-        share = np.exp(second + shift - total)
+        second = second + shift
+        total = np.maximum(first, second) if is_sharp else np.logaddexp(first, second)
+        share = np.where(second > first, 1.0, 0.0) if is_sharp else np.exp(second - total)
         ratio = np.exp(np.log(np.maximum(power, 1e-300)) - total)
         level = float(np.sum(count * ratio) / modes)
         columns = np.stack(

@@ -121,18 +121,26 @@ def broken(short, long, corner, rng, n):
     return np.fft.ifft2(white * np.sqrt(power)).real[:n, :n]
 
 
-@pytest.mark.parametrize(
-    ("short", "long", "corner", "n"), [(1.3, 0.3, 20, 400), (0.8, 0.3, 16, 800), (1.5, 0.5, 40, 400)]
-)
-def test_blur_that_does_not_fit_gives_way_to_the_window(short, long, corner, n):
-    """Once 1.2 without an interval, and 0.738 [0.727, 0.750], with blur and noise "in the model"."""
-    surface = fc.surfaces.from_array(STEP * broken(short, long, corner, 5 if n == 800 else 4, n), SPACING)
+@pytest.mark.parametrize(("short", "long", "corner"), [(1.3, 0.3, 20), (1.5, 0.5, 40)])
+def test_blur_that_does_not_fit_gives_way_to_the_window(short, long, corner):
+    """Once 1.2 without an interval."""
+    surface = fc.surfaces.from_array(STEP * broken(short, long, corner, 4, 400), SPACING)
     result = fc.dimensions.estimate(surface).isel(method=0)
     assert "the longest run of octaves" in result.hurst.attrs["comment"]
     assert float(result.scale_min) >= 0.5 * corner * SPACING
     # a corner inside an octave, and few long waves: the interval holds those of the run without an octave
     assert float(result.ci_low) - 0.06 < long < float(result.ci_high) + 0.06
     assert float(result.ci_high - result.ci_low) < 0.65
+
+
+def test_large_crop_has_the_exponent_of_the_shorter_waves_and_that_of_the_longer():
+    """Once 0.738 [0.727, 0.750] for 0.8, with blur and noise "in the model"."""
+    result = fc.dimensions.estimate(fc.surfaces.from_array(STEP * broken(0.8, 0.3, 16, 5, 800), SPACING))
+    result = result.isel(method=0)
+    assert float(result.ci_low) < 0.8 < float(result.ci_high)
+    assert float(result.ci_high - result.ci_low) < 0.02
+    assert float(result.scale_max) == pytest.approx(16 * SPACING, rel=0.01)
+    assert "0.30 [0.26, 0.33] that of longer ones" in result.hurst.attrs["comment"]
 
 
 def test_land_surface_is_answered_with_its_window():
@@ -170,6 +178,32 @@ def test_smooth_short_waves_on_rough_long_ones():
         inside += bool(result.ci_low[0] <= 0.8 <= result.ci_high[0])
         assert float(result.ci_high[0] - result.ci_low[0]) < 0.6
     assert inside >= 10  # measured: .96 of 50
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_crop_with_a_rolloff_has_the_exponent_of_the_shorter_waves(hurst):
+    """Once .15 for .3 and .51 for .7, as a band limit with noise, in 28 of 30."""
+    inside, widths = 0, []
+    for rng in range(4):
+        surface = fc.surfaces.from_array(STEP * broken(hurst, -1.0, 10, rng, 160), SPACING)
+        result = fc.dimensions.estimate(surface).isel(method=0)
+        inside += bool(result.ci_low <= hurst <= result.ci_high)
+        assert float(result.hurst) == pytest.approx(hurst, abs=0.04)
+        widths.append(float(result.ci_high - result.ci_low))
+        assert "no waves beyond the sampling" in result.hurst.attrs["comment"]
+    assert inside >= 3
+    assert np.median(widths) < 0.2
+
+
+def test_crop_with_two_exponents_has_that_of_the_shorter_waves():
+    """Once .43 for .3, as a band limit with noise, in 30 of 30."""
+    inside = 0
+    for rng in range(4):
+        surface = fc.surfaces.from_array(STEP * broken(0.3, 0.8, 16, rng, 160), SPACING)
+        result = fc.dimensions.estimate(surface).isel(method=0)
+        inside += bool(result.ci_low <= 0.3 <= result.ci_high)
+        assert float(result.ci_high - result.ci_low) < 0.2
+    assert inside >= 3
 
 
 @pytest.mark.parametrize("rng", [0, 1])
