@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ _LEAST = 12  # modes of an octave
 _STEPS, _LONGEST_STEP = 60, 0.5
 _LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
 _FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
+_WITHOUT_ALIASES = 10.0  # decrease of the deviance from which a surface has no aliases
 _RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
 _NAMES = (
     "hurst",
@@ -80,7 +81,8 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     Whittle's likelihood of the cosine modes, as in `estimate`. A run is accepted if the likelihood ratio
     against separate exponents and amplitudes of its octaves is below the 99.7 % quantile of chi square.
     Beside other octaves its interval also holds that of the run without the octave there, as a blur ends
-    gradually.
+    gradually. Waves beyond the sampling are in the model of a surface with free edges, as aliases, unless the
+    two shortest octaves have one exponent only without them, as in a crop of a periodic surface.
 
     Examples
     --------
@@ -91,7 +93,7 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     (True, 0.7)
     """
     surfaces = read_surfaces(surface)
-    records = [octaves(blocks_of(single)) for single in surfaces]
+    records = [octaves(with_or_without_aliases(blocks_of(single))) for single in surfaces]
     runs = [longest_run(record) for record in records]
     intervals = [interval_of_run(run, record) for run, record in zip(runs, records, strict=True)]
     spacing = surfaces[0].spacing[1]
@@ -218,6 +220,36 @@ def frame_blocks(means: Array, frame: Frame) -> Blocks:
     return Blocks(means, frame.count, 2.0 * np.pi / np.sqrt(frame.squares), frame, frame.axes)
 
 
+def with_or_without_aliases(blocks: Blocks) -> Blocks:
+    """Return blocks without aliases where the two shortest octaves have one exponent only then.
+
+    So it is in crops of periodic surfaces, which have no waves beyond the sampling.
+    """
+    if blocks.frame is None:
+        return blocks
+    unaliased = frame_blocks(blocks.power, blocks.frame.unaliased)
+    shortest = octaves(unaliased)[:2]
+    if len(shortest) < 2:
+        return blocks
+    inside = shortest[0].inside | shortest[1].inside
+    fit = fit_power_law(unaliased, inside)
+    if fit.deviance > fit_power_law(blocks, inside).deviance - _WITHOUT_ALIASES or fit.hurst < _LEAST_HURST:
+        return blocks
+    return unaliased if has_one_exponent(shortest, fit) else blocks
+
+
+def window_of(blocks: Blocks, inside: Array) -> Run | None:
+    """Return the exponent of some blocks, of one or several octaves; None if no one fits them."""
+    parts = [replace(octave, inside=octave.inside & inside) for octave in octaves(blocks)]
+    parts = [part for part in parts if blocks.count[part.inside].sum() >= _LEAST]
+    run = [replace(part, fit=fit_power_law(blocks, part.inside)) for part in parts]
+    fit = fit_power_law(blocks, inside)
+    if not run or not has_one_exponent(run, fit):
+        return None
+    wavelength = blocks.wavelength[inside]
+    return Run(0, len(run), float(wavelength.min()), float(wavelength.max()), fit)
+
+
 def _periodic(surface: Surface) -> tuple[Array, Array, Array]:
     """Return the mean power, the number of modes and the wavelength of every ring of a periodic surface."""
     from fractalcontact.dimensions._periodic_modes import PeriodicModes
@@ -276,8 +308,6 @@ def fit_power_law(blocks: Blocks, inside: Array) -> PowerLaw:
 
 def longest_run(record: Sequence[Octave]) -> Run:
     """Return the longest run of octaves that one exponent of a fractal fits; of equal ones the surest."""
-    from scipy.special import chdtrc
-
     best, width = None, 0
     for first in range(len(record)):
         for last in range(first + 1, len(record) + 1):
@@ -285,16 +315,22 @@ def longest_run(record: Sequence[Octave]) -> Run:
             if len(run) < max(width, min(2, len(record))):
                 continue
             fit = _joint_fit(run)
-            ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
-            fits = len(run) == 1 or chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM
             is_fractal = fit.hurst > _LEAST_HURST and fit.low < 1.0
-            if not fits or not is_fractal:
+            if not is_fractal or not has_one_exponent(run, fit):
                 continue
             if best is None or len(run) > width or fit.modes > best.fit.modes:
                 best, width = Run(first, last, run[0].low, run[-1].high, fit), len(run)
     if best is None:
         return Run(0, 0, np.nan, np.nan, PowerLaw(np.nan, np.nan, np.nan, 0.0, np.nan))
     return best
+
+
+def has_one_exponent(run: Sequence[Octave], fit: PowerLaw) -> bool:
+    """Return whether the joint fit of some octaves is not rejected against their own exponents."""
+    from scipy.special import chdtrc
+
+    ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
+    return len(run) == 1 or bool(chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM)
 
 
 def interval_of_run(run: Run, record: Sequence[Octave]) -> tuple[float, float]:

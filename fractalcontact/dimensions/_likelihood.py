@@ -30,6 +30,8 @@ from fractalcontact.dimensions._exponent_by_scale import (
     longest_run,
     octaves,
     run_estimate,
+    window_of,
+    with_or_without_aliases,
 )
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
 from fractalcontact.dimensions._increment_moments import Moments, increment_moments
@@ -47,7 +49,13 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._second_exponent import Explanations, alternatives, fit_knee, several_exponents
+from fractalcontact.dimensions._second_exponent import (
+    NO_ALIASES,
+    Explanations,
+    alternatives,
+    fit_knee,
+    several_exponents,
+)
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import Window
 from fractalcontact.dimensions._waves import without_waves
@@ -178,6 +186,8 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     compared_parts = cache(lambda hurst, stride: heterogeneity(moments(stride), spacing, hurst))
     free = _FreeEdges(surface, heights, power, scales, noise, spread, _pilot(moments(1), spacing))
     stride = _stride(scales, max(surface.spacing))
+    if window := _window_without_aliases(free):
+        return window
     comparison, blurred = _comparison(free), None
     if comparison is not None:
         hurst = comparison.plain.hurst
@@ -304,6 +314,24 @@ def _without_aliases(
     explained = Explanations.likelier(fit, window.power, window.frame)
     several = None if explained.has_aliases else several_exponents(explained, free.surface)
     return None if several is None else (several, _lag(several, free.surface))
+
+
+def _window_without_aliases(free: _FreeEdges) -> Estimate | None:
+    """Return the estimate of a given window of a surface without aliases, if one exponent fits it."""
+    if free.scales is None or free.power is None or free.surface.finest_scale:
+        return None
+    if free.noise or free.spread is not None:
+        return None
+    frame = _mode_blocks.frame(free.heights.shape, free.surface.plane_spacing)
+    inside = chosen_blocks(frame, free.surface, free.scales)
+    blocks = frame_blocks(frame.mean(free.power), frame)
+    unaliased = with_or_without_aliases(blocks)
+    if unaliased is blocks or frame.count[inside].sum() < LEAST_MODES:
+        return None
+    run = window_of(unaliased, inside)
+    if run is None:
+        return None
+    return replace(run_estimate(run, free.surface), window=ASKED, note=NO_ALIASES)
 
 
 def _lag(estimate: Estimate, surface: Surface) -> int:

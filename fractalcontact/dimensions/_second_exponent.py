@@ -52,7 +52,7 @@ _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; mo
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
-_NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
+NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 
 
@@ -232,7 +232,7 @@ def several_exponents(explained: Explanations, surface: Surface) -> Estimate | N
     else:
         estimate = run_estimate(explained.run, surface)
     if not explained.has_aliases:
-        estimate = replace(estimate, note=joined(estimate.note, _NO_ALIASES))
+        estimate = replace(estimate, note=joined(estimate.note, NO_ALIASES))
     if not fit.is_good or excess < (-_TWO_ALONE if kind == "two" else -_UNDECIDED):
         return estimate
     return estimate.holding(fit.low if fit.low > LOWEST else 0.0, fit.high, _OR_NOISE)

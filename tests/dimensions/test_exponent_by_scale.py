@@ -52,6 +52,21 @@ def test_periodic_surface_with_rolloff():
     assert float(result.scale_max) == pytest.approx(32 * SPACING, rel=0.01)
 
 
+def test_crop_of_a_periodic_surface_is_measured_without_aliases():
+    """Once .9 for .3 in the shortest octave, and .37 for .3 in a window from 3 spacings on."""
+    whole = fc.surfaces.spectral(
+        (320, 320), SPACING, hurst=0.3, rms_height=1e-6, rolloff=20 * SPACING, rng=2, members=4
+    )
+    crops = fc.surfaces.from_array(whole.values[:, :160, :160], SPACING)
+    result = fc.dimensions.scaling(crops)
+    assert (result.in_window[:, :2]).all()
+    assert ((result.ci_low < 0.3) & (result.ci_high > 0.3))[:, :2].mean() > 0.7
+    window = fc.dimensions.estimate(crops, scales=(3 * SPACING, 16 * SPACING)).isel(method=0)
+    assert ((window.ci_low < 0.3) & (window.ci_high > 0.3)).sum() >= 3
+    assert float((window.ci_high - window.ci_low).max()) < 0.1
+    assert "no waves beyond the sampling" in window.hurst.attrs["comment"]
+
+
 @pytest.mark.parametrize("tilt", [0.0, 1e-6])
 def test_profile_is_not_changed_by_a_tilt(tilt):
     heights = brownian(0.5, 1e-6, 2, (1000,))
