@@ -24,7 +24,6 @@ from fractalcontact.dimensions._anisotropy import (
     fit_anisotropy,
 )
 from fractalcontact.dimensions._blur import CLEAR, fit_blurred
-from fractalcontact.dimensions._exponent_by_scale import frame_blocks
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
 from fractalcontact.dimensions._records import (
@@ -302,7 +301,7 @@ class _Instrument:
         if fit is None or not (fit.is_good and fit.gain > CLEAR[2] and fit.hurst < 1.0):
             return None
         means = frame.mean(power)
-        if several_exponents(Explanations(fit, frame_blocks(means, frame)), surface) is not None:
+        if several_exponents(Explanations.likelier(fit, means, frame), surface) is not None:
             return None
         every = Window(frame, np.ones(frame.count.size, dtype=bool), means)
         sharp, blurred = (every.signal(form, fit.hurst, fit.spread**2)[0] for form in (NONE, fit.form))
