@@ -179,8 +179,12 @@ class Explanations:
 
     @cached_property
     def choice(self) -> tuple[str, float] | None:
-        """Several exponents that are likelier than blur and noise, kind and `excess`; None if none are."""
-        return self._choice(min(-_DECISIVE, self.single - _AGAINST_SINGLE))
+        """Several exponents that are likelier than blur and noise, kind and `excess`; None if none are.
+
+        Without aliases they may be a little less likely where blur and noise leave the longest waves out.
+        """
+        limit = -_DECISIVE if self.has_aliases or not self.is_shortened else _ALIKE
+        return self._choice(min(limit, self.single - _AGAINST_SINGLE))
 
     @property
     def possible(self) -> list[tuple[float, float]]:
