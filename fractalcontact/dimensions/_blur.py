@@ -51,8 +51,10 @@ _WIDE = 1.1  # squared spread beyond which the forms do not differ
 _EDGE = 0.07  # share of the power of the edges beyond which a mode is left out
 _OCTAVES, _WEAK = 5, 3.0  # longest octaves compared with a fit, and -z beyond which they are too weak
 _WHITE = 0.5  # share of the waves below the noise that the edges must not disturb
-# deviance that noise must bring beside Akaike's penalty, to have half the weight in the mean of the models
+# deviance that noise must bring beside Akaike's penalty, to have half the weight in the mean of the models;
+# that of weak noise, up to a rms height over the rms increment, is not penalised, and below the least is none
 _AGAINST_NOISE = 6.0
+_WEAK_NOISE, _LEAST_NOISE = 0.06, 0.005
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
@@ -183,7 +185,7 @@ def fit_blurred(
         if fit.has_noise and excess < limit:
             ends = _blur_fit.interval(window, fit, limit - excess)
             low, high = min(low, ends[0]), max(high, ends[1])
-    hurst = _mean(fits)
+    hurst = _mean(window, fits)
     at_mean = _blur_fit.fit(window, best, hurst=hurst)
     plain = [fit.penalised for fit in fits if fit.form == NONE and fit.has_noise == noise]
     return BlurredFit(
@@ -208,14 +210,33 @@ def fit_blurred(
     )
 
 
-def _mean(fits: Sequence[Fit]) -> float:
+def _mean(window: Window, fits: Sequence[Fit]) -> float:
     """Return the mean exponent of some models, weighted by their likelihood.
 
-    Noise is penalised more than by Akaike: fitted where there is none, it doubles the error.
+    Noise is penalised more than by Akaike: fitted where there is none, it doubles the error. Weak noise does
+    less harm, left out or put in, and few instruments have none: it is in the mean without a penalty.
     """
-    costs = np.array([fit.penalised + _AGAINST_NOISE * fit.has_noise for fit in fits])
-    weights = np.exp(-0.5 * (costs - costs.min()))
-    return float(np.average([fit.hurst for fit in fits], weights=weights))
+    quiet = {fit.form: fit for fit in fits if not fit.has_noise}
+    hursts = [fit.hurst for fit in fits]
+    costs = [fit.penalised + _AGAINST_NOISE * fit.has_noise for fit in fits]
+    for noisy in fits:
+        if noisy.has_noise and noisy.form in quiet:
+            weak = _with_weak_noise(window, noisy, quiet[noisy.form])
+            hursts.append(weak.hurst)
+            costs.append(weak.deviance + quiet[noisy.form].penalised - quiet[noisy.form].deviance)
+    weights = np.exp(-0.5 * (np.array(costs) - min(costs)))
+    return float(np.average(hursts, weights=weights))
+
+
+def _with_weak_noise(window: Window, noisy: Fit, quiet: Fit) -> Fit:
+    """Return the fit of at most weak noise; that without noise where none is found."""
+    unit = 2.0 / max(1.0 - noisy.hurst, _WEAK_NOISE)  # power of noise of one rms increment
+    if noisy.noise < unit * _LEAST_NOISE**2:
+        return quiet
+    most = unit * _WEAK_NOISE**2
+    if noisy.noise <= most:
+        return noisy
+    return _blur_fit.fit(window, replace(noisy, noise=most, most_noise=most))
 
 
 def chosen_blocks(frame: Frame, surface: Surface, scales: Scales) -> Array:

@@ -21,6 +21,7 @@ _MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges mat
 NARROW = 0.03  # squared spread below which the jump does not matter
 _COST, _NOISE_COST = 5.0, 1.0  # deviance of blur and of noise in the interval where neither is seen
 _LARGEST = 200.0  # squared spread
+_FILTERED = 0.15  # least squared spread to start a filter from: it is flat at 0, where points have no weight
 _ENDS = 6  # steps to an end of an interval
 _NO_NOISE = 1e-4  # share of every mode below which noise is as good as none
 _STEPS, _TRIES, _DAMPING = 25, 8, 1e-3
@@ -82,6 +83,8 @@ def fit(window: Window, start: Fit, form: str = "", hurst: float | None = None) 
     """Fit one model from a start by damped scoring steps; at a given exponent, if there is one."""
     form = form or start.form
     square = 0.0 if form == NONE else start.square if start.known is None else start.known
+    if form == FILTER != start.form and start.known is None:
+        square = max(square, _FILTERED)
     values = np.array([start.hurst if hurst is None else hurst, square, start.noise])
     free = np.array([hurst is None, form != NONE and start.known is None, start.has_noise])
     low, high = np.array([LOWEST, 0.0, 0.0]), np.array([HIGHEST, _LARGEST, start.most_noise])

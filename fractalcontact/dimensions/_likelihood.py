@@ -68,8 +68,9 @@ from fractalcontact.dimensions._whittle import (
 Array = np.ndarray[Any, np.dtype[Any]]
 SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 
-_PLAIN = 10.0  # decrease of the penalised deviance at which blur and noise are as likely as neither
-_DOUBT = 4.4  # difference from it below which both have more than a tenth of the weight
+_PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are taken, if one is to be
+_DOUBT = 4.4  # below it, from which on the interval holds blur and noise beside neither
+_EVEN = 13.0  # decrease at which both have half the weight in their mean; neither a tenth 4.4 above
 _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # misfits below and above which the interval of a surface allows for blur, noise and a second exponent: noise
 # and a rougher second surface make it positive, and are harder to see than a blur
@@ -344,13 +345,14 @@ def _or_neither(
 ) -> Estimate:
     """Return the mean of an estimate with blur or noise and that with neither, where both are likely."""
     gain = comparison.gain / parts.widening**2
-    if not free.is_default or abs(gain - _PLAIN) > _DOUBT or comparison.plain.hurst >= 1.0:
+    is_doubtful = _PLAIN - _DOUBT <= gain <= _EVEN + _DOUBT
+    if not (free.is_default and is_doubtful) or comparison.plain.hurst >= 1.0:
         return estimate
     modes = _modes(free)
     fit = modes.fit(free.pilot, noise=False)
     neither = _without_blur(free, modes, fit, parts, comparison, is_even=True)[0]
     if estimate.window == BLUR_WINDOW and neither.window == _FREE_WINDOW:
-        share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _PLAIN))))
+        share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _EVEN))))
         if share > 0.5:
             return neither.averaged(estimate, 1.0 - share, _OR_PLAIN)
         return estimate.averaged(neither, share, _OR_PLAIN)
