@@ -34,6 +34,7 @@ from fractalcontact.dimensions._transfer_functions import (
     FORMS,
     NONE,
     TRANSFER,
+    Edges,
     Window,
     edge_power,
     plain_power,
@@ -381,10 +382,12 @@ class _Search:
         inside &= edges * signal < _EDGE * (signal + noise)
         if not fit.has_noise:
             inside &= fit.square * squares < _FALL
+        # the edges fall less than the surface; without noise the window ends where they matter
+        jump = Edges.of(self.frame, fit.hurst, fit.square) if fit.has_noise else edges
         # the blur may have been reflected at the edges, as by most filters, or go on beyond them
         plain, with_edges = (
             Window(self.frame, inside, self.power),
-            Window(self.frame, inside, self.power, edges),
+            Window(self.frame, inside, self.power, jump),
         )
         if plain.count.sum() < _LEAST:
             return plain

@@ -9,6 +9,7 @@ whole points (`FILTER`), or with the Gaussian transfer function itself (`TRANSFE
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -29,21 +30,24 @@ FORMS = {
 _NO_ALIASES = 0.1  # squared spread beyond which far aliases do not matter
 _MOST_MEAN = 1.0  # logarithm of a mean over its centre, beyond which nothing of the power is left
 _LEAST_LOG = -600.0  # logarithm of the smallest expected power
+_LEAST_JUMP = 1e-260  # of the slope at the edges: its smallest power
+_STEP = 0.05  # of the exponent, and relative one of the squared spread, between powers of the jump
 
 
 class Window:
     """Blocks of a window with what the models need of them.
 
-    `edges` is the power of the jump of the slope at the edges, over that of the surface, by blocks of the
-    frame.
+    `edges` is the power of the jump of the slope at the edges, by blocks of the frame: as it depends on the
+    exponent and the spread, or in a fixed ratio to that of the blurred surface.
     """
 
-    def __init__(self, frame: Frame, inside: Array, power: Array, edges: Array | None = None) -> None:
+    def __init__(self, frame: Frame, inside: Array, power: Array, edges: Edges | Array | None = None) -> None:
         self.frame, self.inside = frame, inside
         self.count, self.power = frame.count[inside], power[inside]
         self.number = float(self.count.sum())
         self.logs, self.squares = frame.logs[:, inside], frame.squares[inside]
-        self.edges = None if edges is None else np.log1p(edges[inside])
+        self.edges = edges.part(inside) if isinstance(edges, Edges) else None
+        self.ratio = np.log1p(edges[inside]) if isinstance(edges, np.ndarray) else None
         self._parts: dict[str, Array] = {}
 
     def part(self, name: str) -> Array:
@@ -67,7 +71,7 @@ class Window:
     def signal(self, form: str, hurst: float, square: float) -> tuple[Array, Array, Array]:
         """Return the expected power without noise, and the derivatives of its logarithm by H and `square`."""
         value, slope = node_weights(hurst)
-        logs, by_hurst = value @ self.logs, slope @ self.logs
+        logs, by_hurst = plain, plain_hurst = value @ self.logs, slope @ self.logs
         by_square: Array = np.zeros(logs.size)
         if form == TRANSFER:
             logs, by_square = logs - square * self.squares, -self.squares
@@ -78,11 +82,16 @@ class Window:
             density, density_slope = value @ self.part("densities"), slope @ self.part("densities")
             ratio, ratio_hurst, by_square = self._unaliased(form, hurst, square)
             logs, by_hurst = logs + ratio - density, by_hurst + ratio_hurst - density_slope
-        if self.edges is not None and form != NONE:
-            logs = logs + self.edges
+        if self.ratio is not None and form != NONE:
+            logs = logs + self.ratio
         if form != NONE:
             mean, mean_hurst, mean_square = self._mean_in_blocks(hurst, square)
             logs, by_hurst, by_square = logs + mean, by_hurst + mean_hurst, by_square + mean_square
+        if self.edges is not None and form != NONE:
+            total = np.logaddexp(logs, plain + self.edges.logs(hurst, square))
+            share = np.exp(logs - total)
+            by_hurst = share * by_hurst + (1.0 - share) * (plain_hurst + self.edges.by_hurst)
+            logs, by_square = total, share * by_square + (1.0 - share) * self.edges.by_square
         return np.exp(np.clip(logs, _LEAST_LOG, -_LEAST_LOG)), by_hurst, by_square
 
     def _mean_in_blocks(self, hurst: float, square: float) -> tuple[Array, Array, Array]:
@@ -130,8 +139,54 @@ class Window:
             yield 2.0 * np.log(np.abs(transfer))[index], (2.0 * rate / transfer / spacing**2)[index]
 
 
+@dataclass(frozen=True)
+class Edges:
+    """Power of the jump of the slope at the edges, over that of the surface before the blur, by blocks.
+
+    The logarithm is nearly linear in the exponent and in the squared spread.
+
+    Attributes
+    ----------
+    hurst, square : float
+        Where the power is exact.
+    log, by_hurst, by_square : ndarray, shape (blocks,)
+        Its logarithm there, and derivatives.
+    """
+
+    hurst: float
+    square: float
+    log: Array
+    by_hurst: Array
+    by_square: Array
+
+    @classmethod
+    def of(cls, frame: Frame, hurst: float, square: float) -> Edges:
+        """Return the power near an exponent and a squared spread."""
+        step, wider = _STEP, _STEP * square
+        here = np.log(_jump(frame, hurst, square))
+        by_hurst = (np.log(_jump(frame, hurst + step, square)) - here) / step
+        return cls(
+            hurst, square, here, by_hurst, (np.log(_jump(frame, hurst, square + wider)) - here) / wider
+        )
+
+    def part(self, inside: Array) -> Edges:
+        """Return some of the blocks."""
+        log, by_hurst, by_square = (a[inside] for a in (self.log, self.by_hurst, self.by_square))
+        return Edges(self.hurst, self.square, log, by_hurst, by_square)
+
+    def logs(self, hurst: float, square: float) -> Array:
+        """Return the logarithm of the power."""
+        change = (hurst - self.hurst) * self.by_hurst + (square - self.square) * self.by_square
+        return np.asarray(self.log + change)
+
+
 def edge_power(frame: Frame, hurst: float, square: float) -> Array:
-    """Return the power of the jump of the slope at the edges, over that of the blurred surface.
+    """Return the power of the jump of the slope at the edges, over that of the blurred surface."""
+    return np.asarray(_jump(frame, hurst, square) * np.exp(np.minimum(square * frame.squares, -_LEAST_LOG)))
+
+
+def _jump(frame: Frame, hurst: float, square: float) -> Array:
+    """Return the power of the jump of the slope at the edges, over that of the surface before the blur.
 
     Reflected at an edge, heights of slope g have modes of the power 4 <g^2> / (n q^4) along the normal.
     <g^2> of the waves of one wavenumber along the edge is an integral of the spectral density over those
@@ -139,8 +194,7 @@ def edge_power(frame: Frame, hurst: float, square: float) -> Array:
     """
     p = np.exp(np.linspace(-6.0, np.log(np.pi), 240))
     power = hurst + 0.5 * frame.axes
-    signal = frame.squares**-power * np.exp(-np.minimum(square * frame.squares, 600.0))
-    total = np.zeros_like(signal)
+    total = np.zeros(frame.squares.size)
     for axis, (n, d) in enumerate(zip(frame.shape, frame.spacing, strict=True)):
         across = frame.waves[axis]
         along, index = (
@@ -149,7 +203,7 @@ def edge_power(frame: Frame, hurst: float, square: float) -> Array:
         radius = p**2 + along[:, None] ** 2
         slopes = np.trapezoid(p**2 * radius**-power * np.exp(-square * radius), p, axis=1) / np.pi
         total += 4.0 * slopes[index] / (n * d * across**4) * -np.expm1(-square * across**2)
-    return np.asarray(total / signal)
+    return np.asarray(np.maximum(total * frame.squares**power, _LEAST_JUMP))
 
 
 def plain_power(frame: Frame, hurst: float) -> Array:
