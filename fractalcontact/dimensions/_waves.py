@@ -1,8 +1,7 @@
 """Single waves of a surface, such as machining marks: found in the spectrum, named and removed.
 
-A mode of a Gaussian surface over the mean of its neighbours is an exponential number; a single wave stands
-far above them. This is the test of Fisher (1929) with the mean of the ring of equal wavenumber, corrected by
-that of the modes around, in place of the mean of all modes: the spectrum may have any form, and a lay.
+Strong waves are found in any surface by the modes around them (`_wave_peaks`), faint ones in a surface whose
+modes follow a smooth spectrum (`_faint_waves`).
 """
 
 from __future__ import annotations
@@ -14,42 +13,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base import fft
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._faint_waves import WhiteSurface
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._wave_peaks import LONGEST, tapered_peaks
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along an axis
-FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 MOST = 32  # waves; more are a pattern
-_LONGEST = {1: 12.0, 2: 4.0}  # wavenumber steps: longer waves are not told from the form, by number of axes
-# a longer wave of a profile is found if it runs through it so often, and is so many times above the limit
-_FEW_WAVES, _STRONG = 7.0, 3.0
-_NEIGHBOURS, _LINE = (
-    13,
-    5,
-)  # edges of the squares of modes around one: its neighbours, and itself with its taper
-_ALONG = 41  # neighbours of a mode of a profile
-_RADIAL = np.arange(
-    3, 13
-)  # modes from one along the ray through it that are compared with it, on either side
-_ABOVE_RAY = 15.0  # times their mean: a step or ridges put much power on a ray, and no wave
-_LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
-_CLIPPED = 8.0  # times the mean: neighbours count up to here, for there may be other waves
-_FREEDOM = {1: 9.0, 2: 30.0}  # independent neighbours, by the number of axes; fewer than modes, for the taper
-_ROUNDS, _PASSES = 3, 3
-_ROUNDING = 1e-22  # of the strongest mode
+_ROUNDS = 3
 _LEFT = 0.05  # of the mean square increment, below which many waves are all there is
 _NONE_LEFT = 1e-8
 _NAMED = 3  # waves in a note
 _MULTIPLES = 12  # of a wave that are looked for at their own places
-_MULTIPLE_WIDTH, _LEAST_RAY = 2.0, 5  # modes beside a multiple that it changes, and modes that must be left
+_DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
 _FEW = 3
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
@@ -178,12 +161,12 @@ def find_waves(surface: Surface) -> list[Wave]:
     )
     is_periodic = all(surface.grid.periodic) and max(heights.shape) <= LARGEST_CROP
     found: list[Wave] = []
+    part = without_trend(heights[window], plane=not is_periodic)
     for _ in range(_ROUNDS):
-        part = without_trend(heights[window], plane=not is_periodic)
         tapers = [window_weights(n, None if is_periodic or n == 1 else "hann") for n in part.shape]
         multiples = _multiples(found, part.shape, surface.axes)
         tapered = part * tapers[0][:, None] * tapers[1]
-        peaks = _peaks(tapered, surface.plane_spacing, surface.axes, multiples)
+        peaks = tapered_peaks(tapered, surface.plane_spacing, surface.axes, multiples)
         if len(found) + len(peaks) > MOST:
             return []
         new = [
@@ -193,7 +176,50 @@ def find_waves(surface: Surface) -> list[Wave]:
             break
         found += new
         heights = _subtracted(heights, new)
+        part = without_trend(heights[window], plane=not is_periodic)
+    for _ in range(0 if _is_progression(found) else _ROUNDS):
+        white = WhiteSurface.of(part, surface.plane_spacing, is_periodic=is_periodic)
+        faint = white.peaks(LONGEST[surface.axes], _related(found, part.shape))
+        if len(found) + len(faint) > MOST:
+            return []
+        if not faint:
+            break
+        new = []
+        for peak in faint:
+            if part.shape == heights.shape:
+                new.append(_named(surface, peak.cycles, white.wave(peak.cycles), peak.p_value))
+            else:
+                new.append(_measured(heights, peak.cycles, peak.p_value, surface, is_periodic=is_periodic))
+        found += new
+        heights = _subtracted(heights, new)
+        part = without_trend(heights[window], plane=not is_periodic)
     return sorted(found, key=lambda wave: -wave.amplitude)
+
+
+def _related(found: Sequence[Wave], shape: tuple[int, ...]) -> list[Array]:
+    """Return the cycles per point of the multiples of waves, and of those whose multiples they may be.
+
+    Multiples shorter than two spacings are seen at their aliases. Each place is listed once.
+    """
+    done, related = [np.array(wave.cycles) for wave in found], []
+    for wave in found:
+        for divisor in range(1, _DIVISORS + 1):
+            for multiple in range(1, _MULTIPLES + 1):
+                at = np.array(wave.cycles) * multiple / divisor
+                if divisor > 1 and float(np.abs(at).max()) > 0.5:
+                    break
+                at = (at + 0.5) % 1.0 - 0.5
+                if all(_steps_apart(at, other, shape) > 1.0 for other in done):
+                    done.append(at)
+                    related.append(at)
+    return related
+
+
+def _steps_apart(cycles: Array, other: Array, shape: tuple[int, ...]) -> float:
+    """Return the distance of two waves in modes; a wave and its opposite are the same."""
+    return min(
+        float(np.max(np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape)) for sign in (1.0, -1.0)
+    )
 
 
 def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Array:
@@ -210,109 +236,6 @@ def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Arra
                 for step in near:
                     marked[tuple((place + step) % shape)] = True
     return marked
-
-
-def _peaks(
-    tapered: Array, spacing: tuple[float, float], axes: int, multiples: Array
-) -> list[tuple[tuple[float, float], float]]:
-    """Return the cycles per point (y, x) and the p value of the modes that stand out.
-
-    Those of `multiples` are tested among themselves, and not against the ray through them.
-    """
-    from scipy.ndimage import maximum_filter, uniform_filter
-
-    ny, nx = tapered.shape
-    half = fft.rfft2(tapered)
-    right = half.real**2 + half.imag**2
-    columns = np.arange(nx)
-    mirrored = columns > nx // 2
-    # the whole plane of modes, which has period (ny, nx)
-    power = np.empty((ny, nx))
-    power[:, ~mirrored] = right
-    power[:, mirrored] = right[-np.arange(ny) % ny][:, nx - columns[mirrored]]
-    y, x = np.fft.fftfreq(ny), np.fft.fftfreq(nx)
-    extent = min(n * d for n, d in zip((ny, nx)[-axes:], spacing[-axes:], strict=True))
-    radius = np.hypot(y[:, None] / spacing[0], x / spacing[1]) * extent
-    # beyond a cut-off there is only rounding, which is no neighbour of a wave
-    power[power <= _ROUNDING * power.max()] = 0.0
-    white = _whitened(power, radius, axes)
-    wide, narrow = ((_NEIGHBOURS, _LINE), (_ALONG, _LINE))[axes == 1]
-    sizes = [(1, edge) if axes == 1 else (edge, edge) for edge in (wide, narrow)]
-    clipped = np.minimum(white, _CLIPPED * uniform_filter(white, sizes[0], mode="wrap"))
-
-    def around(values: Array) -> Array:
-        outer, inner = (uniform_filter(values, size, mode="wrap") * float(np.prod(size)) for size in sizes)
-        return np.asarray(outer - inner)
-
-    number, total = around((power > 0.0).astype(float)), around(clipped)
-    is_surrounded = (number > 0.1 * np.prod(sizes[0])) & (total > np.finfo(float).tiny)
-    ratio = np.where(is_surrounded, white * number / np.where(is_surrounded, total, 1.0), 0.0)
-    # a long wave of a profile has its mirror image among the modes around it: the shorter ones are taken,
-    # whose power law is not known so well, and only a strong wave is told from it
-    longer = (radius >= _FEW_WAVES) & (radius < _LONGEST[axes])
-    for row, column in np.argwhere(longer & ~mirrored):
-        shorter = white[row, column + _RADIAL[0] : column + _ALONG // 2]
-        ratio[row, column] = white[row, column] / max(float(shorter.mean()), np.finfo(float).tiny)
-    allowed = (longer | (radius >= _LONGEST[axes])) & ~mirrored
-    freedom = _FREEDOM[axes]
-    among = max(1, int(np.count_nonzero(multiples)))
-    count = 0.5 * np.where(multiples, among, power.size)
-    least = freedom * ((count / FALSE_ALARM) ** (1.0 / freedom) - 1.0)
-    least = np.where(longer, _STRONG * least, least)
-    places = np.argwhere(allowed & (ratio > least) & (power == maximum_filter(power, sizes[1], mode="wrap")))
-    share = power * (2.0 - np.cos(2.0 * np.pi * y)[:, None] - np.cos(2.0 * np.pi * x))
-    places = places[share[tuple(places.T)] > _LEAST_SHARE * share.sum()]
-    on_edge = (places[:, 1] == 0) | (2 * places[:, 1] == nx)  # both signs of y are the same wave there
-    places = places[~on_edge | (y[places[:, 0]] >= 0.0)]
-    rays = np.stack([y[places[:, 0]] * ny, x[places[:, 1]] * nx], axis=1)
-    places = places[multiples[tuple(places.T)] | _above_rays(white, places, rays)]
-    return [
-        (
-            (float(y[row]), float(x[column])),
-            float(min(1.0, count[row, column] * (1.0 + ratio[row, column] / freedom) ** -freedom)),
-        )
-        for row, column in places
-    ]
-
-
-def _whitened(power: Array, radius: Array, axes: int) -> Array:
-    """Return the modes over the mean of their ring; those of a profile over a power law."""
-    if axes == 1:
-        return np.asarray(power * (radius / radius.max()) ** 2)
-    ring = np.rint(radius).astype(np.int64).ravel()
-    number = np.maximum(np.bincount(ring, (power > 0.0).ravel()), 1)
-    clipped, white = power, power
-    for _ in range(_PASSES):  # a wave raises the mean of its ring, unless it is clipped
-        level = np.maximum(np.bincount(ring, clipped.ravel()) / number, np.finfo(float).tiny)
-        expected = np.exp(np.interp(radius, np.arange(level.size), np.log(level)))
-        white = power / expected
-        clipped = np.minimum(white, _CLIPPED) * expected
-    return np.asarray(white)
-
-
-def _above_rays(white: Array, places: Array, rays: Array) -> Array:
-    """Return which modes stand above both parts of the ray through them; `rays` are their mode numbers.
-
-    The multiples of a mode, as those of cusps, are left out of its ray, unless little of it would be left.
-    """
-    if not len(places):
-        return np.zeros(0, dtype=bool)
-    peaks = white[tuple(places.T)]
-    distance = np.hypot(*rays.T)[:, None]
-    along = rays / distance
-    beyond = np.abs(_RADIAL - distance * np.maximum(np.rint(_RADIAL / distance), 1.0)) > _MULTIPLE_WIDTH
-    beyond |= np.count_nonzero(beyond, axis=1, keepdims=True) < _LEAST_RAY
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1) * (min(white.shape) > 1)
-    means = []
-    for side in (-1, 1):
-        at = places[:, None, None] + side * _RADIAL[:, None, None] * along[:, None, None]
-        at = np.rint(at + np.arange(-1, 2)[:, None] * across[:, None, None]).astype(np.int64)
-        ray = white[at[..., 0] % white.shape[0], at[..., 1] % white.shape[1]]
-        if side > 0:
-            ray = ray * beyond[:, :, None]
-        number = np.maximum(np.count_nonzero(ray, axis=(1, 2)), 1)
-        means.append(np.minimum(ray, 0.25 * peaks[:, None, None]).sum(axis=(1, 2)) / number)
-    return np.asarray(peaks > _ABOVE_RAY * np.maximum(*means))
 
 
 def _measured(
@@ -343,15 +266,22 @@ def _measured(
             shift = np.clip(0.5 * (low - high) / bend, -2.0, 2.0) if bend < 0 else np.sign(high - low)
             best = best + shift * step
     value = 2.0 * mode(best) / float(np.prod([taper.sum() for taper in tapers]))
-    waves_per_metre = best / np.array(surface.spacing)
+    return _named(surface, (float(best[0]), float(best[1])), (value.real, -value.imag), p_value)
+
+
+def _named(
+    surface: Surface, cycles: tuple[float, float], amplitudes: tuple[float, float], p_value: float
+) -> Wave:
+    """Return a wave of given cycles per point and amplitudes of its cosine and sine, in SI units."""
+    waves_per_metre = np.array(cycles) / np.array(surface.spacing)
     return Wave(
         wavelength=float(1.0 / np.hypot(*waves_per_metre)),
         azimuth=float(np.degrees(np.arctan2(*waves_per_metre)) % 180.0),
-        amplitude=abs(value) * surface.unit,
+        amplitude=float(np.hypot(*amplitudes)) * surface.unit,
         p_value=p_value,
-        cycles=(float(best[0]), float(best[1])),
-        cosine=value.real,
-        sine=-value.imag,
+        cycles=cycles,
+        cosine=amplitudes[0],
+        sine=amplitudes[1],
     )
 
 
