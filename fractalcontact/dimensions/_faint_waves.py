@@ -38,8 +38,10 @@ _STEPS = 4  # of its fit
 _AGREE = 3.0  # mean square of the deviations of the rings from it, over their variance
 _APART = 1.5  # modes between two waves
 _LOBES = 4.0  # times the envelope of what a wave shows beside itself: modes below it wait for its removal
-_UNEVEN = 6.0  # standard deviations by which the modes may differ from exponential numbers
+_SHORTEST = 2.05  # spacings: the power of shorter waves is not that of a ring, for aliases and blur
+_UNEVEN = 5.0  # standard deviations by which the modes may differ from exponential numbers
 _MOST = 48  # modes above the first limit; more are those of a surface that is not white
+_LEAST = 1e-280  # power of a mode: that of a constant is zero
 _ACROSS = np.arange(-1, 2)  # lines of modes along a ray
 _ABOVE_RAY = 8.0  # times the mean of the strongest line of modes on the ray through it
 
@@ -119,7 +121,7 @@ class Rings:
         return result
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)
 def _rings(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bool) -> Rings:
     axes = 1 if shape[0] == 1 else 2
     extent = min(n * d for n, d in zip(shape[-axes:], spacing[-axes:], strict=True))
@@ -173,9 +175,8 @@ class WhiteSurface:
         modes = _modes(heights, is_periodic)
         power = modes.real**2 + modes.imag**2 if is_periodic else modes * modes
         rings = _rings((heights.shape[0], heights.shape[1]), spacing, is_periodic)
-        factor = np.sqrt(
-            heights.size * (1.0 if is_periodic else 2.0 ** _axes(heights)) / rings.expected(power)
-        )
+        expected = np.maximum(rings.expected(power), max(ROUNDING * float(power.max()), _LEAST))
+        factor = np.sqrt(heights.size * (1.0 if is_periodic else 2.0 ** _axes(heights)) / expected)
         factor[(power <= ROUNDING * power.max()) | (rings.ring < _FIRST_RING).reshape(power.shape)] = 0.0
         modes *= factor
         return cls(_heights(modes, heights.shape, is_periodic), factor, spacing, is_periodic)
@@ -386,7 +387,7 @@ class Search:
         return self.total * max(radius, self.longest) ** self.axes
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)
 def _search(
     shape: tuple[int, int], spacing: tuple[float, float], padded: tuple[int, int], longest: float
 ) -> Search:
@@ -396,7 +397,7 @@ def _search(
     (py, px), (ny, nx) = padded, shape
     y, x = np.fft.fftfreq(py * ny), np.arange(px * nx // 2 + 1) / (px * nx)
     radius = np.hypot(y[:, None] * unit[0], x * unit[1])
-    inside = radius >= longest
+    inside = (radius >= longest) & (radius <= extent / (_SHORTEST * max(spacing[-axes:])))
     share = np.zeros(radius.shape)
     share[inside] = radius[inside] ** -float(axes)
     share[:, 0] *= 0.5

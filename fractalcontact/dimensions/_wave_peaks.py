@@ -125,7 +125,7 @@ def _is_largest(power: Array, place: Array, size: tuple[int, int]) -> bool:
     )
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)
 def _plane(shape: tuple[int, int], spacing: tuple[float, float], axes: int) -> tuple[Array, Array]:
     """Return the wavenumber of the modes in steps of the shortest extent, and the number of their ring."""
     y, x = (np.fft.fftfreq(n) / d for n, d in zip(shape, spacing, strict=True))

@@ -72,8 +72,9 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     Notes
     -----
     Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
-    seventh of a profile). At 128 x 128 points waves of one rms increment are always found, of 0.3 in a third
-    to two thirds of the surfaces, of 0.1 never. The default method of `estimate` removes what is found.
+    seventh of a profile). A wave of N points is found above about 8 times the root of the power spectral
+    density at its wavelength over N: at 128 x 128 points 0.1 rms increments at 4 to 8 spacings in two thirds
+    of the surfaces and more, 0.5 up to 14 spacings always. `estimate` removes what is found.
     Detection, false alarms and accuracy: page `theory_dimensions`.
 
     References
