@@ -40,6 +40,7 @@ _APART = 1.5  # modes between two waves
 _LOBES = 4.0  # times the envelope of what a wave shows beside itself: modes below it wait for its removal
 _SHORTEST = 2.05  # spacings: the power of shorter waves is not that of a ring, for aliases and blur
 _UNEVEN = 5.0  # standard deviations by which the modes may differ from exponential numbers
+_FEWEST = 40  # modes of which that can be told
 _MOST = 48  # modes above the first limit; more are those of a surface that is not white
 _LEAST = 1e-280  # power of a mode: that of a constant is zero
 _ACROSS = np.arange(-1, 2)  # lines of modes along a ray
@@ -196,7 +197,7 @@ class WhiteSurface:
         columns = np.stack(
             [self.whiten(np.ascontiguousarray(part)).ravel() for part in (wave.real, wave.imag)]
         )
-        cosine, sine = np.linalg.solve(columns @ columns.T, columns @ self.white.ravel())
+        cosine, sine = np.linalg.pinv(columns @ columns.T) @ (columns @ self.white.ravel())
         return float(cosine), float(sine)
 
     def power(self) -> Array:
@@ -264,7 +265,7 @@ class WhiteSurface:
         inside[:, 0] = False
         modes = power[::py, ::px][inside[::py, ::px]]
         modes = np.minimum(modes[modes > 0.0], CLIPPED)
-        if not modes.size:
+        if modes.size < _FEWEST:
             return False
         flatness = float(np.log(modes).mean() - np.log(modes.mean())) + np.euler_gamma
         return bool(flatness > -_UNEVEN * np.sqrt((np.pi**2 / 6.0 - 1.0) / modes.size))

@@ -72,9 +72,10 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     Notes
     -----
     Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
-    seventh of a profile). A wave of N points is found above about 8 times the root of the power spectral
-    density at its wavelength over N: at 128 x 128 points 0.1 rms increments at 4 to 8 spacings in two thirds
-    of the surfaces and more, 0.5 up to 14 spacings always. `estimate` removes what is found.
+    seventh of a profile). Among N points a wave is found from an amplitude of about 8 sqrt(S / N) on, S being
+    the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is 0.1 rms
+    increments at 6 spacings, 0.3 at 12 and 0.8 at 24 (H = 0.5); at 256 x 256 half of it. `estimate` removes
+    what is found.
     Detection, false alarms and accuracy: page `theory_dimensions`.
 
     References

@@ -1,8 +1,13 @@
 """Single waves: found, named and removed; false alarms on surfaces without them; marks in `estimate`."""
 
+import re
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter
+from scipy.optimize import brentq
+from scipy.special import j0
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -179,9 +184,92 @@ def test_long_wave_of_a_profile_is_found():
         assert removed == pytest.approx(alone, abs=0.04)
 
 
+def limiting_amplitude(shape, hurst, wavelength):
+    """Return the amplitude in rms increments at which half of the waves are found, by theory.
+
+    The power of the sine over the aliased density S of the surface, a^2 N / (4 S), is the logarithm of the
+    places that are searched over the false alarm, with (pi u / 3)^(1/2) maxima a place along each axis.
+    """
+    axes, n = len(shape), min(shape)
+    wavenumber = 2 * np.pi / wavelength
+    if axes == 2:
+        scale = quad(lambda q: (1 - j0(q)) * q ** (-1 - 2 * hurst), 0, 500, limit=3000)[0]
+        azimuths = np.pi * np.arange(32) / 32
+        waves = wavenumber * np.sin(azimuths), wavenumber * np.cos(azimuths)
+        shifts = 2 * np.pi * np.arange(-6, 7)
+        squares = (waves[0] + shifts[:, None, None]) ** 2 + (waves[1] + shifts[:, None]) ** 2
+        density = np.pi / scale * np.mean(np.sum(squares ** (-1 - hurst), axis=(0, 1)))
+    else:
+        scale = quad(lambda q: (1 - np.cos(q)) * q ** (-1 - 2 * hurst), 0, 500, limit=3000)[0]
+        shifts = 2 * np.pi * np.arange(-200, 201)
+        density = np.pi / 2 / scale * np.sum(np.abs(wavenumber + shifts) ** (-1 - 2 * hurst))
+    octaves = np.log(n / 2.05 / (4.0 if axes == 2 else 12.0))
+    places = octaves * (np.pi * (n / wavelength) ** 2 if axes == 2 else n / wavelength)
+    power = brentq(lambda u: u - np.log(places / 1e-3) - axes / 2 * np.log(np.pi * u / 3), 5.0, 40.0)
+    return 2 * np.sqrt(power * density / np.prod(shape))
+
+
+@pytest.mark.parametrize(
+    ("shape", "hurst", "wavelength"), [((128, 128), 0.3, 6.6), ((96, 96), 0.8, 9.3), ((1024,), 0.5, 11.0)]
+)
+def test_limit_of_detection_is_that_of_theory(shape, hurst, wavelength):
+    limit = limiting_amplitude(shape, hurst, wavelength)
+    shares = []
+    for factor in (0.6, 1.45):
+        found = []
+        for seed in range(16):
+            surface = brownian(shape, hurst, 200 + seed)
+            azimuth = 11.0 * seed if len(shape) == 2 else 0.0
+            marked = surface + marks(surface, azimuth, wavelength, factor * limit)
+            wavelengths = fc.dimensions.waves(marked).wavelength.values / SPACING
+            found.append(np.any(np.abs(wavelengths / wavelength - 1) < 0.03))
+        shares.append(np.mean(found))
+    assert shares[0] <= 0.2
+    assert shares[1] >= 0.8
+
+
+def test_tenth_of_an_increment_is_found_named_and_excluded():
+    for seed in range(3):
+        surface = brownian((256, 256), 0.5, 300 + seed)
+        azimuth = 20.0 + 50.0 * seed
+        marked = surface + marks(surface, azimuth, 5.3, 0.1)
+        found = fc.dimensions.waves(marked)
+        assert found.wavelength.values / SPACING == pytest.approx([5.3], rel=5e-3)
+        assert found.wave_azimuth.values == pytest.approx([azimuth], abs=0.5)
+        assert found.wave_amplitude.values / STEP == pytest.approx([0.1], rel=0.35)
+        alone, removed = (fc.dimensions.estimate(each) for each in (surface, marked))
+        assert float(removed.hurst[0]) == pytest.approx(float(alone.hurst[0]), abs=4e-4)
+        assert re.search(r"a single wave removed: 5\.[23]\d?e-05 m at", removed.hurst.attrs["comment"])
+
+
+def test_faint_multiples_and_crossed_marks():
+    surface = brownian((128, 128), 0.8, 77)
+    crossed = surface + marks(surface, 33.0, 6.1, 0.2) + marks(surface, 118.0, 5.2, 0.2)
+    assert sorted(fc.dimensions.waves(crossed).wavelength.values / SPACING) == pytest.approx(
+        [5.2, 6.1], rel=0.01
+    )
+    angle = np.radians(27.0)
+    along = (surface.x * np.cos(angle) + surface.y * np.sin(angle)) / (19.0 * SPACING)
+    sawtooth = surface + (0.4 * STEP * (2.0 * ((along + 0.3) % 1.0) - 1.0)).transpose("y", "x")
+    multiples = 19.0 * SPACING / fc.dimensions.waves(sawtooth).wavelength.values
+    assert len(multiples) >= 3
+    np.testing.assert_allclose(multiples, np.rint(multiples), atol=0.06)
+
+
 def test_sum_of_waves_is_left_alone():
     surface = fc.surfaces.weierstrass((1024,), SPACING, hurst=0.5, rms_height=STEP)
     assert "removed" not in fc.dimensions.estimate(surface).hurst.attrs["comment"]
+
+
+@pytest.mark.slow
+def test_false_alarm_is_one_in_a_thousand():
+    number = sum(
+        fc.dimensions.waves(brownian(shape, hurst, seed)).sizes["wave"] > 0
+        for shape in ((64, 64), (128, 128), (512,))
+        for hurst in (0.2, 0.5, 0.9)
+        for seed in range(400)
+    )
+    assert number <= 10  # of 3600
 
 
 @pytest.mark.slow
