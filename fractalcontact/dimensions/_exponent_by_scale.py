@@ -12,11 +12,12 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions import _cosine_modes, _mode_blocks
+from fractalcontact.dimensions import _blur_fit, _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, TRANSFER, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -25,6 +26,7 @@ _STEPS, _LONGEST_STEP = 60, 0.5
 _LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
 _FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
 _WITHOUT_ALIASES = 10.0  # decrease of the deviance from which a surface has no aliases
+_BLURS = (BEFORE, 0.05), (TRANSFER, 0.1), (FILTER, 0.15)  # forms of a blur, and where their fits start
 _RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
 _NAMES = (
     "hurst",
@@ -82,7 +84,7 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     against separate exponents and amplitudes of its octaves is below the 99.7 % quantile of chi square.
     Beside other octaves its interval also holds that of the run without the octave there, as a blur ends
     gradually. Waves beyond the sampling are in the model of a surface with free edges, as aliases, unless the
-    two shortest octaves have one exponent only without them, as in a crop of a periodic surface.
+    two shortest octaves have one exponent only without them, as in a crop of a periodic surface, and no blur.
 
     Examples
     --------
@@ -223,7 +225,8 @@ def frame_blocks(means: Array, frame: Frame) -> Blocks:
 def with_or_without_aliases(blocks: Blocks) -> Blocks:
     """Return blocks without aliases where the two shortest octaves have one exponent only then.
 
-    So it is in crops of periodic surfaces, which have no waves beyond the sampling.
+    So it is in crops of periodic surfaces, which have no waves beyond the sampling. A blur with aliases must
+    not explain those octaves better.
     """
     if blocks.frame is None:
         return blocks
@@ -235,7 +238,12 @@ def with_or_without_aliases(blocks: Blocks) -> Blocks:
     fit = fit_power_law(unaliased, inside)
     if fit.deviance > fit_power_law(blocks, inside).deviance - _WITHOUT_ALIASES or fit.hurst < _LEAST_HURST:
         return blocks
-    return unaliased if has_one_exponent(shortest, fit) else blocks
+    window = Window(blocks.frame, inside, blocks.power)
+    blurred = min(
+        _blur_fit.fit(window, _blur_fit.Fit(form, 0.5, square)).penalised for form, square in _BLURS
+    )
+    is_likelier = fit.deviance + 2.0 < blurred  # one parameter beside the amplitude
+    return unaliased if is_likelier and has_one_exponent(shortest, fit) else blocks
 
 
 def window_of(blocks: Blocks, inside: Array) -> Run | None:

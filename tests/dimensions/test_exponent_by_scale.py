@@ -110,3 +110,15 @@ def test_window_beside_a_blur_holds_the_exponent():
         assert not bool(result.in_window[0])
         inside += float(result.window_ci_low) <= 0.5 <= float(result.window_ci_high)
     assert inside >= 9
+
+
+def test_blur_is_not_taken_for_missing_aliases():
+    """A filter of half a spacing looks like a crop of a periodic surface with an exponent .04 larger."""
+    inside = 0
+    for seed in range(4):
+        surface = fc.surfaces.fbm((144, 144), 1e-4, hurst=0.3, rms_increment=1e-6, rng=400 + seed)
+        blurred = surface.copy(data=gaussian_filter(surface.values, 0.5))[8:-8, 8:-8]
+        result = fc.dimensions.scaling(blurred)
+        assert float(result.hurst[0]) > 0.7
+        inside += float(result.window_ci_low) <= 0.3 <= float(result.window_ci_high)
+    assert inside >= 3
