@@ -24,6 +24,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions import _whittle
+from fractalcontact.dimensions._harmonic_filling import Filling
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -305,94 +306,6 @@ def _derivative(spacing: tuple[float, float], hurst: float, order: int) -> Array
     return np.asarray(total.coef)
 
 
-class Filling:
-    """Removal of a plane and harmonic interpolation over the missing points, and its transpose.
-
-    Parameters
-    ----------
-    observed : ndarray of bool, shape (ny, nx)
-    spacing : (dy, dx)
-        A neighbour has the weight of the inverse square of its distance.
-    """
-
-    def __init__(self, observed: Array, spacing: tuple[float, float]) -> None:
-        from scipy.sparse.linalg import splu
-
-        self.observed = observed
-        y, x = (np.linspace(-1.0, 1.0, n) for n in observed.shape)
-        columns = np.stack(np.broadcast_arrays(1.0, x, y[:, None]))[:, observed]
-        self._plane = np.ascontiguousarray(np.linalg.qr(columns.T)[0].T)
-        inner, self._outer = _laplacian(observed, spacing)
-        # a Laplacian is symmetric and positive: ordering its own graph, without pivots, is fastest
-        order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-        self._solve = splu(inner, **order) if inner.shape[0] else None
-
-    def __call__(self, values: Array) -> Array:
-        """Fill a surface from its observed points: shape (points,) to (ny, nx)."""
-        values = self._without_plane(values)
-        heights = np.zeros(self.observed.shape)
-        heights[self.observed] = values
-        if self._solve is not None:
-            heights[~self.observed] = self._solve.solve(-(self._outer @ values))
-        return heights
-
-    def transpose(self, heights: Array) -> Array:
-        """Apply the transpose: shape (ny, nx) to (points,)."""
-        values = heights[self.observed]
-        if self._solve is not None:
-            values = values - self._outer.T @ self._solve.solve(heights[~self.observed], "T")
-        return self._without_plane(values)
-
-    def _without_plane(self, values: Array) -> Array:
-        """Subtract the plane of least squares; `einsum` starts no threads of a linear algebra library."""
-        rest = values.copy()
-        for row in self._plane:
-            rest -= row * np.einsum("i,i", values, row)
-        return rest
-
-
-def _laplacian(observed: Array, spacing: tuple[float, float]) -> tuple[Any, Any]:
-    """Return the graph Laplacian of the missing points: among themselves, and to the observed ones."""
-    from scipy.sparse import coo_array
-
-    number = (
-        np.where(
-            observed,
-            np.cumsum(observed).reshape(observed.shape),
-            np.cumsum(~observed).reshape(observed.shape),
-        )
-        - 1
-    )
-    missing, points = int((~observed).sum()), int(observed.sum())
-    closest = min(spacing)
-    rows, columns, weights, to_observed = [], [], [], []
-    diagonal: Array = np.zeros(missing)
-    for axis, distance in enumerate(spacing):
-        weight = (closest / distance) ** 2
-        for here, there in (((0, -1), (1, None)), ((1, None), (0, -1))):
-            a = tuple(slice(*here) if i == axis else slice(None) for i in (0, 1))
-            b = tuple(slice(*there) if i == axis else slice(None) for i in (0, 1))
-            hole = ~observed[a]
-            np.add.at(diagonal, number[a][hole], weight)
-            rows.append(number[a][hole])
-            columns.append(number[b][hole])
-            weights.append(np.full(rows[-1].size, -weight))
-            to_observed.append(observed[b][hole])
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    entries, outer = np.concatenate(weights), np.concatenate(to_observed)
-    index = np.arange(missing)
-    inner = coo_array(
-        (
-            np.append(entries[~outer], diagonal),
-            (np.append(row[~outer], index), np.append(column[~outer], index)),
-        ),
-        shape=(missing, missing),
-    )
-    return inner.tocsc(), coo_array(
-        (entries[outer], (row[outer], column[outer])), shape=(missing, points)
-    ).tocsr()
-
-
 class GappedModes:
     """Cosine modes of a surface with gaps, their expected power, and the covariance of their sums.
 
@@ -405,12 +318,21 @@ class GappedModes:
         power, which keeps their scatter small for any H.
     probes : int
         Number of random sign patterns.
+    filling : Filling, optional
+        That of `observed`, if it is at hand.
     """
 
-    def __init__(self, lattice: Lattice, observed: Array, reference: float, probes: int = PROBES) -> None:
+    def __init__(
+        self,
+        lattice: Lattice,
+        observed: Array,
+        reference: float,
+        probes: int = PROBES,
+        filling: Filling | None = None,
+    ) -> None:
         self.lattice, self.observed = lattice, observed
         self.missing = float(np.mean(~observed))
-        self.filling = Filling(observed, lattice.spacing)
+        self.filling = Filling(observed, lattice.spacing) if filling is None else filling
         self._root = 1.0 / np.sqrt(expected_power(lattice, reference))
         rng = np.random.default_rng(_SEED)
         self._signs = [rng.integers(0, 2, self._root.shape) * 2.0 - 1.0 for _ in range(probes)]
@@ -476,6 +398,73 @@ class GappedModes:
         heights = np.zeros(self.observed.shape)
         heights[self.observed] = values
         return heights
+
+
+def relative_excess(lattice: Lattice, filling: Filling, hurst: float, probes: int) -> Array:
+    """Return what gaps add to the expected power of each mode, over that of the complete surface.
+
+    As `GappedModes.excess` at its reference. Most of the scatter of random signs is that of the points that
+    are left out, C M C' for the mask M of missing points: it is replaced by its diagonal, which is known.
+    One probe so has the scatter of four to ten.
+    """
+    observed = filling.observed
+    root = 1.0 / np.sqrt(expected_power(lattice, hurst))
+    quarter = fft.dct(np.pad(lattice.covariance(hurst), ((0, 1), (0, 1))), 1, (0, 1))
+    rng = np.random.default_rng(_SEED)
+    total = np.zeros(root.shape)
+    ny, nx = lattice.shape
+    torus = np.empty((2 * ny, nx + 1), dtype=complex)
+    for _ in range(probes):
+        sign = rng.integers(0, 2, root.shape, dtype=np.int8) * 2.0 - 1.0
+        heights = _from_modes(root * sign)
+        seen = np.zeros(observed.shape)
+        seen[observed] = filling.transpose(heights)
+        change = filling(_quarter_product(quarter, seen, torus)[observed])
+        change -= _quarter_product(quarter, heights, torus)
+        total += sign * (root * cosine_modes(change) + _left_out(observed, sign))
+    return np.asarray(total / probes - _missing_share(observed))
+
+
+def relative_white_excess(filling: Filling, probes: int) -> Array:
+    """Return what gaps add to the expected power of white noise of unit variance, as `relative_excess`."""
+    observed = filling.observed
+    shape = tuple(n - 1 for n in observed.shape)
+    rng, total = np.random.default_rng(_SEED), np.zeros(shape)
+    for _ in range(probes):
+        sign = rng.integers(0, 2, shape, dtype=np.int8) * 2.0 - 1.0
+        heights = _from_modes(sign)
+        change = cosine_modes(filling(filling.transpose(heights)) - heights)
+        total += sign * (change + _left_out(observed, sign))
+    return np.asarray(total / probes - _missing_share(observed))
+
+
+def _left_out(observed: Array, modes: Array) -> Array:
+    """Apply C M C' to modes, M being the mask of missing points."""
+    return cosine_modes(np.where(observed, 0.0, _from_modes(modes)))
+
+
+def _missing_share(observed: Array) -> Array:
+    """Return the diagonal of C M C' from the cosine modes of twice the wavenumber of the mask M."""
+    shape = observed.shape
+    doubled = fft.dct((~observed).astype(float), 2, (0, 1)) / 4.0
+    share = doubled[0, 0]
+    places, signs = [], []
+    for n in shape:
+        mode = 2 * np.arange(1, n)
+        places.append(np.where(mode < n, mode, 2 * n - mode) % n)
+        signs.append(np.sign(n - mode).astype(float))
+    (y, x), (along_y, along_x) = places, signs
+    share = share + along_x * doubled[0, x] + (along_y * doubled[y, 0])[:, None]
+    return np.asarray((share + along_y[:, None] * along_x * doubled[np.ix_(y, x)]) / (shape[0] * shape[1]))
+
+
+def _quarter_product(quarter: Array, heights: Array, torus: Array) -> Array:
+    """Multiply heights by a covariance matrix, given a quarter of its spectrum; `torus` is room."""
+    ny, nx = heights.shape
+    modes = fft.rfft2_padded(heights, (2 * ny, 2 * nx), torus)
+    modes[: ny + 1] *= quarter
+    modes[ny + 1 :] *= quarter[ny - 1 : 0 : -1]
+    return fft.irfft2_cropped(modes, (2 * ny, 2 * nx), (ny, nx))
 
 
 def cosine_modes(heights: Array) -> Array:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ def increment_moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...]
         Shortest lag in points.
     """
     from fractalcontact.base.threads import in_bands
-    from fractalcontact.dimensions._kernels import increment_sums
+    from fractalcontact.dimensions._kernels import gapped_increment_sums, increment_sums
 
     block_rows, block_columns = _block_edges(shape, stride)
     row_sums, row_counts, masks = [], [], []
@@ -71,7 +70,9 @@ def increment_moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...]
         mask = None
         if np.isnan(sums).any():
             # a row without gaps keeps its sum, so that it does not matter which slab it was read with
-            gapped, counts = _gapped_sums(heights, rows, block_columns, stride)
+            gapped, counts = np.zeros(sums.shape), np.zeros(sums.shape, dtype=np.int64)
+            place = heights, stride, block_columns
+            in_bands(gapped_increment_sums, rows, KINDS * rows * heights.shape[1], *place, gapped, counts)
             sums = np.where(np.isnan(sums), gapped, sums)
             mask = np.isfinite(heights[:rows])
         row_sums.append(sums)
@@ -118,26 +119,3 @@ def _complete_counts(shape: tuple[int, ...], rows: int, edges: Array, stride: in
         counts[..., k] = np.diff(np.minimum(edges, max(nx - reach, 0)))
         counts[..., 6 + k] = np.diff(edges) * (np.arange(rows) + reach < ny)[:, None]
     return counts
-
-
-def _gapped_sums(heights: Array, rows: int, edges: Array, stride: int) -> tuple[Array, Array]:
-    """Return what `increment_sums` does, and the counts, where some heights are NaN."""
-    sums = np.zeros((rows, edges.size - 1, KINDS))
-    counts = np.zeros(sums.shape, dtype=np.int64)
-    column = 0
-    for axis in (1, 0):
-        for order in (1, 2):
-            for lag in LAGS:
-                reach = lag * stride
-                if heights.shape[axis] > order * reach:
-                    jump = heights
-                    for _ in range(order):
-                        n = jump.shape[axis]
-                        jump = jump.take(range(reach, n), axis) - jump.take(range(n - reach), axis)
-                    jump = jump[:rows]
-                    for block, (low, high) in enumerate(pairwise(edges)):
-                        part = jump[:, low:high]
-                        sums[: len(part), block, column] = np.nansum(part * part, axis=1)
-                        counts[: len(part), block, column] = np.count_nonzero(~np.isnan(part), axis=1)
-                column += 1
-    return sums, counts

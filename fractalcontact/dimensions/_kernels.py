@@ -49,6 +49,39 @@ def increment_sums(start: int, stop: int, heights: Array, stride: int, edges: Ar
                 sums[j, block, column], sums[j, block, column + 3] = first, second
 
 
+@gap_sum_kernel
+def gapped_increment_sums(
+    start: int, stop: int, heights: Array, stride: int, edges: Array, sums: Array, counts: Array
+) -> None:
+    """Do what `increment_sums` does without the increments that have a NaN, and count the others."""
+    ny, nx = heights.shape
+    for j in range(start, stop):
+        for k in range(6):
+            x, y = (0, stride << k - 3) if k > 2 else (stride << k, 0)
+            once, twice = j + y, j + 2 * y
+            column = k if k < 3 else k + 3
+            for block in range(edges.size - 1):
+                low, high = edges[block], edges[block + 1]
+                here, there, beyond = np.uint32(low), np.uint32(low + x), np.uint32(low + 2 * x)
+                last = high if high < nx - x else nx - x
+                total, number = 0.0, 0
+                for i in range(last - low if once < ny else 0):
+                    u = heights[once, i + there] - heights[j, i + here]
+                    is_known = u == u
+                    total += u * u if is_known else 0.0
+                    number += is_known
+                sums[j, block, column], counts[j, block, column] = total, number
+                last = high if high < nx - 2 * x else nx - 2 * x
+                total, number = 0.0, 0
+                for i in range(last - low if twice < ny else 0):
+                    u = heights[once, i + there] - heights[j, i + here]
+                    v = (heights[twice, i + beyond] - heights[once, i + there]) - u
+                    is_known = v == v
+                    total += v * v if is_known else 0.0
+                    number += is_known
+                sums[j, block, column + 3], counts[j, block, column + 3] = total, number
+
+
 @kernel
 def whiten(start: int, stop: int, covariances: Array, columns: Array, log_determinants: Array) -> None:
     """Factor covariances (chunks, n, n) from start up to stop, and solve for their columns (chunks, n, k).
@@ -249,3 +282,70 @@ def walk(heights: Array, spacing: float, opening: float) -> tuple[float, float]:
                 k += 1
         total += np.hypot((n - 1) * spacing / opening - at_x, z[n - 1] / opening - at_z)
     return total * opening, count
+
+
+@kernel
+def aggregate_gradients(
+    right: Array, starts: Array, operator: tuple[Array, ...], tolerance: float, most: int
+) -> Array:
+    """Solve diagonal x - couplings x = right by conjugate gradients with a cycle over levels of aggregates.
+
+    Unknowns of all levels are numbered together, those of level l from starts[l] up to starts[l + 1]; `right`
+    is that of the first level. Of the eight arrays of `operator`, the first four number the neighbours, 0 for
+    none; then come the couplings with those above and after, the diagonal, and the aggregate on the next
+    level. The cycle is symmetric: one Gauss-Seidel sweep forwards from zero, one backwards.
+    """
+    above, after, below, before, vertical, along, diagonal, aggregate = operator
+    levels, m = starts.size - 1, right.size
+    inverse = 1.0 / diagonal
+    x, b = np.zeros(diagonal.size), np.zeros(diagonal.size)  # of the cycle, all levels
+    solution, direction, product = np.zeros(m), np.zeros(m + 1), np.zeros(m)
+    square, old = 0.0, 1.0
+    for k in range(m):
+        b[k + 1] = right[k]
+        square += right[k] * right[k]
+    limit = tolerance * tolerance * square
+    for step in range(most):
+        if square <= limit:
+            break
+        for level in range(levels):
+            first, last = starts[level], starts[level + 1]
+            for k in range(first, last):
+                i, j = below[k], before[k]
+                x[k] = (b[k] + vertical[i] * x[i] + along[j] * x[j]) * inverse[k]
+            if level + 1 < levels:
+                b[last : starts[level + 2]] = 0.0
+                for k in range(first, last):
+                    b[aggregate[k]] += vertical[k] * x[above[k]] + along[k] * x[after[k]]
+        new = 0.0
+        for level in range(levels - 1, -1, -1):
+            first, last = starts[level], starts[level + 1]
+            if level + 1 < levels:
+                for k in range(first, last):
+                    x[k] += 1.8 * x[aggregate[k]]  # aggregates are too stiff by two for long waves
+            new = 0.0
+            for k in range(last - 1, first - 1, -1):
+                i, j = below[k], before[k]
+                around = vertical[k] * x[above[k]] + along[k] * x[after[k]]
+                around += vertical[i] * x[i] + along[j] * x[j]
+                x[k] = (b[k] + around) * inverse[k]
+                new += b[k] * x[k]
+        share = 0.0 if step == 0 else new / old
+        for k in range(1, m + 1):
+            direction[k] = x[k] + share * direction[k]
+        bend = 0.0
+        for k in range(1, m + 1):
+            i, j = below[k], before[k]
+            value = diagonal[k] * direction[k] - vertical[k] * direction[above[k]]
+            value -= along[k] * direction[after[k]] + vertical[i] * direction[i] + along[j] * direction[j]
+            product[k - 1] = value
+            bend += direction[k] * value
+        length = new / bend
+        square = 0.0
+        for k in range(m):
+            solution[k] += length * direction[k + 1]
+            rest = b[k + 1] - length * product[k]
+            b[k + 1] = rest
+            square += rest * rest
+        old = new
+    return solution

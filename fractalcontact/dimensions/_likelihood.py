@@ -33,6 +33,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     window_of,
     with_or_without_aliases,
 )
+from fractalcontact.dimensions._harmonic_filling import Filling
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
 from fractalcontact.dimensions._increment_moments import Moments, increment_moments
 from fractalcontact.dimensions._increments import closed_form, without_steps
@@ -78,6 +79,7 @@ _SLIGHT = -2.5, 1.5
 _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface allows for
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
 _LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
+_LARGE_GAPPED = 1 << 17  # the same of a surface with gaps
 _ROUNDING = 1e-26  # relative rounding of the mean square in transforms
 _FREE_WINDOW = "all modes that vary along both axes"
 _INTERPOLATED = 0.01  # share of heights on a line with their neighbours
@@ -490,12 +492,14 @@ def _is_separable(power: Array, heights: Array) -> bool:
 
 
 def _modes(free: _FreeEdges) -> SurfaceModes:
-    """Return the modes of the window; those of a large complete surface in blocks."""
+    """Return the modes of the window; those of a large surface in blocks."""
     heights, power, spacing = free.heights, free.power, free.surface.plane_spacing
     dx = free.surface.spacing[1]
     window = None if free.scales is None else (free.scales[0] / dx, free.scales[1] / dx)
     if power is not None and heights.size > _LARGE:
         return _mode_blocks.BlockModes.of(power, spacing, window)
+    if power is None and heights.size >= _LARGE_GAPPED:
+        return _mode_blocks.BlockModes.of_gapped(heights, spacing, window, free.pilot)
     lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
     chosen = between(_cosine_modes.wavelengths(lattice), window)
     return _cosine_modes.FreeModes.of(heights, lattice, chosen, free.pilot, power)
@@ -536,7 +540,7 @@ def _without_small_gaps(heights: Array, spacing: tuple[float, float], most: floa
     if not 0 < np.count_nonzero(~observed) <= most * heights.size:
         return heights
     values = heights[observed]
-    return _cosine_modes.Filling(observed, spacing)(values - values.mean())
+    return Filling(observed, spacing)(values - values.mean())
 
 
 def _cropped(heights: Array) -> Array:

@@ -10,14 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from typing import Any
+from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions._surface_input import Scales, between
 from fractalcontact.dimensions._whittle import CHI_SQUARE, UNEVEN, WhittleFit, fit_from_starts
+
+if TYPE_CHECKING:
+    from fractalcontact.dimensions._cosine_modes import Lattice
+    from fractalcontact.dimensions._harmonic_filling import Filling
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -30,6 +34,12 @@ NODES = np.exp(0.5 * (_FIRST + _LAST) - 0.5 * (_LAST - _FIRST) * np.cos(_ANGLES)
 _SMOOTH = 1.3  # exponent up to which the sums over the covariance are exact enough
 _PER = 12  # inverse relative width of a block
 _LARGEST = 1024  # points along an axis up to which the table is summed over the lattice
+_SMOOTHEST = 1.1  # exponent up to which the effect of gaps is found
+_FAR = 0.03  # change of H beyond which the effect of gaps is found again
+_MODERATE = 0.15  # share of missing points up to which one probe is enough
+_BORDER = 0.95  # the same for the share of the border that was observed
+_STEEP = 0.7  # exponent up to which one probe is enough in any case
+_MANY = 0.3  # the same for the standard error of a surface of fewer points
 _ALIASES = 2  # aliases along each axis that are summed one by one
 _INVERSE = np.linalg.inv(np.polynomial.chebyshev.chebvander(-np.cos(_ANGLES), _DEGREE))
 
@@ -264,10 +274,15 @@ def expected_power_at(
     shape: tuple[int, ...], spacing: tuple[float, ...], modes: Any
 ) -> Callable[[float], Array]:
     """Return a function of H: the expected power of the modes of given numbers, (rows, columns)."""
+    return _summed(shape, spacing, [_weights(n, k) for n, k in zip(shape, modes, strict=True)])
+
+
+def _summed(shape: tuple[int, ...], spacing: tuple[float, ...], weights: Any) -> Callable[[float], Array]:
+    """Return a function of H: the sum over the covariance at all lags with weights along y and x."""
     from fractalcontact.dimensions._cosine_modes import Lattice
 
     lattice = Lattice.of((shape[0], shape[1]), (spacing[0], spacing[1]))
-    along_y, along_x = (_weights(n, k) for n, k in zip(shape, modes, strict=True))
+    along_y, along_x = weights
     return lambda hurst: np.asarray(along_y @ lattice.covariance(hurst) @ along_x.T)
 
 
@@ -278,6 +293,26 @@ def _weights(n: int, modes: Array) -> Array:
     weights = 2.0 * ((n - lag) * np.cos(angle * lag) - np.sin(angle * lag) / np.sin(angle)) / n
     weights[:, 0] = 1.0
     return np.asarray(weights)
+
+
+@lru_cache(maxsize=2)
+def _block_weights(n: int) -> Array:
+    """Return the mean of `_weights` over the modes of each block along an axis: (blocks, n).
+
+    With that of the mode at its centre, H of a large surface would be 0.0003 too large.
+    """
+    starts, lag = _starts(n, 1), np.arange(n)
+    cosines, sines = np.cos(np.pi * np.arange(2 * n) / n), np.sin(np.pi * np.arange(2 * n) / n)
+    weights = np.empty((starts.size - 1, n))
+    for row, first, last in zip(weights, starts, starts[1:], strict=False):
+        modes = np.arange(first, last)
+        turns = np.multiply.outer(modes, lag) % (2 * n)
+        row[:] = (n - lag) * cosines[turns].sum(axis=0)
+        row -= (sines[turns] / sines[modes][:, None]).sum(axis=0)
+        row *= 2.0 / (n * modes.size)
+    weights[:, 0] = 1.0
+    weights.flags.writeable = False  # shared by all calls
+    return weights
 
 
 def _profile_power(n: int) -> Array:
@@ -323,8 +358,78 @@ def profile_modes(heights: Array) -> Array:
 
 
 @dataclass(frozen=True)
+class BlockGaps:
+    """The effect of missing points on the modes of a large surface, block by block.
+
+    Attributes
+    ----------
+    lattice : Lattice
+    filling : Filling
+    starts, count : as in `Frame`, for all blocks
+    chosen : ndarray of bool
+        Blocks that are fitted.
+    pilot : float
+        An exponent near that of the surface.
+    """
+
+    lattice: Lattice
+    filling: Filling
+    starts: tuple[Array, Array]
+    count: Array
+    chosen: Array
+    pilot: float
+
+    @cached_property
+    def missing(self) -> float:
+        """Share of missing points."""
+        return 1.0 - float(np.mean(self.filling.observed))
+
+    def probes(self, hurst: float) -> int:
+        """Return how many random sign patterns scatter by at most a third of the standard error of H.
+
+        One is enough but for large gaps, and gaps at the border, of a smooth surface.
+        """
+        observed = self.filling.observed
+        border = (observed[0], observed[-1], observed[:, 0], observed[:, -1])
+        is_large = self.missing > _MODERATE or np.mean(np.concatenate(border)) < _BORDER
+        return 2 if is_large and hurst > _STEEP else 1
+
+    def excess(self, hurst: float) -> Array:
+        """Return the excess of the expected power over that of the complete surface."""
+        from fractalcontact.dimensions._cosine_modes import relative_excess
+
+        return self._mean(relative_excess(self.lattice, self.filling, hurst, self.probes(hurst)))
+
+    @cached_property
+    def white(self) -> Array:
+        """Excess of the expected power of white noise."""
+        from fractalcontact.dimensions._cosine_modes import relative_white_excess
+
+        return self._mean(relative_white_excess(self.filling, self.probes(self.pilot)))
+
+    def _mean(self, values: Array) -> Array:
+        return np.asarray((_sums(values, self.starts) / self.count)[self.chosen])
+
+    def error(self, fit: WhittleFit) -> float:
+        """Return the standard error of H by the sandwich formula, see `_cosine_modes.FreeModes.error`."""
+        from fractalcontact.dimensions._cosine_modes import GappedModes
+
+        hurst = float(np.clip(fit.hurst, LOWEST, _SMOOTH))
+        gapped = GappedModes(self.lattice, self.filling.observed, hurst, 1, self.filling)
+        reference = gapped.reference_power()
+        rows = np.zeros((len(fit.columns), *self.count.shape))
+        rows[:, self.chosen] = fit.columns / fit.total
+        for axis, starts in enumerate(self.starts):
+            rows = np.repeat(rows, np.diff(starts), axis=axis + 1)
+        meat = 0.25 * gapped.score_covariance(rows * reference, hurst, fit.noise / fit.amplitude)
+        bread = np.linalg.inv(fit.bread)
+        square = float((bread @ meat @ bread.T)[1, 1])
+        return float(np.sqrt(square)) if square > 0 else float("nan")
+
+
+@dataclass(frozen=True)
 class BlockModes:
-    """Modes of a large complete surface with free edges, block by block (a `_whittle.Modes`).
+    """Modes of a large surface with free edges, block by block (a `_whittle.Modes`).
 
     Attributes
     ----------
@@ -342,7 +447,32 @@ class BlockModes:
     order: Array
     sector: Array
     model: Callable[[float], Array]
-    gapped: None = None
+    gaps: BlockGaps | None = None
+
+    @classmethod
+    def of_gapped(
+        cls, heights: Array, spacing: tuple[float, float], scales: Scales, pilot: float
+    ) -> BlockModes:
+        """Fill a surface and collect its modes; `pilot` is an exponent near its own."""
+        from fractalcontact.dimensions._cosine_modes import Lattice, mode_power
+        from fractalcontact.dimensions._harmonic_filling import Filling
+
+        observed = np.isfinite(heights)
+        filling, values = Filling(observed, spacing), heights[observed]
+        modes = cls.of(mode_power(filling(values - values.mean())), spacing, None)
+        shape = heights.shape[0], heights.shape[1]
+        starts = _starts(shape[0], 1), _starts(shape[1], 1)
+        blocks = starts[0].size - 1, starts[1].size - 1
+        chosen = between(modes.order, scales)
+        gaps = BlockGaps(
+            Lattice.of(shape, spacing),
+            filling,
+            starts,
+            modes.count.reshape(blocks),
+            chosen.reshape(blocks),
+            float(np.clip(pilot, LOWEST, _SMOOTHEST)),
+        )
+        return replace(modes.part(chosen), gaps=gaps)
 
     @classmethod
     def of(cls, power: Array, spacing: tuple[float, float], scales: Scales) -> BlockModes:
@@ -360,8 +490,9 @@ class BlockModes:
         along_y, along_x = (np.pi * k / (n * d) for k, n, d in zip(centres, (ny, nx), spacing, strict=True))
         order = 2.0 * np.pi / np.hypot(along_y[:, None], along_x)
         chosen = between(order, scales)
-        expected = expected_power_at((ny, nx), spacing, centres)
+        expected = _summed((ny, nx), spacing, [_block_weights(n) for n in (ny, nx)])
 
+        @lru_cache(maxsize=8)  # the nodes of the likelihood, which gaps need as well
         def model(hurst: float) -> Array:
             if hurst > _SMOOTH:  # sums over the covariance cancel
                 lattice = Lattice.of((ny, nx), spacing)
@@ -383,7 +514,9 @@ class BlockModes:
         return float(self.count.sum())
 
     def scatter(self, fit: WhittleFit) -> float:
-        """Return z of the flatness."""
+        """Return z of the flatness; 0 with gaps, whose effect on it is only estimated."""
+        if self.gaps is not None:
+            return 0.0
         ratio = self.power / fit.total
         mean = float(np.average(ratio, weights=self.count))
         logs = float(np.average(self.logs - np.log(fit.total), weights=self.count)) - np.log(mean)
@@ -391,7 +524,11 @@ class BlockModes:
 
     def part(self, chosen: Array) -> BlockModes:
         """Return some of the blocks."""
-        model = self.model
+        model, gaps = self.model, self.gaps
+        if gaps is not None:
+            of_all = np.zeros_like(gaps.chosen)
+            of_all[gaps.chosen] = chosen
+            gaps = replace(gaps, chosen=of_all)
         return BlockModes(
             power=self.power[chosen],
             logs=self.logs[chosen],
@@ -399,15 +536,37 @@ class BlockModes:
             order=self.order[chosen],
             sector=self.sector[chosen],
             model=lambda hurst: model(hurst)[chosen],
+            gaps=gaps,
         )
 
     def fit(self, start: float, noise: bool) -> WhittleFit:
-        """Fit from a pilot estimate; with noise from two starts, of which the better end is returned."""
-        return fit_from_starts(self.power, self.model, start, noise, weights=self.count)
+        """Fit from a pilot estimate; with noise from two starts, of which the better end is returned.
+
+        What gaps add is a share of the expected power that hardly depends on H. It is found at a pilot
+        estimate, and again where the fit is far from that.
+        """
+        fit = partial(fit_from_starts, self.power, self.model, noise=noise, weights=self.count)
+        if self.gaps is None:
+            return fit(start)
+        white = self.gaps.white if noise else None
+        pilot = self.gaps.pilot
+        for _ in range(2):
+            share = self.gaps.excess(pilot)
+            excess = partial(_scaled, self.model, share)
+            result = fit(start, gaps=excess, white_excess=white)
+            nearest = float(np.clip(result.hurst, LOWEST, _SMOOTHEST))
+            if abs(nearest - pilot) < _FAR:
+                break
+            pilot = nearest
+        return result
 
     def error(self, fit: WhittleFit) -> float:
         """Return the standard error of H, see `_cosine_modes.FreeModes.error`."""
-        return fit.standard_error * (1.01 + 0.02 * float(np.clip(fit.hurst, 0.0, 1.0)))
+        missing = 0.0 if self.gaps is None else self.gaps.missing
+        if self.gaps is not None and missing > _MANY:
+            return self.gaps.error(fit)
+        correlation = 1.01 + 0.02 * float(np.clip(fit.hurst, 0.0, 1.0))
+        return fit.standard_error * correlation / float(np.sqrt(1.0 - missing))
 
     def is_uneven(self, inside: Array, hurst: float) -> bool:
         """Return whether few waves of some blocks carry more than their share."""
@@ -416,6 +575,11 @@ class BlockModes:
         mean = float(np.average(part.power / expected, weights=part.count))
         logs = float(np.average(part.logs - np.log(expected), weights=part.count)) - np.log(mean)
         return bool((logs - CHI_SQUARE[0]) * np.sqrt(part.number / CHI_SQUARE[1]) < -UNEVEN)
+
+
+def _scaled(model: Callable[[float], Array], share: Array, hursts: tuple[float, ...]) -> list[Array]:
+    """Return a share of the expected power at each exponent."""
+    return [share * model(hurst) for hurst in hursts]
 
 
 def _sums(values: Array, starts: tuple[Array, Array]) -> Array:
