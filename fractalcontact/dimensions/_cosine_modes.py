@@ -35,6 +35,7 @@ _MODERATE = 0.15  # the same for two, and for the error of a surface of fewer po
 _SMALL = 1 << 13  # modes up to which the covariance of the score takes all probes
 _SEED = 20260801
 _SMOOTH = 1.1  # H above which the expected power is summed from differences: no fractal is so smooth
+_ELONGATED = 30.0  # ratio of the spacings beyond which the same is done for any H
 _NEAR = 24.0  # spacings up to which second differences are taken directly
 _DERIVATIVES = 4  # half the highest order of the derivatives beyond
 
@@ -207,12 +208,16 @@ def expected_power(lattice: Lattice, hurst: float) -> Array:
     other units.
 
     The sums over a covariance cancel beyond double precision where the longest waves of a large and smooth
-    surface have 1e16 times the power of the shortest. So beyond H = `_SMOOTH` the cosine modes are written as
+    surface have 1e16 times the power of the shortest, and where spacings differ a hundredfold. So beyond
+    H = `_SMOOTH`, or a ratio of `_ELONGATED`, the cosine modes are written as
     sine modes of the differences over one step along both axes, which is exact:
     sum_i cos(q (i + 1/2)) z_i = -sum_i sin(q i) (z_i - z_(i-1)) / (2 sin(q / 2)).
     """
-    if hurst <= _SMOOTH:
+    is_elongated = max(lattice.spacing) > _ELONGATED * min(lattice.spacing)
+    if hurst <= _SMOOTH and not is_elongated:
         return _along(_along(lattice.covariance(hurst), 1), 0)
+    if abs(hurst - 1.0) < 1e-6:  # where the differences of r^2H vanish, as does their factor 1 - H
+        hurst = 1.0 + 1e-6
     power = _along(_along(_difference_covariance(lattice, hurst), 1, differences=True), 0, differences=True)
     sy, sx = (np.sin(0.5 * np.pi * np.arange(1, n) / n) ** 2 for n in lattice.shape)
     return np.asarray(power / (16.0 * sy[:, None] * sx))
@@ -281,7 +286,11 @@ def _difference_covariance(lattice: Lattice, hurst: float) -> Array:
         for n, d in zip((ny, nx), lattice.spacing, strict=True)
     ]
     y, x = (np.abs(np.arange(-1, n + 1)) * d for n, d in zip(near, lattice.spacing, strict=True))
-    power = (y[:, None] ** 2 + x**2) ** hurst
+    # less what varies along the longer spacing only, which cancels in differences along the shorter one
+    long, short = (y[:, None], x) if lattice.spacing[0] > lattice.spacing[1] else (x, y[:, None])
+    unit = np.where(long > 0.0, long, 1.0)
+    power = unit ** (2 * hurst) * np.expm1(hurst * np.log1p((short / unit) ** 2))
+    power = np.where(long > 0.0, power, short ** (2 * hurst))
     covariance[: near[0], : near[1]] = np.diff(np.diff(power, 2, 0), 2, 1)
     return np.asarray(covariance / (hurst - 1.0))
 

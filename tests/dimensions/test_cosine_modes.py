@@ -165,3 +165,17 @@ def test_expected_power_of_large_smooth_surface(shape):
     )
     assert larger[0, 0] / square[0, 0] == pytest.approx(8.0**5.9, rel=0.01)
     assert (large > 0.0).all()
+
+
+@pytest.mark.parametrize("spacing", [(1e4, 1.0), (1e-4, 1.0)])
+def test_expected_power_where_spacings_differ(spacing):
+    """Short waves along the shorter spacing: those of independent profiles, power 1D / (1 - H) of each."""
+    n, hurst = 200, 0.9
+    for value in (0.99999999, 1.05):
+        assert (_cosine_modes.expected_power(_cosine_modes.Lattice.of((n, n), spacing), value) > 0.0).all()
+    power = _cosine_modes.expected_power(_cosine_modes.Lattice.of((n, n), spacing), hurst)
+    power = power if spacing[0] > 1.0 else power.T
+    lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) * min(spacing)
+    modes = scipy.fft.dct(np.eye(n), axis=1, norm="ortho")[:, 1:].T
+    profile = np.einsum("ki,ij,kj->k", modes, -(lag ** (2 * hurst)) / (1 - hurst), modes)
+    np.testing.assert_allclose(power[:, -20:].mean(axis=0), profile[-20:], rtol=0.02)
