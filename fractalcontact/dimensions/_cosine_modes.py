@@ -24,7 +24,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions import _whittle
-from fractalcontact.dimensions._harmonic_filling import Filling
+from fractalcontact.dimensions._harmonic_interpolation import Filling
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

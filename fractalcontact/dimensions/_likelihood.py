@@ -33,7 +33,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     window_of,
     with_or_without_aliases,
 )
-from fractalcontact.dimensions._harmonic_filling import Filling
+from fractalcontact.dimensions._harmonic_interpolation import Filling
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
 from fractalcontact.dimensions._increment_moments import Moments, increment_moments
 from fractalcontact.dimensions._increments import closed_form, without_steps

@@ -21,7 +21,7 @@ from fractalcontact.dimensions._whittle import CHI_SQUARE, UNEVEN, WhittleFit, f
 
 if TYPE_CHECKING:
     from fractalcontact.dimensions._cosine_modes import Lattice
-    from fractalcontact.dimensions._harmonic_filling import Filling
+    from fractalcontact.dimensions._harmonic_interpolation import Filling
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -455,7 +455,7 @@ class BlockModes:
     ) -> BlockModes:
         """Fill a surface and collect its modes; `pilot` is an exponent near its own."""
         from fractalcontact.dimensions._cosine_modes import Lattice, mode_power
-        from fractalcontact.dimensions._harmonic_filling import Filling
+        from fractalcontact.dimensions._harmonic_interpolation import Filling
 
         observed = np.isfinite(heights)
         filling, values = Filling(observed, spacing), heights[observed]

@@ -6,7 +6,7 @@ import scipy.fft
 import scipy.stats
 
 from fractalcontact.dimensions import _cosine_modes
-from fractalcontact.dimensions._harmonic_filling import Filling
+from fractalcontact.dimensions._harmonic_interpolation import Filling
 
 
 def squares(shape, steps, observed=None):
