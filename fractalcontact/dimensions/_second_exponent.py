@@ -37,6 +37,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 _SCORING_STEPS = 40  # of a fit of two exponents
 _LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
+_LEAST_CROSSOVER = 2.0  # spacings: shorter waves run along the diagonals only
 _FLAT = 1.2  # times the standard errors of two exponents: the likelihood is flatter than a parabola
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
 _DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
@@ -147,7 +148,8 @@ class Explanations:
         if self.has_aliases:
             return None if self.is_shortened else fit_two_exponents(self.blocks, self.inside)
         fits = [fit_two_exponents(self.blocks, self.inside, is_sharp=sharp) for sharp in (False, True)]
-        rough = [fit for fit in fits if fit is not None and fit.rough.hurst > _LEAST_EXPONENT]
+        seen = [fit for fit in fits if fit is not None and fit.crossover > _LEAST_CROSSOVER]
+        rough = [fit for fit in seen if fit.rough.hurst > _LEAST_EXPONENT]
         return min(rough, key=lambda fit: fit.penalised, default=None)
 
     @cached_property

@@ -206,6 +206,15 @@ def test_crop_with_two_exponents_has_that_of_the_shorter_waves():
     assert inside >= 3
 
 
+@pytest.mark.parametrize("rng", [0, 3])
+def test_waves_along_the_diagonals_have_no_exponent_of_their_own(rng):
+    """Once .26 and .14 with the ends 0 and .9, of waves shorter than 2 spacings."""
+    surface = fc.surfaces.from_array(STEP * broken(0.0, 0.9, 1.8, rng, 128), SPACING)
+    result = fc.dimensions.estimate(surface).isel(method=0)
+    assert float(result.hurst) == pytest.approx(0.9, abs=0.12)
+    assert float(result.ci_low) > 0.7
+
+
 @pytest.mark.parametrize("rng", [0, 1])
 def test_sum_of_two_surfaces_has_the_exponent_of_each(rng):
     rough, smooth = (brownian(hurst, rng + seed, (256, 256)) for hurst, seed in ((0.3, 0), (0.9, 100)))
