@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, TooLittleMemory
+from fractalcontact.base.memory import require_libraries
 from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
@@ -36,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parsers()[0].parse_args(arguments)
     warnings.showwarning = _say_warning
     try:
+        require_libraries()
         with leaving(_leave):
             code: int = options.action(options)
     except TooLittleMemory as error:

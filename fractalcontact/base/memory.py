@@ -20,10 +20,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fractalcontact.base.errors import TooLittleMemory, UnreadableFile
+from fractalcontact.base.threads import openblas_threads
 
 NEGLIGIBLE = 1 << 25  # bytes that a call takes without a look at the limits
 SMALL_FILE = 1 << 28  # bytes that any file may unpack to
-LIBRARIES = 5e8  # of the address space: the compiler and the threads, where they are not loaded yet
+# bytes that NumPy, SciPy, Numba and matplotlib take as they are loaded, as `ulimit -v` (address space) and
+# `ulimit -d` (data) count them. OpenBLAS, of which NumPy and SciPy have a copy each, takes more for every
+# further thread; where that does not fit, it ends the process or tries for ever.
+LIBRARIES = {"-v": 6.1e8, "-d": 2.3e8}
+OPENBLAS_THREAD = 8.4e7
 PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
 
 
@@ -55,7 +60,8 @@ Estimate = float | Callable[[Plane, Mapping[str, Any]], float]
 def free_memory(root: Path = Path("/")) -> Free:
     """Return how much memory this process may still take; `root` is that of the file system."""
     limits = [_free_of_machine(root), *_free_of_process(root), *_free_of_groups(root)]
-    return min(limits, key=lambda free: free.size)
+    least = min(limits, key=lambda free: free.size)
+    return least._replace(size=max(0.0, least.size))
 
 
 def _free_of_machine(root: Path) -> Free:
@@ -71,7 +77,7 @@ def _free_of_machine(root: Path) -> Free:
 
 
 def _free_of_process(root: Path) -> Iterator[Free]:
-    """Yield what the limits of the process leave (Linux)."""
+    """Yield what the limits of the process leave beside the libraries; below 0, these do not fit (Linux)."""
     status = _numbers(root / "proc/self/status")
     if not status:
         return
@@ -80,9 +86,24 @@ def _free_of_process(root: Path) -> Iterator[Free]:
     for limit, used, option in (("RLIMIT_AS", "VmSize", "-v"), ("RLIMIT_DATA", "VmData", "-d")):
         most = resource.getrlimit(getattr(resource, limit))[0]
         if most != resource.RLIM_INFINITY and used in status:
-            reserve = 0.0 if "numba" in sys.modules else LIBRARIES
-            left = max(0.0, most - 1024.0 * status[used] - reserve)
+            left = most - 1024.0 * status[used] - _libraries(option)
             yield Free(left, f"limit of the process, ulimit {option} {most >> 10}")
+
+
+def _libraries(option: str) -> float:
+    """Return the bytes that the libraries take, as `ulimit` counts them; 0 where they are loaded."""
+    if "numba" in sys.modules:
+        return 0.0
+    return LIBRARIES[option] + OPENBLAS_THREAD * (openblas_threads() - 1)
+
+
+def require_libraries() -> None:
+    """Raise `TooLittleMemory` unless the libraries can be loaded within the limits of the process."""
+    for free in _free_of_process(Path("/")):
+        if free.size < 0.0:
+            fewer = "" if openblas_threads() == 1 else " (less with OPENBLAS_NUM_THREADS=1)"
+            expected = f"about {in_words(-free.size)} more to load NumPy, SciPy and Numba{fewer}"
+            raise TooLittleMemory("fractalcontact", [f"memory: expected {expected}, got the {free.limit}"])
 
 
 def _free_of_groups(root: Path) -> Iterator[Free]:

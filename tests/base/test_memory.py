@@ -155,20 +155,21 @@ contact = ["press"]
 @linux
 def test_scene_beyond_the_limit_is_refused_in_one_line_and_writes_nothing(tmp_path):
     (tmp_path / "large.toml").write_text(SCENE.format(n=5000), encoding="utf-8")
-    command = f"ulimit -v 1500000; exec {sys.executable} -m fractalcontact run large.toml -o out"
-    done = subprocess.run(
-        ["bash", "-c", command],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": str(Path(fc.__file__).parents[1])},
-    )
-    assert done.returncode == 1
-    assert "the stage contact: about" in done.stderr
-    assert "ulimit -v 1500000" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out" / "result.nc").exists()
+    for limit, reason in ((1500000, "the stage contact: about"), (400000, "to load NumPy, SciPy and Numba")):
+        command = f"ulimit -v {limit}; exec {sys.executable} -m fractalcontact run large.toml -o out"
+        done = subprocess.run(
+            ["bash", "-c", command],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+            env=os.environ | {"PYTHONPATH": str(Path(fc.__file__).parents[1])},
+        )
+        assert done.returncode == 1
+        assert reason in done.stderr
+        assert f"ulimit -v {limit}" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert not (tmp_path / "out" / "result.nc").exists()
 
 
 def test_lazy_surface_needs_no_memory_for_the_whole_of_it():
