@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+# Tests run on as many processes as there are processors: further threads of OpenBLAS would only wait for each
+# other, and burn a processor while they do. Set before NumPy is imported, and inherited by every process.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 DATA = "FRACTALCONTACT_DATA"
 STRICT = "FRACTALCONTACT_STRICT_SKIPS"
 # programs that are used where they are installed, and are never required: other solvers, a browser

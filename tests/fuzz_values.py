@@ -12,7 +12,10 @@ import uuid
 
 import numpy as np
 import xarray as xr
+from hypothesis import HealthCheck
 
+# of every property-based test: a call may be slow, and what was found before is kept in the tests themselves
+SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 HUGE = 10**400
 NOW = datetime.datetime(2026, 1, 2, 3, 4, 5)
 

@@ -98,11 +98,11 @@ def dense_increment(operator, traction, bound, change):
     Minimise dq K dq / 2 with |q + dq| <= bound and sum dq = change; the displacement is the multiplier.
     """
     root = np.linalg.cholesky(operator).T
+    right = np.linalg.solve(root.T, np.ones(bound.size))
 
     def under(displacement):
-        right = np.linalg.solve(root.T, np.full(bound.size, displacement))
         limits = (-bound - traction, bound - traction)
-        return lsq_linear(root, right, limits, method="bvls", tol=1e-14).x
+        return lsq_linear(root, right * displacement, limits, method="bvls", tol=1e-14).x
 
     reach = 20 * abs(change) * operator.max()
     displacement = brentq(lambda d: under(d).sum() - change, -reach, reach, xtol=1e-12 * reach)

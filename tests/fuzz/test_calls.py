@@ -29,14 +29,13 @@ from fuzz_calls import (
     slid,
     unexplained,
 )
-from fuzz_values import VALUES
-from hypothesis import HealthCheck, given, settings, strategies
+from fuzz_values import SETTINGS, VALUES
+from hypothesis import given, settings, strategies
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 
 QUICK, LONG = 400, 60_000
-SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 
 
 # errors of these name what the argument stands for, the file, or the first argument, refused as it stands

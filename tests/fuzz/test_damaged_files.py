@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 from fuzz_files import FILES, READERS, content, damaged_file, fault_of_file, names
-from hypothesis import HealthCheck, given, settings, strategies
+from fuzz_values import SETTINGS
+from hypothesis import given, settings, strategies
 
 import fractalcontact as fc
 from fractalcontact.base.errors import UnreadableFile
@@ -19,7 +20,6 @@ from fractalcontact.base.errors import UnreadableFile
 # rasterio prints an exception where it cannot decode what GDAL says of a damaged file
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 QUICK, LONG = 200, 30_000
-SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 
 
 def check(pick):

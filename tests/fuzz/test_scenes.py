@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from fuzz_calls import rough
 from fuzz_scenes import SCENES, damaged_text, fault_of_scene, toml_of
-from hypothesis import HealthCheck, given, settings, strategies
+from fuzz_values import SETTINGS
+from hypothesis import given, settings, strategies
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
 
 QUICK, LONG = 150, 20_000
-SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 
 
 def fault(source):
