@@ -34,6 +34,7 @@ _NAMED = 3  # waves in a note
 _MULTIPLES = 12  # of a wave that are looked for at their own places
 _DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
 _FEW = 3
+_ALMOST_SINGULAR = 1e-3  # of the larger singular value
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
@@ -267,8 +268,17 @@ def _measured(
             bend = low - 2.0 * middle + high
             shift = np.clip(0.5 * (low - high) / bend, -2.0, 2.0) if bend < 0 else np.sign(high - low)
             best = best + shift * step
-    value = 2.0 * mode(best) / float(np.prod([taper.sum() for taper in tapers]))
-    return _named(surface, (float(best[0]), float(best[1])), (value.real, -value.imag), p_value)
+    # least squares with the weights of the taper: near two spacings cosine and sine are not independent
+    value, whole = mode(best), float(np.prod([taper.sum() for taper in tapers]))
+    twice = np.prod(
+        [
+            taper @ np.exp(4j * np.pi * f * np.arange(len(taper)))
+            for taper, f in zip(tapers, best, strict=True)
+        ]
+    )
+    products = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]])
+    cosine, sine = np.linalg.pinv(products, rcond=_ALMOST_SINGULAR) @ (value.real, -value.imag)
+    return _named(surface, (float(best[0]), float(best[1])), (float(cosine), float(sine)), p_value)
 
 
 def _named(
