@@ -43,8 +43,13 @@ _UNEVEN = 5.0  # standard deviations by which the modes may differ from exponent
 _FEWEST = 40  # modes of which that can be told
 _MOST = 48  # modes above the first limit; more are those of a surface that is not white
 _LEAST = 1e-280  # power of a mode: that of a constant is zero
+_LARGEST = 600.0  # logarithm of the expected power
+_EDGE = np.log(2.0)  # largest fall of the logarithm of the power between rings: a band may end inside a ring
 _ACROSS = np.arange(-1, 2)  # lines of modes along a ray
-_ABOVE_RAY = 8.0  # times the mean of the strongest line of modes on the ray through it
+# least power of a wave, times the mean of the strongest line of modes on the ray through it: the first for
+# the mean of any ray, the second from the mean of a ridge on
+_ABOVE_RAY, _ABOVE_RIDGE = 8.0, 15.0
+_RAY, _RIDGE = 1.5, 2.5
 
 
 @dataclass(frozen=True)
@@ -113,11 +118,14 @@ class Rings:
             coefficients = coefficients + self.normal @ (self.design.T @ (count * excess))
         excess = np.exp(np.clip(logs - self.design @ coefficients, -30.0, 30.0)) - 1.0
         if not there.all() or float(np.mean(0.5 * count * excess**2)) > _AGREE:
+            beside = np.maximum(np.append(logs[1:], logs[-1]), np.append(logs[0], logs[:-1]))
+            logs = np.maximum(logs, beside - _EDGE)
             return np.asarray(np.exp(np.interp(self.logs, self.design[:, -2], logs)))
         result = np.full_like(self.logs, coefficients[0])
         for coefficient in coefficients[1:]:
             result *= self.logs
             result += coefficient
+        np.minimum(result, _LARGEST, out=result)  # a fit to few rings runs away in the long modes before them
         np.exp(result, out=result)
         return result
 
@@ -247,7 +255,7 @@ class WhiteSurface:
                 continue
             mean, ray = self._around(power, cycles)
             p_value = _probability(number, ratio / max(1.0, mean), self._continuous)
-            if p_value < FALSE_ALARM and (count or ratio > _ABOVE_RAY * ray):
+            if p_value < FALSE_ALARM and (count or ratio > _least_on_ray(ray)):
                 found.append(Peak(ratio, p_value, (float(cycles[0]), float(cycles[1]))))
         return found
 
@@ -423,6 +431,14 @@ def _probability(number: float, ratio: float, continuous: int) -> float:
     Along each axis of continuous frequencies there are sqrt(pi ratio / 3) times as many maxima (Rice 1944).
     """
     return float(min(1.0, number * np.exp(-ratio) * max(1.0, np.pi / 3.0 * ratio) ** (0.5 * continuous)))
+
+
+def _least_on_ray(ray: float) -> float:
+    """Return the power that a wave has, given the mean of the modes on the ray through it.
+
+    All modes of a ridge, as that of offsets of the rows, are exponential numbers of its mean.
+    """
+    return ray * float(np.interp(ray, (_RAY, _RIDGE), (_ABOVE_RAY, _ABOVE_RIDGE)))
 
 
 def _axes(heights: Array) -> int:
