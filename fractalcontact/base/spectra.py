@@ -87,6 +87,14 @@ def periodogram(
     return psd, half_weights(shape[-1])
 
 
+def ring_edges(shape: Sequence[int], spacing: Sequence[float]) -> Array:
+    """Return the edges of the rings of `radial_average`, in rad m-1."""
+    finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
+    edges = step * (np.arange(int(np.floor(np.pi / max(spacing) / step + 0.5)) + 1) + 0.5)
+    low = finer * (np.arange(int(np.ceil(0.5 * step / finer - 0.5 - 1e-9))) + 0.5)
+    return np.concatenate([low, edges])
+
+
 def radial_average(
     psd: Array, shape: Sequence[int], spacing: Sequence[float], edges: Array | None = None
 ) -> tuple[Array, Array, Array]:
@@ -114,12 +122,7 @@ def radial_average(
     waves = half_wavenumbers(shape, spacing)
     radius = np.sqrt(_square((waves[0][:half], waves[1]))).ravel()  # rows of -q_y have the same
     nyquist = np.pi / max(spacing)
-    if edges is None:
-        finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
-        edges = step * (np.arange(int(np.floor(nyquist / step + 0.5)) + 1) + 0.5)
-        low = finer * (np.arange(int(np.ceil(0.5 * step / finer - 0.5 - 1e-9))) + 0.5)
-        edges = np.concatenate([low, edges])
-    edges = np.asarray(edges, dtype=np.float64)
+    edges = ring_edges(shape, spacing) if edges is None else np.asarray(edges, dtype=np.float64)
     rings = edges.size - 1
     ring = np.searchsorted(edges, radius, side="right")  # 0 and rings + 1 hold what is in no ring
     ring[(radius > nyquist * (1 + 1e-12)) | (radius == 0)] = 0

@@ -343,15 +343,17 @@ def _spectrum_covariance(surface: Surface, curve: Curve, _: float) -> Array | st
     if surface.axes == 1:
         return "a ring of a profile is one mode, whose logarithm is not normally distributed"
     sides = surface.grid.extent
-    if abs(sides[0] - sides[1]) > _SQUARE * max(sides):
-        return "the covariance of the rings is known for squares only"
+    if max(sides) > _LONGEST * min(sides):
+        return "the surface is too long for its width: its rings hold few waves along the short side"
     if any(surface.grid.periodic) and not all(surface.grid.periodic):
         return _PERIODIC
-    return _spectrum.ring_covariance(curve.count, is_tapered=not all(surface.grid.periodic))
+    return _spectrum.ring_covariance(
+        curve.count, surface.shape, surface.grid.spacing, is_tapered=not all(surface.grid.periodic)
+    )
 
 
 _LEAST_WINDOWS = 128  # points along an axis from which on windows are at most an eighth of the surface
-_SQUARE = 0.02  # relative difference of the sides of a square
+_LONGEST = 4.0  # ratio of the sides up to which the covariance of rings was checked
 _PERIODIC = "a periodic surface is not fractional Brownian, for which the covariance of the curve is known"
 _ROWS = "the covariance of the curve is known for a single profile, not for the rows of a surface"
 _UNIT = "depends on the unit of height: see the curve's vertical_scale"

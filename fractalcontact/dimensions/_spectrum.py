@@ -227,8 +227,10 @@ def _tapered_power(shape: tuple[int, int], spacing: tuple[float, float], hurst: 
     return np.asarray(np.maximum(modes, 1e-300))
 
 
-def ring_covariance(counts: Array, *, is_tapered: bool) -> Array:
-    """Return the covariance of the logarithms of ring averages of a square; `counts` are those of all rings.
+def ring_covariance(
+    counts: Array, shape: tuple[int, int], spacing: tuple[float, float], *, is_tapered: bool
+) -> Array:
+    """Return the covariance of the logarithms of all ring averages; `counts` are their numbers of modes.
 
     Without a window the modes are independent. Under a Hann window those up to two apart are correlated; far
     rings are so alike that the covariance with their neighbours can be counted as variance.
@@ -238,18 +240,28 @@ def ring_covariance(counts: Array, *, is_tapered: bool) -> Array:
         return np.diag(2.0 / counts)
     total = (2.0 * sum(_TAPER) - _TAPER[0]) ** 2
     result = np.diag(2.0 * total / counts)
-    rings = min(_EXACT_RINGS, counts.size)
-    reach = rings + 3
-    mode = np.arange(-reach, reach + 1)
-    ring = np.floor(np.hypot(mode[:, None], mode) + 0.5).astype(np.int64) - 1
+    edges = spectra.ring_edges(shape, spacing)
+    rings = min(_EXACT_RINGS, edges.size - 1)
+    lines = []
+    for n, d in zip(shape, spacing, strict=True):
+        step = 2.0 * np.pi / (n * d)
+        reach = int(edges[rings] / step) + 3
+        lines.append(step * np.arange(-reach, reach + 1))
+    radius = np.hypot(lines[0][:, None], lines[1])
+    ring = np.where(radius > 0.0, np.searchsorted(edges, radius, side="right") - 1, -1)
+    held = np.unique(ring[(ring >= 0) & (ring < rings)])  # empty rings have no average
+    number = np.full(edges.size + 1, -1)
+    number[held] = np.arange(held.size)
+    rings = min(held.size, counts.size)
+    ring = number[ring]  # -1 at the mean and beyond
     inner = ring[2:-2, 2:-2]
-    pairs = np.zeros(((rings + 5) ** 2,))
+    pairs = np.zeros((held.size**2,))
     for dy in range(-2, 3):
         for dx in range(-2, 3):
             other = ring[2 + dy : ring.shape[0] - 2 + dy, 2 + dx : ring.shape[1] - 2 + dx]
-            both = (inner >= 0) & (other >= 0) & (inner < rings) & (other < rings)
-            index = inner[both] * (rings + 5) + other[both]
+            both = (inner >= 0) & (other >= 0)
+            index = inner[both] * held.size + other[both]
             pairs += _TAPER[abs(dy)] * _TAPER[abs(dx)] * np.bincount(index, minlength=pairs.size)
-    exact = 2.0 * pairs.reshape(rings + 5, rings + 5)[:rings, :rings]
+    exact = 2.0 * pairs.reshape(held.size, held.size)[:rings, :rings]
     result[:rings, :rings] = exact / np.outer(counts[:rings], counts[:rings])
     return result

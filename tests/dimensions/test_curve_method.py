@@ -35,6 +35,20 @@ def test_interval_holds_the_exponent(method, family, hurst):
     assert 0.6 < value.std() / error.mean() < 1.5
 
 
+@pytest.mark.parametrize(
+    ("shape", "spacing"), [((50, 140), (1e-4, 1e-4)), ((140, 50), (1e-4, 1e-4)), ((64, 64), (2e-4, 1e-4))]
+)
+def test_interval_of_the_spectrum_of_a_rectangle(shape, spacing):
+    """The rings follow the longer side: near the mean some hold modes along it only."""
+    rectangles = (
+        fc.surfaces.fbm(shape, spacing, hurst=0.4, rms_increment=1e-6, rng=rng) for rng in range(30)
+    )
+    value, low, high, error = estimates(rectangles, "spectrum")
+    assert np.count_nonzero((low <= 0.4) & (high >= 0.4)) >= 25
+    assert abs(value.mean() - 0.4) < 4 * error.mean() / np.sqrt(30)
+    assert 0.6 < value.std() / error.mean() < 1.5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["spectrum", "roughness_length"])
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
@@ -52,7 +66,7 @@ def test_bent_curve_widens_interval():
     assert float(result.ci_high - result.ci_low) > 4.5 * float(result.standard_error)
 
 
-@pytest.mark.parametrize(("shape", "word"), [((64, 96), "squares"), ((128,), "profile")])
+@pytest.mark.parametrize(("shape", "word"), [((32, 160), "too long for its width"), ((128,), "profile")])
 def test_reason_where_the_covariance_is_not_known(shape, word):
     surface = fc.surfaces.fbm(shape, 1e-4, hurst=0.5, rms_increment=1e-6, rng=1)
     result = fc.dimensions.estimate(surface, "spectrum")
