@@ -348,7 +348,7 @@ def _spectrum_covariance(surface: Surface, curve: Curve, _: float) -> Array | st
     if any(surface.grid.periodic) and not all(surface.grid.periodic):
         return _PERIODIC
     return _spectrum.ring_covariance(
-        curve.count, surface.shape, surface.grid.spacing, is_tapered=not all(surface.grid.periodic)
+        curve.count, surface.shape, surface.spacing, is_tapered=not all(surface.grid.periodic)
     )
 
 

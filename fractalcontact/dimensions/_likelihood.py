@@ -6,7 +6,7 @@ spectrum between cut-offs. Profiles with free ends: the exact likelihood of thei
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -33,10 +33,19 @@ from fractalcontact.dimensions._exponent_by_scale import (
     window_of,
     with_or_without_aliases,
 )
-from fractalcontact.dimensions._harmonic_interpolation import Filling
+from fractalcontact.dimensions._free_edges import (
+    LARGE,
+    FreeEdges,
+    SurfaceModes,
+    cropped,
+    first_exponent,
+    is_separable,
+    without_offsets,
+    without_small_gaps,
+)
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
-from fractalcontact.dimensions._increment_moments import Moments, increment_moments
-from fractalcontact.dimensions._increments import closed_form, without_steps
+from fractalcontact.dimensions._increment_moments import increment_moments
+from fractalcontact.dimensions._increments import without_steps
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._periodic_modes import periodic_likelihood
 from fractalcontact.dimensions._profile_likelihood import profile_likelihood
@@ -57,7 +66,7 @@ from fractalcontact.dimensions._second_exponent import (
     fit_knee,
     several_exponents,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface, between
+from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._transfer_functions import Window
 from fractalcontact.dimensions._waves import without_waves
 from fractalcontact.dimensions._whittle import (
@@ -67,7 +76,6 @@ from fractalcontact.dimensions._whittle import (
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
-SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
 
 _PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are taken, if one is to be
 _DOUBT = 4.4  # below it, from which on the interval holds blur and noise beside neither
@@ -78,9 +86,6 @@ _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 _SLIGHT = -2.5, 1.5
 _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface allows for
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
-_LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
-_LARGE_GAPPED = 1 << 17  # the same of a surface with gaps
-_ROUNDING = 1e-26  # relative rounding of the mean square in transforms
 _FREE_WINDOW = "all modes that vary along both axes"
 _INTERPOLATED = 0.01  # share of heights on a line with their neighbours
 _LINEAR = (
@@ -89,7 +94,6 @@ _LINEAR = (
     "`scales` from eight distances of the points on"
 )
 _FEW_GAPS = 0.002  # share of the heights that may be filled without an effect on the waves
-_SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
 _SEPARABLE = (
     "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
@@ -142,52 +146,18 @@ def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) ->
     return estimate.without_interval(_PERIODIC_GAPS)
 
 
-@dataclass(frozen=True)
-class _FreeEdges:
-    """Heights with free edges, and what is asked for.
-
-    Attributes
-    ----------
-    surface : Surface
-    heights : ndarray, shape (ny, nx)
-        Without the rows and columns at the border where nothing was observed.
-    power : ndarray, optional
-        Squared cosine modes; None with gaps.
-    scales, noise
-        As in `fractalcontact.dimensions.estimate`.
-    spread : float, optional
-        That of a known blur, in spacings of x.
-    pilot : float
-        First estimate of H.
-    """
-
-    surface: Surface
-    heights: Array
-    power: Array | None
-    scales: Scales
-    noise: bool
-    spread: float | None
-    pilot: float
-
-    @property
-    def is_default(self) -> bool:
-        """Whether nothing is known of the window, the instrument, or the points that were gridded."""
-        is_asked = self.scales is not None or self.spread is not None or self.noise
-        return not (is_asked or self.surface.finest_scale)
-
-
 def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
     """Fit the cosine modes of a surface with free edges; `spread` in spacings is that of a known blur."""
-    heights = _cropped(surface.heights)
+    heights = cropped(surface.heights)
     if surface.finest_scale:
-        heights = _without_small_gaps(heights, surface.plane_spacing)
+        heights = without_small_gaps(heights, surface.plane_spacing)
     power = _cosine_modes.mode_power(heights) if np.isfinite(heights).all() else None
-    if power is not None and _is_separable(power, heights):
+    if power is not None and is_separable(power, heights):
         return undefined(_SEPARABLE)
-    levelled, spacing = _without_offsets(heights), surface.plane_spacing
+    levelled, spacing = without_offsets(heights), surface.plane_spacing
     moments = cache(lambda stride: increment_moments([(levelled, len(levelled))], levelled.shape, stride))
     compared_parts = cache(lambda hurst, stride: heterogeneity(moments(stride), spacing, hurst))
-    free = _FreeEdges(surface, heights, power, scales, noise, spread, _pilot(moments(1), spacing))
+    free = FreeEdges(surface, heights, power, scales, noise, spread, first_exponent(moments(1), spacing))
     stride = _stride(scales, max(surface.spacing))
     if window := _window_without_aliases(free):
         return window
@@ -206,7 +176,7 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     elif comparison is not None and (several := _without_aliases(free, comparison, blurred, parts)):
         estimate, lag = several
     else:
-        modes = _modes(free)
+        modes = free.modes()
         if modes.number < LEAST_MODES:
             return undefined(f"{modes.number:.0f} modes in the window, at least {LEAST_MODES} are needed")
         fit = modes.fit(free.pilot, noise)
@@ -228,7 +198,7 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     )
 
 
-def _ground(free: _FreeEdges, parts: Heterogeneity, hurst: float, misfit: float) -> Estimate | None:
+def _ground(free: FreeEdges, parts: Heterogeneity, hurst: float, misfit: float) -> Estimate | None:
     """Return the estimate of the ground between steps; None where there are none, or not by default."""
     if not (free.is_default and parts.note):
         return None
@@ -245,7 +215,7 @@ def _ground(free: _FreeEdges, parts: Heterogeneity, hurst: float, misfit: float)
     )
 
 
-def _comparison(free: _FreeEdges) -> Comparison | None:
+def _comparison(free: FreeEdges) -> Comparison | None:
     """Compare the surface with one that is blurred and noisy; None where that is not known.
 
     With gaps, with few modes, and where gridding has removed short waves, as a blur does.
@@ -259,7 +229,7 @@ def _comparison(free: _FreeEdges) -> Comparison | None:
     return compare(Window(frame, inside, frame.mean(free.power)), free.pilot, noise=free.noise)
 
 
-def _shows_blur(free: _FreeEdges, comparison: Comparison, parts: Heterogeneity) -> bool:
+def _shows_blur(free: FreeEdges, comparison: Comparison, parts: Heterogeneity) -> bool:
     """Return whether blur or noise is to be fitted; unequal parts count for fewer modes, and look like it."""
     gain, least = comparison.gain / parts.widening**2, _PLAIN - (_DOUBT if free.is_default else 0.0)
     if abs(comparison.misfit) > SIGNIFICANT * parts.widening:
@@ -267,7 +237,7 @@ def _shows_blur(free: _FreeEdges, comparison: Comparison, parts: Heterogeneity) 
     return not parts.note and gain > (least if comparison.plain.hurst < 1.0 else CLEAR[2])
 
 
-def _blurred_fit(free: _FreeEdges, comparison: Comparison) -> BlurredFit | None:
+def _blurred_fit(free: FreeEdges, comparison: Comparison) -> BlurredFit | None:
     """Fit blur and noise in the largest window that a model of them fits; None if it has too few modes."""
     assert free.power is not None  # a surface with gaps is not compared
     window = comparison.window
@@ -281,7 +251,7 @@ def _blurred_fit(free: _FreeEdges, comparison: Comparison) -> BlurredFit | None:
     )
 
 
-def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tuple[Estimate, int]:
+def _with_blur(free: FreeEdges, comparison: Comparison, fit: BlurredFit) -> tuple[Estimate, int]:
     """Return the estimate of a surface on which blur or noise is seen, and a lag beyond the blur."""
     surface, window = free.surface, comparison.window
     longest = 2.0 * np.pi / float(np.sqrt(window.squares.min())) * surface.spacing[1]
@@ -301,7 +271,7 @@ def _with_blur(free: _FreeEdges, comparison: Comparison, fit: BlurredFit) -> tup
 
 
 def _without_aliases(
-    free: _FreeEdges, comparison: Comparison, fit: BlurredFit | None, parts: Heterogeneity
+    free: FreeEdges, comparison: Comparison, fit: BlurredFit | None, parts: Heterogeneity
 ) -> tuple[Estimate, int] | None:
     """Return the estimate of waves without aliases that have several exponents, and a lag; None otherwise.
 
@@ -319,7 +289,7 @@ def _without_aliases(
     return None if several is None else (several, _lag(several, free.surface))
 
 
-def _window_without_aliases(free: _FreeEdges) -> Estimate | None:
+def _window_without_aliases(free: FreeEdges) -> Estimate | None:
     """Return the estimate of a given window of a surface without aliases, if one exponent fits it."""
     if free.scales is None or free.power is None or free.surface.finest_scale:
         return None
@@ -343,14 +313,14 @@ def _lag(estimate: Estimate, surface: Surface) -> int:
 
 
 def _or_neither(
-    estimate: Estimate, free: _FreeEdges, comparison: Comparison, parts: Heterogeneity
+    estimate: Estimate, free: FreeEdges, comparison: Comparison, parts: Heterogeneity
 ) -> Estimate:
     """Return the mean of an estimate with blur or noise and that with neither, where both are likely."""
     gain = comparison.gain / parts.widening**2
     is_doubtful = _PLAIN - _DOUBT <= gain <= _EVEN + _DOUBT
     if not (free.is_default and is_doubtful) or comparison.plain.hurst >= 1.0:
         return estimate
-    modes = _modes(free)
+    modes = free.modes()
     fit = modes.fit(free.pilot, noise=False)
     neither = _without_blur(free, modes, fit, parts, comparison, is_even=True)[0]
     if estimate.window == BLUR_WINDOW and neither.window == _FREE_WINDOW:
@@ -361,7 +331,7 @@ def _or_neither(
     return estimate if gain > _PLAIN else neither.holding(estimate.ci_low, estimate.ci_high, _OR_PLAIN)
 
 
-def _allowing_rounding(estimate: Estimate, comparison: Comparison, free: _FreeEdges) -> Estimate:
+def _allowing_rounding(estimate: Estimate, comparison: Comparison, free: FreeEdges) -> Estimate:
     """Return an estimate with blur; where heights are rounded, its interval holds that of noise alone."""
     if not free.noise and rounding_note(free.heights, estimate.standard_error):
         estimate = estimate.holding(*comparison.interval(np.inf, blur=False))
@@ -369,7 +339,7 @@ def _allowing_rounding(estimate: Estimate, comparison: Comparison, free: _FreeEd
 
 
 def _without_blur(
-    free: _FreeEdges,
+    free: FreeEdges,
     modes: SurfaceModes,
     fit: WhittleFit,
     parts: Heterogeneity,
@@ -404,7 +374,7 @@ def _without_blur(
     return estimate, 1
 
 
-def _plain(free: _FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: Comparison | None) -> Estimate:
+def _plain(free: FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: Comparison | None) -> Estimate:
     """Return the estimate of one exponent at all scales of the window."""
     surface, scales, noise = free.surface, free.scales, free.noise
     dx = surface.spacing[1]
@@ -429,9 +399,9 @@ def _plain(free: _FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: C
     )
 
 
-def _allowing_scales(estimate: Estimate, free: _FreeEdges, window: Window, misfit: float) -> Estimate:
+def _allowing_scales(estimate: Estimate, free: FreeEdges, window: Window, misfit: float) -> Estimate:
     """Widen the interval by what blur, noise or a second exponent would give that cannot be excluded."""
-    if free.power is None or free.heights.size > _LARGE:
+    if free.power is None or free.heights.size > LARGE:
         return estimate
     fit = fit_blurred(free.power, window.frame)
     if fit is None:
@@ -445,7 +415,7 @@ def _allowing_scales(estimate: Estimate, free: _FreeEdges, window: Window, misfi
     return estimate.holding(low, high, note)
 
 
-def _longest_run(free: _FreeEdges, window: Window, *, is_even: bool = True) -> tuple[Estimate, int] | None:
+def _longest_run(free: FreeEdges, window: Window, *, is_even: bool = True) -> tuple[Estimate, int] | None:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
     None if there is no run. Where few waves dominate the run, None as well, unless they dominate all modes
@@ -456,7 +426,7 @@ def _longest_run(free: _FreeEdges, window: Window, *, is_even: bool = True) -> t
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None
     dx = free.surface.spacing[1]
-    part = _modes(replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst))
+    part = replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst).modes()
     estimate = run_estimate(run, free.surface).holding(*interval_of_run(run, record))
     if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
         if is_even:
@@ -466,14 +436,14 @@ def _longest_run(free: _FreeEdges, window: Window, *, is_even: bool = True) -> t
     return estimate, max(1, round(0.5 * run.low))
 
 
-def _run_beside_gaps(free: _FreeEdges) -> tuple[Estimate, int] | None:
+def _run_beside_gaps(free: FreeEdges) -> tuple[Estimate, int] | None:
     """Return `_longest_run` of a surface with few gaps, which are filled.
 
     None if they are many, or if few waves dominate the modes.
     """
     if free.surface.finest_scale:
         return None
-    filled = _without_small_gaps(free.heights, free.surface.plane_spacing, _FEW_GAPS)
+    filled = without_small_gaps(free.heights, free.surface.plane_spacing, _FEW_GAPS)
     if np.isnan(filled).any():
         return None
     frame = _mode_blocks.frame(filled.shape, free.surface.plane_spacing)
@@ -485,66 +455,11 @@ def _run_beside_gaps(free: _FreeEdges) -> tuple[Estimate, int] | None:
     return _longest_run(replace(free, heights=filled, power=power), window)
 
 
-def _is_separable(power: Array, heights: Array) -> bool:
-    """Return whether no mode that varies along both axes is above rounding."""
-    centred = heights - heights.mean()
-    return float(power.sum()) <= _ROUNDING * float(np.sum(centred * centred))
-
-
-def _modes(free: _FreeEdges) -> SurfaceModes:
-    """Return the modes of the window; those of a large surface in blocks."""
-    heights, power, spacing = free.heights, free.power, free.surface.plane_spacing
-    dx = free.surface.spacing[1]
-    window = None if free.scales is None else (free.scales[0] / dx, free.scales[1] / dx)
-    if power is not None and heights.size > _LARGE:
-        return _mode_blocks.BlockModes.of(power, spacing, window)
-    if power is None and heights.size >= _LARGE_GAPPED:
-        return _mode_blocks.BlockModes.of_gapped(heights, spacing, window, free.pilot)
-    lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
-    chosen = between(_cosine_modes.wavelengths(lattice), window)
-    return _cosine_modes.FreeModes.of(heights, lattice, chosen, free.pilot, power)
-
-
-def _without_offsets(heights: Array) -> Array:
-    """Subtract an offset of each row and each column, which the modes are insensitive to."""
-    if np.isnan(heights).any():
-        return heights
-    return np.asarray(heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True) + heights.mean())
-
-
 def _stride(scales: Scales, spacing: float) -> int:
     """Return the stride whose second differences resolve the shortest waves of the window."""
     return 1 if scales is None else max(1, round(0.5 * scales[0] / spacing))
 
 
-def _pilot(moments: Moments, spacing: tuple[float, float]) -> float:
-    """Return a first estimate of H."""
-    hurst = closed_form(moments, spacing, error=False).hurst
-    return float(np.clip(hurst, 0.03, 0.98)) if np.isfinite(hurst) else 0.5
-
-
 def _rms_increment(fit: WhittleFit) -> float:
     """Return the rms increment over one x spacing that corresponds to the amplitude."""
     return float(np.sqrt(2.0 * fit.amplitude / (1.0 - fit.hurst))) if fit.hurst < 1.0 else float("nan")
-
-
-def _without_small_gaps(heights: Array, spacing: tuple[float, float], most: float = _SMALL_GAPS) -> Array:
-    """Fill the gaps of a gridded surface by harmonic interpolation, unless they are many.
-
-    The model of the gaps has the short waves that gridding has removed; with it one fit in six of surfaces
-    of H 0.9 did not converge. Only waves longer than most gaps are used. Nearest heights would meet in steps
-    inside a larger hole, whose power falls as that of H = 0.5: with a hole of 3 % of the area they lowered H
-    from 0.9 to 0.84.
-    """
-    observed = np.isfinite(heights)
-    if not 0 < np.count_nonzero(~observed) <= most * heights.size:
-        return heights
-    values = heights[observed]
-    return Filling(observed, spacing)(values - values.mean())
-
-
-def _cropped(heights: Array) -> Array:
-    """Remove the rows and columns at the border where nothing was observed."""
-    observed = np.isfinite(heights)
-    rows, columns = np.flatnonzero(observed.any(axis=1)), np.flatnonzero(observed.any(axis=0))
-    return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -64,9 +64,9 @@ def test_every_method(rough, tmp_path):
     near = result.hurst.sel({"method": ["default", "increments", "second_variogram"]})
     np.testing.assert_allclose(near, 0.7, atol=0.05)
     has_interval = np.isfinite(result.ci_low)
-    assert list(result.method.values[has_interval.values]) == ["default", *VALIDATED]
+    assert list(result.method.values[has_interval.values]) == ["default", *VALIDATED, "spectrum"]
     reasons = json.loads(result.ci_low.attrs["reason"])
-    assert set(reasons) == set(NAMES) - set(VALIDATED)
+    assert set(reasons) == set(NAMES) - {*VALIDATED, "spectrum"}
     assert all(reasons.values())
     assert set(json.loads(result.scale_min.attrs["comment"])) == {"default", *NAMES}
     assert (result.scale_min < result.scale_max).all()
