@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _cosine_modes, _mode_blocks
+from fractalcontact.dimensions import _cosine_modes
+from fractalcontact.dimensions._block_modes import BlockModes
 from fractalcontact.dimensions._harmonic_interpolation import Filling
 from fractalcontact.dimensions._increment_moments import Moments
 from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
-SurfaceModes = _cosine_modes.FreeModes | _mode_blocks.BlockModes
+SurfaceModes = _cosine_modes.FreeModes | BlockModes
 
 LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
 _LARGE_GAPPED = 1 << 17  # the same of a surface with gaps
@@ -61,9 +62,9 @@ class FreeEdges:
         dx = self.surface.spacing[1]
         window = None if self.scales is None else (self.scales[0] / dx, self.scales[1] / dx)
         if power is not None and heights.size > LARGE:
-            return _mode_blocks.BlockModes.of(power, spacing, window)
+            return BlockModes.of(power, spacing, window)
         if power is None and heights.size >= _LARGE_GAPPED:
-            return _mode_blocks.BlockModes.of_gapped(heights, spacing, window, self.pilot)
+            return BlockModes.of_gapped(heights, spacing, window, self.pilot)
         lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), spacing)
         chosen = between(_cosine_modes.wavelengths(lattice), window)
         return _cosine_modes.FreeModes.of(heights, lattice, chosen, self.pilot, power)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
+from fractalcontact.dimensions._block_modes import BlockModes
 from fractalcontact.dimensions._cosine_modes import Lattice, expected_power
-from fractalcontact.dimensions._mode_blocks import BlockModes, frame, node_weights, profile_modes
+from fractalcontact.dimensions._mode_blocks import frame, node_weights, profile_modes
 
 
 def cosines(n):
