@@ -3,7 +3,7 @@
 Three explanations are compared by their penalised deviance: blur and noise (`_blur`), the sum of two
 fractional Brownian surfaces, and one exponent in a run of octaves with others beside it
 (`_exponent_by_scale`). Several exponents are also compared with waves that have no aliases, as in a crop of a
-periodic surface: nothing beyond the sampling, and often a corner in the spectrum.
+periodic surface: nothing beyond the sampling, and often a corner in the spectrum, or a bend (`_rolloff`).
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
 )
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate, joined
+from fractalcontact.dimensions._rolloff import RollOff, fit_rolloff, rolloff_estimate
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -112,7 +113,9 @@ class Explanations:
             return aliased
         unaliased = cls(fit, frame_blocks(means, frame.unaliased), has_aliases=False)
         shortest = unaliased.record[0].fit
-        if shortest.low > 1.0 or shortest.high < 0.0 or unaliased.run_excess > _FAR:
+        if shortest.low > 1.0 or shortest.high < 0.0:
+            return aliased
+        if unaliased.run_excess > _FAR and unaliased.rolloff_excess > _FAR:
             return aliased
         excess = np.inf if aliased.choice is None else aliased.choice[1] - _DECISIVE
         if unaliased.choice is not None and unaliased.choice[1] < excess:
@@ -173,6 +176,17 @@ class Explanations:
         return self.excess(penalised_deviance(self.record, self.run, self.inside))
 
     @cached_property
+    def rolloff(self) -> RollOff | None:
+        """A slow roll-off of a fractal exponent, without aliases."""
+        fit = None if self.has_aliases else fit_rolloff(self.blocks, self.inside)
+        return fit if fit is not None and _LEAST_EXPONENT < fit.law.hurst < 1.0 else None
+
+    @cached_property
+    def rolloff_excess(self) -> float:
+        """`excess` of the slow roll-off; infinite without one."""
+        return np.inf if self.rolloff is None else self.excess(self.rolloff.penalised)
+
+    @cached_property
     def single(self) -> float:
         """`excess` of one exponent, which is among blur and noise with aliases; infinite then."""
         if self.has_aliases:
@@ -197,12 +211,16 @@ class Explanations:
         if choice[0] == "two" and self.two is not None:
             half_width = min(self.two.rough.high - self.two.rough.hurst, _WIDEST)
             return [(self.two.rough.hurst - half_width, self.two.rough.hurst + half_width)]
+        if choice[0] == "rolloff" and self.rolloff is not None:
+            return [(self.rolloff.law.low, self.rolloff.law.high)]
         run = self.knee.run if choice[0] == "knee" and self.knee is not None else self.run
         return [interval_of_run(run, self.record)]
 
     def _choice(self, limit: float) -> tuple[str, float] | None:
         two, knee, run = self.two, self.likely_knee, self.run
         excess = np.inf if two is None else self.excess(two.penalised)
+        if self.rolloff_excess < min(limit, excess, self.run_excess):
+            return "rolloff", self.rolloff_excess
         if two is not None and two.rough.hurst > _LEAST_EXPONENT and excess < limit:
             return "two", excess
         excess = np.inf if knee is None else self.excess(knee.penalised)
@@ -233,6 +251,8 @@ def several_exponents(explained: Explanations, surface: Surface) -> Estimate | N
     fit, two, knee = explained.fit, explained.two, explained.knee
     if kind == "two" and two is not None:
         estimate = _two_estimate(two, explained.record[0], explained.blocks, surface)
+    elif kind == "rolloff" and explained.rolloff is not None:
+        estimate = rolloff_estimate(explained.rolloff, explained.blocks, surface)
     elif kind == "knee" and knee is not None:
         estimate = _knee_estimate(knee, explained.record, surface)
     else:

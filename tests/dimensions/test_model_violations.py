@@ -195,6 +195,25 @@ def test_crop_with_a_rolloff_has_the_exponent_of_the_shorter_waves(hurst):
     assert np.median(widths) < 0.2
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+def test_crop_with_a_slow_rolloff_has_the_exponent_of_the_shorter_waves(hurst):
+    """Once .10 for .3 and .16 for .8, in intervals that held neither in 16 of 16."""
+    inside, widths, corners = 0, [], []
+    for rng in range(6):
+        wave = np.hypot(*np.meshgrid(*(np.fft.fftfreq(256),) * 2)) * 12.0
+        white = np.fft.fft2(np.random.default_rng(rng).standard_normal((256, 256)))
+        heights = np.fft.ifft2(white * (1.0 + wave**2) ** (-0.5 - 0.5 * hurst)).real[:128, :128]
+        result = fc.dimensions.estimate(fc.surfaces.from_array(STEP * heights, SPACING)).isel(method=0)
+        if "a slow roll-off" in result.hurst.attrs["comment"]:
+            corners.append(float(result.scale_max))
+        widths.append(float(result.ci_high - result.ci_low))
+        inside += bool(result.ci_low <= hurst <= result.ci_high)
+    assert inside >= 5
+    assert np.median(widths) < 0.25
+    np.testing.assert_allclose(corners, 12.0 * SPACING, rtol=0.25)
+    assert len(corners) >= 5
+
+
 def test_crop_with_two_exponents_has_that_of_the_shorter_waves():
     """Once .43 for .3, as a band limit with noise, in 30 of 30."""
     inside = 0
