@@ -24,7 +24,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.joints.uplift"
 EDGES = {"W": ("x", 0.0), "E": ("x", 1.0), "S": ("y", 0.0), "N": ("y", 1.0)}  # axis, share of its extent
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
-LARGEST_PRESSURE = 1e12  # Pa
+SMALLEST_STRESS, LARGEST_PRESSURE = 1e-30, 1e12  # Pa
 SOFTEST = 1e3  # Pa/m
 BALANCE = 1e-10  # relative change of the pressures that ends the iteration with the opening
 MAX_ITERATIONS = 500
@@ -70,7 +70,9 @@ def _check(
     problems.number("drain_diameter", drain_diameter, at_least=0)
     problems.number("drain_share", drain_share, at_least=0, at_most=1)
     problems.number("normal_stiffness", normal_stiffness, at_least=SOFTEST, optional=True)
-    problems.number("total_stress", total_stress, above=0, at_most=LARGEST_PRESSURE, optional=True)
+    problems.number(
+        "total_stress", total_stress, at_least=SMALLEST_STRESS, at_most=LARGEST_PRESSURE, optional=True
+    )
     both = normal_stiffness is not None and total_stress is not None
     problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
     has_gap = check_gap(problems, gap, RESULTS)
