@@ -40,6 +40,8 @@ def fit_rolloff(blocks: Blocks, inside: Array) -> RollOff | None:
 
     count, wavelength = blocks.count[inside], blocks.wavelength[inside]
     powers, modes = np.log(np.maximum(blocks.power[inside], 1e-300)), float(count.sum())
+    if not wavelength.max() > _LEAST_LENGTH:
+        return None
     waves = 2.0 * np.pi / wavelength
     corners = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
 
