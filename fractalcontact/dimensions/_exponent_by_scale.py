@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 _LEAST = 12  # modes of an octave
 _STEPS, _LONGEST_STEP = 60, 0.5
+_SCORING_STEPS = 40  # of a fit of two or three parameters
+_FLAT = 1.2  # times their standard errors: the likelihood is flatter than a parabola
 _LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
 _FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
 _WITHOUT_ALIASES = 10.0  # decrease of the deviance from which a surface has no aliases
@@ -312,6 +314,88 @@ def fit_power_law(blocks: Blocks, inside: Array) -> PowerLaw:
     level = float(top.max() + np.log(np.sum(part.count * np.exp(top - top.max())) / modes))
     deviance = float(np.sum(part.count * logs) + modes * level)
     return PowerLaw(hurst, hurst - NORMAL * error, hurst + NORMAL * error, modes, deviance)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Parameters of an expected power that were fitted by scoring.
+
+    Attributes
+    ----------
+    deviance : float
+    values : ndarray, shape (parameters,)
+    information : ndarray, shape (parameters, parameters)
+    """
+
+    deviance: float
+    values: Array
+    information: Array
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether the blocks determine all parameters."""
+        return bool(np.linalg.cond(self.information) < 1e12)
+
+    @property
+    def half_widths(self) -> Array:
+        """Half the widths of the 95 % intervals."""
+        return _FLAT * NORMAL * np.sqrt(CORRELATION * np.diag(np.linalg.inv(self.information)))
+
+
+def best_scored(
+    model: Callable[[Array], tuple[Array, Array]],
+    power: Array,
+    count: Array,
+    starts: Sequence[Array],
+    bounds: tuple[Array, Array],
+    largest_step: Array,
+) -> Scored:
+    """Fit the parameters of a model to blocks by damped scoring from some starts; return the best fit.
+
+    `model` returns the logarithm of the expected power but for its level, and the derivatives.
+    """
+    logs = np.log(np.maximum(power, 1e-300))
+    fits = [_scored(model, logs, count, start, bounds, largest_step) for start in starts]
+    return min(fits, key=lambda fit: fit.deviance)
+
+
+def _scored(
+    model: Callable[[Array], tuple[Array, Array]],
+    logs: Array,
+    count: Array,
+    values: Array,
+    bounds: tuple[Array, Array],
+    largest_step: Array,
+) -> Scored:
+    modes, damping = float(count.sum()), 1e-2
+
+    def evaluate(values: Array) -> tuple[float, Array, Array]:
+        """Return the deviance, the derivatives less their means, and the relative residuals."""
+        expected, columns = model(values)
+        ratio = np.exp(logs - expected)
+        level = float(np.sum(count * ratio) / modes)
+        columns -= np.average(columns, axis=1, weights=count)[:, None]
+        deviance = float(np.sum(count * expected) + modes * np.log(level))
+        return deviance, columns, ratio / level - 1.0
+
+    current = evaluate(values)
+    for _ in range(_SCORING_STEPS):
+        deviance, columns, residual = current
+        information = 0.5 * (count * columns) @ columns.T
+        score = 0.5 * (count * columns) @ residual
+        ridge = np.diag(damping * np.diag(information) + 1e-12)
+        step = np.linalg.lstsq(information + ridge, score, rcond=None)[0]
+        moved = np.clip(values + np.clip(step, -largest_step, largest_step), *bounds)
+        trial = evaluate(moved)
+        if trial[0] > deviance + 1e-9:
+            damping *= 6.0
+            if damping > 1e6:
+                break
+            continue
+        values, current, damping = moved, trial, max(damping / 10.0, 1e-7)
+        if deviance - trial[0] < 1e-3:
+            break
+    return Scored(current[0], values, 0.5 * (count * current[1]) @ current[1].T)
 
 
 def longest_run(record: Sequence[Octave]) -> Run:

@@ -11,15 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._blur_fit import CORRELATION
-from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw
+from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, best_scored
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_FLAT = 1.2  # times the standard error: the likelihood is flatter than a parabola
 _PARAMETERS = 3  # exponent, corner and amplitude
 _LEAST_LENGTH = 4.0  # spacings: a shorter corner leaves no waves beyond it
 _WINDOW = "the waves shorter than the corner of the roll-off"
@@ -36,53 +34,28 @@ class RollOff:
 
 def fit_rolloff(blocks: Blocks, inside: Array) -> RollOff | None:
     """Fit exponent and corner to some blocks; None where the corner is not among their waves."""
-    from scipy.optimize import minimize
-
     count, wavelength = blocks.count[inside], blocks.wavelength[inside]
-    powers, modes = np.log(np.maximum(blocks.power[inside], 1e-300)), float(count.sum())
     if not wavelength.max() > _LEAST_LENGTH:
         return None
-    waves = 2.0 * np.pi / wavelength
-    corners = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
+    low, high = np.array([LOWEST, -np.log(wavelength.max())]), np.array([HIGHEST, -np.log(_LEAST_LENGTH)])
 
-    def evaluate(values: Array) -> tuple[float, Array]:
-        """Return the deviance, and the derivatives of the logarithm of the expected power."""
+    def model(values: Array) -> tuple[Array, Array]:
+        """Return the logarithm of the power, and its derivatives by H and the logarithm of the corner."""
         hurst, corner = values
         logs, slope = (part[inside] for part in blocks.logs(float(hurst)))
-        square = (2.0 * np.pi * np.exp(corner) / waves) ** 2
-        logs = logs - (1.0 + hurst) * np.log1p(square)
-        rest = powers - logs
-        level = float(rest.max() + np.log(np.sum(count * np.exp(rest - rest.max())) / modes))
-        columns = np.stack(
-            [slope - np.log1p(square), -2.0 * (1.0 + hurst) * square / (1.0 + square), np.ones(count.size)]
-        )
-        return float(np.sum(count * logs) + modes * level), columns
+        power, square = hurst + 0.5 * blocks.axes, (wavelength * np.exp(corner)) ** 2
+        bend = np.log1p(square)
+        return logs - power * bend, np.stack([slope - bend, -2.0 * power * square / (1.0 + square)])
 
-    starts = [
-        (hurst, share * corners[0] + (1.0 - share) * corners[1])
-        for hurst in (0.3, 0.8)
-        for share in (0.3, 0.6)
-    ]
-    bounds = [(LOWEST, HIGHEST), corners]
-    fits = [
-        minimize(
-            lambda values: evaluate(values)[0],
-            start,
-            method="Nelder-Mead",
-            bounds=bounds,
-            options={"xatol": 1e-4, "fatol": 1e-3},
-        )
-        for start in starts
-    ]
-    best = min(fits, key=lambda fit: float(fit.fun))
-    hurst, corner = (float(value) for value in best.x)
-    deviance, columns = evaluate(best.x)
-    information = 0.5 * (count * columns) @ columns.T
-    if not corners[0] < corner < corners[1] or np.linalg.cond(information) > 1e12:
+    places = [share * low[1] + (1.0 - share) * high[1] for share in (0.3, 0.6)]
+    starts = [np.array([hurst, place]) for hurst in (0.3, 0.8) for place in places]
+    best = best_scored(model, blocks.power[inside], count, starts, (low, high), np.array([0.2, 0.7]))
+    hurst, corner = (float(value) for value in best.values)
+    if not (low[1] < corner < high[1] and best.is_regular):
         return None
-    error = _FLAT * NORMAL * float(np.sqrt(CORRELATION * np.linalg.inv(information)[0, 0]))
-    law = PowerLaw(hurst, hurst - error, hurst + error, modes, deviance)
-    return RollOff(law, float(np.exp(-corner)), deviance + 2.0 * _PARAMETERS)
+    error = float(best.half_widths[0])
+    law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
+    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * _PARAMETERS)
 
 
 def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Estimate:

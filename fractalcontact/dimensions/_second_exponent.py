@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.dimensions._blur import BlurredFit
-from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._exponent_by_scale import (
     Blocks,
     Octave,
     PowerLaw,
     Run,
+    best_scored,
     fit_power_law,
     frame_blocks,
     interval_of_run,
@@ -36,10 +36,8 @@ from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_SCORING_STEPS = 40  # of a fit of two exponents
 _LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
 _LEAST_CROSSOVER = 2.0  # spacings: shorter waves run along the diagonals only
-_FLAT = 1.2  # times the standard errors of two exponents: the likelihood is flatter than a parabola
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
 _DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
 _SHORTENED = 12.0  # its increase up to which they do so where blur leaves the longest waves out
@@ -378,48 +376,20 @@ def fit_two_exponents(blocks: Blocks, inside: Array, *, is_sharp: bool = False) 
     """
     if blocks.frame is None:
         return None
-    logs, power, count = blocks.frame.logs[:, inside], blocks.power[inside], blocks.count[inside]
+    table, power, count = blocks.frame.logs[:, inside], blocks.power[inside], blocks.count[inside]
     waves = np.log(2.0 * np.pi / blocks.wavelength[inside])
-    modes, best = float(count.sum()), None
-    for place in (0.25, 0.5, 0.75):
-        start = np.array([0.3, 0.8, (1.0 - place) * waves.min() + place * waves.max()])
-        fit = _scored(logs, power, count, waves, start, is_sharp=is_sharp)
-        if best is None or fit[0] < best[0]:
-            best = fit
-    if best is None:
-        return None
-    deviance, (rough, smooth, crossing), information = best
-    if not (waves.min() < crossing < waves.max() and np.linalg.cond(information) < 1e12):
-        return None
-    errors = _FLAT * NORMAL * np.sqrt(CORRELATION * np.diag(np.linalg.inv(information)))
-    laws = [
-        PowerLaw(float(hurst), float(hurst - error), float(hurst + error), modes, deviance)
-        for hurst, error in zip((rough, smooth), errors[:2], strict=True)
-    ]
-    crossover = float(2.0 * np.pi / np.exp(crossing))
-    return TwoExponents(laws[0], laws[1], crossover, deviance + 2.0 * 4, is_sharp)
+    bounds = np.array([LOWEST, LOWEST, waves.min()]), np.array([HIGHEST, HIGHEST, waves.max()])
 
-
-def _scored(
-    logs: Array, power: Array, count: Array, waves: Array, values: Array, *, is_sharp: bool
-) -> tuple[float, Array, Array]:
-    """Return deviance, parameters (both exponents, logarithm of the crossover) and information.
-
-    `logs` is the table of the expected power at the nodes.
-    """
-    modes, damping = float(count.sum()), 1e-2
-
-    def evaluate(values: Array) -> tuple[float, Array, Array]:
+    def model(values: Array) -> tuple[Array, Array]:
+        """Return the logarithm of the sum of both powers, and its derivatives."""
         weights = np.stack([part for hurst in values[:2] for part in node_weights(hurst)])
-        first, first_slope, second, second_slope = weights @ logs
+        first, first_slope, second, second_slope = weights @ table
         at = np.argmin(np.abs(waves - values[2]))
         # both powers are equal at the wavenumber; there they fall as q^(-2 H - axes)
         shift = first[at] - second[at] + 2.0 * (values[1] - values[0]) * (values[2] - waves[at])
         second = second + shift
         total = np.maximum(first, second) if is_sharp else np.logaddexp(first, second)
         share = np.where(second > first, 1.0, 0.0) if is_sharp else np.exp(second - total)
-        ratio = np.exp(np.log(np.maximum(power, 1e-300)) - total)
-        level = float(np.sum(count * ratio) / modes)
         columns = np.stack(
             [
                 (1.0 - share) * first_slope + share * first_slope[at],
@@ -427,30 +397,21 @@ def _scored(
                 2.0 * (values[1] - values[0]) * share,
             ]
         )
-        columns -= np.average(columns, axis=1, weights=count)[:, None]
-        deviance = float(np.sum(count * total) + modes * np.log(level))
-        return deviance, columns, ratio / level - 1.0
+        return total, columns
 
-    current = evaluate(values)
-    for _ in range(_SCORING_STEPS):
-        deviance, columns, residual = current
-        information = 0.5 * (count * columns) @ columns.T
-        score = 0.5 * (count * columns) @ residual
-        ridge = np.diag(damping * np.diag(information) + 1e-12)
-        step = np.linalg.lstsq(information + ridge, score, rcond=None)[0]
-        step = np.clip(step, [-0.2, -0.2, -0.7], [0.2, 0.2, 0.7])
-        moved = np.clip(values + step, [LOWEST, LOWEST, waves.min()], [HIGHEST, HIGHEST, waves.max()])
-        trial = evaluate(moved)
-        if trial[0] > deviance + 1e-9:
-            damping *= 6.0
-            if damping > 1e6:
-                break
-            continue
-        values, current, damping = moved, trial, max(damping / 10.0, 1e-7)
-        if deviance - trial[0] < 1e-3:
-            break
-    columns = current[1]
-    return current[0], values, 0.5 * (count * columns) @ columns.T
+    starts = [
+        np.array([0.3, 0.8, (1.0 - place) * waves.min() + place * waves.max()]) for place in (0.25, 0.5, 0.75)
+    ]
+    best = best_scored(model, power, count, starts, bounds, np.array([0.2, 0.2, 0.7]))
+    rough, smooth, crossing = best.values
+    if not (waves.min() < crossing < waves.max() and best.is_regular):
+        return None
+    laws = [
+        PowerLaw(float(hurst), float(hurst - error), float(hurst + error), float(count.sum()), best.deviance)
+        for hurst, error in zip((rough, smooth), best.half_widths[:2], strict=True)
+    ]
+    crossover = float(2.0 * np.pi / np.exp(crossing))
+    return TwoExponents(laws[0], laws[1], crossover, best.deviance + 2.0 * 4, is_sharp)
 
 
 def penalised_deviance(record: Sequence[Octave], run: Run, inside: Array) -> float:
