@@ -56,6 +56,7 @@ _WHITE = 0.5  # share of the waves below the noise that the edges must not distu
 # that of weak noise, up to a rms height over the rms increment, is not penalised, and below the least is none
 _AGAINST_NOISE = 6.0
 _WEAK_NOISE, _LEAST_NOISE = 0.06, 0.005
+_LEAST_DISTANCE = 0.06  # of an exponent to 1, where the rms increment of the model has no limit
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
@@ -231,7 +232,7 @@ def _mean(window: Window, fits: Sequence[Fit]) -> float:
 
 def _with_weak_noise(window: Window, noisy: Fit, quiet: Fit) -> Fit:
     """Return the fit of at most weak noise; that without noise where none is found."""
-    unit = 2.0 / max(1.0 - noisy.hurst, _WEAK_NOISE)  # power of noise of one rms increment
+    unit = 2.0 / max(1.0 - noisy.hurst, _LEAST_DISTANCE)  # power of noise of one rms increment
     if noisy.noise < unit * _LEAST_NOISE**2:
         return quiet
     most = unit * _WEAK_NOISE**2

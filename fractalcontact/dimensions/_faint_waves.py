@@ -8,7 +8,7 @@ of wavelength has the same share of the false alarms, so that a long wave is tes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -132,7 +132,7 @@ class Rings:
 
 @lru_cache(maxsize=1)
 def _rings(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bool) -> Rings:
-    axes = 1 if shape[0] == 1 else 2
+    axes = _axes(shape)
     extent = min(n * d for n, d in zip(shape[-axes:], spacing[-axes:], strict=True))
     if is_periodic:
         y, x = np.fft.fftfreq(shape[0]), np.arange(shape[1] // 2 + 1) / shape[1]
@@ -185,7 +185,7 @@ class WhiteSurface:
         power = modes.real**2 + modes.imag**2 if is_periodic else modes * modes
         rings = _rings((heights.shape[0], heights.shape[1]), spacing, is_periodic)
         expected = np.maximum(rings.expected(power), max(ROUNDING * float(power.max()), _LEAST))
-        factor = np.sqrt(heights.size * (1.0 if is_periodic else 2.0 ** _axes(heights)) / expected)
+        factor = np.sqrt(heights.size * (1.0 if is_periodic else 2.0 ** _axes(heights.shape)) / expected)
         factor[(power <= ROUNDING * power.max()) | (rings.ring < _FIRST_RING).reshape(power.shape)] = 0.0
         modes *= factor
         return cls(_heights(modes, heights.shape, is_periodic), factor, spacing, is_periodic)
@@ -261,7 +261,7 @@ class WhiteSurface:
 
     @property
     def _continuous(self) -> int:
-        return 0 if self.is_periodic else _axes(self.white)
+        return 0 if self.is_periodic else _axes(self.white.shape)
 
     def _is_white(self, power: Array, search: Search) -> bool:
         """Return whether the modes are exponential numbers of one mean, as without lay or ridges.
@@ -301,8 +301,7 @@ class WhiteSurface:
 
     def _hides(self, other: Array, ratio: float, cycles: Array, power: float) -> bool:
         """Return whether a mode is a wave that was done, or may be what this shows beside itself."""
-        for sign in (1.0, -1.0):
-            distance = np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * self.white.shape
+        for distance in distances(cycles, other, self.white.shape):
             if distance.max() < _APART:
                 return True
             lobes = np.prod(np.minimum(1.0, 1.0 / (np.pi * np.maximum(distance, 1e-9)) ** 2))
@@ -400,7 +399,7 @@ class Search:
 def _search(
     shape: tuple[int, int], spacing: tuple[float, float], padded: tuple[int, int], longest: float
 ) -> Search:
-    axes = 1 if shape[0] == 1 else 2
+    axes = _axes(shape)
     extent = min(n * d for n, d in zip(shape[-axes:], spacing[-axes:], strict=True))
     unit = extent / spacing[0], extent / spacing[1]
     (py, px), (ny, nx) = padded, shape
@@ -441,18 +440,24 @@ def _least_on_ray(ray: float) -> float:
     return ray * float(np.interp(ray, (_RAY, _RIDGE), (_ABOVE_RAY, _ABOVE_RIDGE)))
 
 
-def _axes(heights: Array) -> int:
-    return 1 if heights.shape[0] == 1 else 2
+def distances(cycles: Array, other: Array, shape: tuple[int, ...]) -> Iterator[Array]:
+    """Yield the modes between two waves along (y, x); then with one of them reversed, which is the same wave."""
+    for sign in (1.0, -1.0):
+        yield np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape
+
+
+def _axes(shape: tuple[int, ...]) -> int:
+    return 1 if shape[0] == 1 else 2
 
 
 def _modes(heights: Array, is_periodic: bool) -> Array:
-    return fft.rfft2(heights) if is_periodic else fft.dct(heights, 2, (-2, -1)[2 - _axes(heights) :])
+    return fft.rfft2(heights) if is_periodic else fft.dct(heights, 2, (-2, -1)[2 - _axes(heights.shape) :])
 
 
 def _heights(modes: Array, shape: tuple[int, ...], is_periodic: bool) -> Array:
     if is_periodic:
         return fft.irfft2(modes, (shape[0], shape[1]))
-    axes = 1 if shape[0] == 1 else 2
+    axes = _axes(shape)
     result = fft.dct(modes, 3, (-2, -1)[2 - axes :])
     result /= 2.0**axes * shape[0] * shape[1]
     return result

@@ -17,7 +17,7 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._faint_waves import WhiteSurface
+from fractalcontact.dimensions._faint_waves import WhiteSurface, distances
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 from fractalcontact.dimensions._wave_peaks import LONGEST, tapered_peaks
@@ -212,17 +212,10 @@ def _related(found: Sequence[Wave], shape: tuple[int, ...]) -> list[Array]:
                 if divisor > 1 and float(np.abs(at).max()) > 0.5:
                     break
                 at = (at + 0.5) % 1.0 - 0.5
-                if all(_steps_apart(at, other, shape) > 1.0 for other in done):
+                if all(apart.max() > 1.0 for other in done for apart in distances(at, other, shape)):
                     done.append(at)
                     related.append(at)
     return related
-
-
-def _steps_apart(cycles: Array, other: Array, shape: tuple[int, ...]) -> float:
-    """Return the distance of two waves in modes; a wave and its opposite are the same."""
-    return min(
-        float(np.max(np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape)) for sign in (1.0, -1.0)
-    )
 
 
 def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Array:
