@@ -441,7 +441,7 @@ def _least_on_ray(ray: float) -> float:
 
 
 def distances(cycles: Array, other: Array, shape: tuple[int, ...]) -> Iterator[Array]:
-    """Yield the modes between two waves along (y, x); then with one of them reversed, which is the same wave."""
+    """Yield the distance of two waves in modes along (y, x), as they are and with one of them reversed."""
     for sign in (1.0, -1.0):
         yield np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape
 
