@@ -126,8 +126,8 @@ def directions(
     Notes
     -----
     Free edges: second differences over equal lengths along lattice directions, without the blur and noise
-    that the modes of a complete surface show. Periodic: sectors of the spectrum. Models, tests, and their
-    measured size, power and coverage: page `theory_dimensions`.
+    that the modes of a complete surface show. Periodic: sectors of the spectrum. Models and tests: page
+    `theory_dimensions`; their measured size, power and coverage: page `estimator_accuracy`.
 
     References
     ----------

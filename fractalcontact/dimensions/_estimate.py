@@ -148,8 +148,8 @@ def estimate(
     Notes
     -----
     Free edges: fractional Brownian heights. Periodic: a power-law spectrum between cut-offs. The interval
-    is widened, with a note, where the surface fits neither. Theory, coverage and limits: page
-    `theory_dimensions`. Select a method with ``sel({"method": "spectrum"})``.
+    is widened, with a note, where the surface fits neither. Theory: page `theory_dimensions`; measured
+    coverage and limits: page `estimator_accuracy`. Select a method with ``sel({"method": "spectrum"})``.
 
     References
     ----------

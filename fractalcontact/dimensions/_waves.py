@@ -77,7 +77,7 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is 0.1 rms
     increments at 6 spacings, 0.3 at 12 and 0.8 at 24 (H = 0.5); at 256 x 256 half of it. `estimate` removes
     what is found.
-    Detection, false alarms and accuracy: page `theory_dimensions`.
+    Detection, false alarms and accuracy: page `estimator_accuracy`.
 
     References
     ----------
