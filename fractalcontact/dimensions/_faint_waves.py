@@ -22,8 +22,8 @@ from fractalcontact.dimensions._wave_peaks import (
     FALSE_ALARM,
     LINE,
     NEIGHBOURS,
-    RADIAL,
     ROUNDING,
+    least_beside,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -41,15 +41,11 @@ _LOBES = 4.0  # times the envelope of what a wave shows beside itself: modes bel
 _SHORTEST = 2.05  # spacings: the power of shorter waves is not that of a ring, for aliases and blur
 _UNEVEN = 5.0  # standard deviations by which the modes may differ from exponential numbers
 _FEWEST = 40  # modes of which that can be told
+_ON_RIDGES = 8  # modes of ridges that may be taken for a wave
 _MOST = 48  # modes above the first limit; more are those of a surface that is not white
 _LEAST = 1e-280  # power of a mode: that of a constant is zero
 _LARGEST = 600.0  # logarithm of the expected power
 _EDGE = np.log(2.0)  # largest fall of the logarithm of the power between rings: a band may end inside a ring
-_ACROSS = np.arange(-1, 2)  # lines of modes along a ray
-# least power of a wave, times the mean of the strongest line of modes on the ray through it: the first for
-# the mean of any ray, the second from the mean of a ridge on
-_ABOVE_RAY, _ABOVE_RIDGE = 8.0, 15.0
-_RAY, _RIDGE = 1.5, 2.5
 
 
 @dataclass(frozen=True)
@@ -253,9 +249,9 @@ class WhiteSurface:
             p_value = _probability(number, ratio, self._continuous)
             if p_value >= FALSE_ALARM:
                 continue
-            mean, ray = self._around(power, cycles)
+            mean, least = self._around(power, cycles)
             p_value = _probability(number, ratio / max(1.0, mean), self._continuous)
-            if p_value < FALSE_ALARM and (count or ratio > _least_on_ray(ray)):
+            if p_value < FALSE_ALARM and (count or ratio > least):
                 found.append(Peak(ratio, p_value, (float(cycles[0]), float(cycles[1]))))
         return found
 
@@ -332,7 +328,7 @@ class WhiteSurface:
         return np.asarray((modes.real**2 + modes.imag**2) / self.white.size)
 
     def _around(self, power: Array, cycles: Array) -> tuple[float, float]:
-        """Return the mean power of the modes around one, and that on the ray through it, the larger side."""
+        """Return the mean power of the modes around one, and the power that a wave needs there."""
         (py, px), (ny, nx) = self._padded, self.white.shape
         modes = power[::py, ::px]
         centre = np.rint(cycles * (ny, nx)).astype(np.int64)
@@ -351,19 +347,15 @@ class WhiteSurface:
         values = at(centre[0] + rows, centre[1] + columns)[outside]
         values = values[values > 0.0]
         mean = float(np.minimum(values, CLIPPED * values.mean()).mean()) if values.size else 1.0
-        mode = cycles * (ny, nx)
-        along = mode / np.hypot(*mode)
-        across = np.array([-along[1], along[0]]) * (ny > 1)
-        rays = []
-        for side in (-1.0, 1.0):
-            lines = (
-                centre[:, None, None]
-                + side * RADIAL * along[:, None, None]
-                + _ACROSS[:, None] * across[:, None, None]
-            )
-            lines = np.rint(lines).astype(np.int64)
-            rays.append(float(np.minimum(at(lines[0], lines[1]), 0.5 * power.max()).mean(axis=1).max()))
-        return mean, max(rays)
+        bound = 0.5 * power.max()
+        least = least_beside(
+            lambda rows, columns: np.minimum(at(rows, columns), bound),
+            cycles * (ny, nx),
+            np.array([ny * self.spacing[0] if ny > 1 else 0.0, nx * self.spacing[1]]),
+            _ON_RIDGES,
+            anywhere=False,
+        )
+        return mean, least
 
 
 @dataclass(frozen=True)
@@ -430,14 +422,6 @@ def _probability(number: float, ratio: float, continuous: int) -> float:
     Along each axis of continuous frequencies there are sqrt(pi ratio / 3) times as many maxima (Rice 1944).
     """
     return float(min(1.0, number * np.exp(-ratio) * max(1.0, np.pi / 3.0 * ratio) ** (0.5 * continuous)))
-
-
-def _least_on_ray(ray: float) -> float:
-    """Return the power that a wave has, given the mean of the modes on the ray through it.
-
-    All modes of a ridge, as that of offsets of the rows, are exponential numbers of its mean.
-    """
-    return ray * float(np.interp(ray, (_RAY, _RIDGE), (_ABOVE_RAY, _ABOVE_RIDGE)))
 
 
 def distances(cycles: Array, other: Array, shape: tuple[int, ...]) -> Iterator[Array]:

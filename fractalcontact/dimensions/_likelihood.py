@@ -68,7 +68,7 @@ from fractalcontact.dimensions._second_exponent import (
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._transfer_functions import Window
-from fractalcontact.dimensions._waves import without_waves
+from fractalcontact.dimensions._waves import MOST_REPEATED, without_waves
 from fractalcontact.dimensions._whittle import (
     LEAST_MODES,
     WhittleFit,
@@ -99,6 +99,10 @@ _SEPARABLE = (
     "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
     "exponent is: estimate profiles, or see `directions`"
 )
+_REPEATED = (
+    "many rows or columns repeat their neighbours: the surface was enlarged, and the short waves are those "
+    "of its blocks; remove the repeated ones, or give `scales` from eight blocks on"
+)
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
     "another family than its own: see fractalcontact.surfaces.fill"
@@ -122,12 +126,15 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
         return undefined(CONSTANT)
     if surface.is_plane:
         return plane()
-    is_interpolated = scales is None and not surface.finest_scale and surface.linear_share > _INTERPOLATED
+    made = ""
+    if scales is None and not surface.finest_scale:
+        made = _LINEAR if surface.linear_share > _INTERPOLATED else ""
+        made = _REPEATED if surface.repeated_share > MOST_REPEATED else made
     surface, wave_note = without_waves(surface)
     estimate = _fitted(surface, scales, noise, psf)
     estimate = replace(estimate, note=joined(wave_note, estimate.note))
-    if is_interpolated and not estimate.reason:
-        return replace(estimate.without_interval(_LINEAR), note=joined(_LINEAR, estimate.note))
+    if made and not estimate.reason:
+        return replace(estimate.without_interval(made), note=joined(made, estimate.note))
     return estimate
 
 

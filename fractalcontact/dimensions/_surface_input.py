@@ -160,8 +160,7 @@ class Surface:
         Linear interpolation makes them: 0.5 % where the cells are as far apart as the points, 12 % at half of
         that. Measured heights have none; rounded ones repeat a few values and do not count.
         """
-        share = 0.0
-        middle = self.raw[tuple(slice(max(0, n // 2 - MIDDLE), n // 2 + MIDDLE) for n in self.shape)]
+        share, middle = 0.0, self._middle
         for lines in (middle, middle.T):
             bend = np.abs(lines[:-2] - 2.0 * lines[1:-1] + lines[2:])
             known = int(np.count_nonzero(np.isfinite(bend)))
@@ -173,6 +172,24 @@ class Surface:
             if np.unique(straight).size > 0.9 * straight.size:
                 share = max(share, straight.size / known)
         return share
+
+    @property
+    def repeated_share(self) -> float:
+        """Share of rows or columns in the middle that repeat the one before, as in an enlarged surface.
+
+        They do so at equal distances there; where heights were rounded, or rows were padded, they do not.
+        """
+        share, middle = 0.0, self._middle
+        for lines in (middle, middle.T):
+            starts = np.flatnonzero((lines[1:] != lines[:-1]).any(axis=1))
+            if len(starts) > 2 and len(starts) < len(lines) - 1:
+                apart = np.abs(starts - np.linspace(starts[0], starts[-1], len(starts))).max()
+                share = max(share, (1.0 - len(starts) / (len(lines) - 1)) * float(apart <= 1.0))
+        return share
+
+    @property
+    def _middle(self) -> Array:
+        return self.raw[tuple(slice(max(0, n // 2 - MIDDLE), n // 2 + MIDDLE) for n in self.shape)]
 
     def _distance_from_plane(self) -> float:
         """Return the largest distance from the least-squares plane, in scaled height."""

@@ -7,6 +7,7 @@ that of the modes around, in place of the mean of all modes: the spectrum may ha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -23,10 +24,16 @@ _FEW_WAVES, _STRONG = 7.0, 3.0
 # edges of the squares of modes around one: its neighbours, and itself with its taper
 NEIGHBOURS, LINE = 13, 5
 ALONG = 41  # neighbours of a mode of a profile
-RADIAL = np.arange(3, 13)  # modes from one along the ray through it that are compared with it, on either side
+BESIDE = np.arange(3, 13)  # modes from one, on the lines through it, that are compared with it on either side
+_SIDES = np.arange(-1, 2)  # lines of modes side by side
+_ARC = 1.2  # radians on either side: further on is the mirror image of a mode
+_DIRECTIONS = np.pi * np.arange(24) / 24
+_OUTLYING = 4.0  # times the median: modes on a line count up to here, for there may be other waves
+_ABOVE_LINE = 8.0  # least power of a wave, times the mean of the strongest line of a surface without ridges
+_LINE, _RIDGE = 1.75, 3.0  # mean of the strongest line: of any surface, and of a ridge
+_FREEDOM_OF_LINE = 6.0  # of the mean of its modes
 CLIPPED = 8.0  # times the mean: neighbours count up to here, for there may be other waves
 ROUNDING = 1e-22  # of the strongest mode
-_ABOVE_RAY = 15.0  # times their mean: a step or ridges put much power on a ray, and no wave
 _LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
 _FREEDOM = {1: 9.0, 2: 30.0}  # independent neighbours, by the number of axes; fewer than modes, for the taper
 _PASSES = 3
@@ -81,7 +88,7 @@ def tapered_peaks(
     for column in (
         np.flatnonzero((radius[0] >= _FEW_WAVES) & (radius[0] < LONGEST[axes])) if axes == 1 else ()
     ):
-        shorter = white[0, column + RADIAL[0] : column + ALONG // 2]
+        shorter = white[0, column + BESIDE[0] : column + ALONG // 2]
         ratio[0, column] = white[0, column] / max(float(shorter.mean()), np.finfo(float).tiny)
     freedom = _FREEDOM[axes]
     counts = 0.5 * power.size, 0.5 * max(1, int(np.count_nonzero(multiples)))
@@ -100,8 +107,21 @@ def tapered_peaks(
     places = places[share[tuple(places.T)] > _LEAST_SHARE * share.sum()]
     on_edge = (places[:, 1] == 0) | (2 * places[:, 1] == nx)  # both signs of y are the same wave there
     places = places[~on_edge | (y[places[:, 0]] >= 0.0)]
-    rays = np.stack([y[places[:, 0]] * ny, x[places[:, 1]] * nx], axis=1)
-    places = places[multiples[tuple(places.T)] | _above_rays(white, places, rays)]
+    extent = np.array([n * d if n > 1 else 0.0 for n, d in zip((ny, nx), spacing, strict=True)])
+
+    def is_above_lines(row: int, column: int) -> bool:
+        bound, level = 0.25 * white[row, column], white[row, column] / ratio[row, column]
+        mode = np.array([y[row] * ny, x[column] * nx])
+        least = least_beside(
+            lambda rows, columns: np.minimum(white[rows % ny, columns % nx], bound) / level,
+            mode,
+            extent,
+            len(places),
+            anywhere=True,
+        )
+        return bool(ratio[row, column] > least)
+
+    places = places[[multiples[row, column] or is_above_lines(row, column) for row, column in places]]
     return [
         (
             (float(y[row]), float(x[column])),
@@ -148,26 +168,54 @@ def _whitened(power: Array, radius: Array, ring: Array, axes: int) -> Array:
     return np.asarray(white)
 
 
-def _above_rays(white: Array, places: Array, rays: Array) -> Array:
-    """Return which modes stand above both parts of the ray through them; `rays` are their mode numbers.
+def least_beside(
+    modes_at: Callable[[Array, Array], Array], mode: Array, extent: Array, places: int, *, anywhere: bool
+) -> float:
+    """Return the power that a wave needs, from the modes on lines through it: ridges and arcs are no waves.
 
-    The multiples of a mode, as those of cusps, are left out of its ray, unless little of it would be left.
+    Parameters
+    ----------
+    modes_at : callable
+        Power of the modes at rows and columns, over the mean of those around the wave.
+    mode : ndarray, (row, column)
+        Of the wave, with signs.
+    extent : ndarray, (y, x)
+        Of the surface; 0 along y of a profile.
+    places : int
+        Among which this is one: all modes of ridges are exponential numbers of the mean of their line.
+    anywhere : bool
+        Lines in all directions: the ray of a ridge that is drawn with steps is folded at two spacings, and
+        no longer runs through the wavenumber zero.
     """
-    if not len(places):
-        return np.zeros(0, dtype=bool)
-    peaks = white[tuple(places.T)]
-    distance = np.hypot(*rays.T)[:, None]
-    along = rays / distance
-    beyond = np.abs(RADIAL - distance * np.maximum(np.rint(RADIAL / distance), 1.0)) > _MULTIPLE_WIDTH
-    beyond |= np.count_nonzero(beyond, axis=1, keepdims=True) < _LEAST_RAY
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1) * (min(white.shape) > 1)
-    means = []
-    for side in (-1, 1):
-        at = places[:, None, None] + side * RADIAL[:, None, None] * along[:, None, None]
-        at = np.rint(at + np.arange(-1, 2)[:, None] * across[:, None, None]).astype(np.int64)
-        ray = white[at[..., 0] % white.shape[0], at[..., 1] % white.shape[1]]
-        if side > 0:
-            ray = ray * beyond[:, :, None]
-        number = np.maximum(np.count_nonzero(ray, axis=(1, 2)), 1)
-        means.append(np.minimum(ray, 0.25 * peaks[:, None, None]).sum(axis=(1, 2)) / number)
-    return np.asarray(peaks > _ABOVE_RAY * np.maximum(*means))
+    distance = float(np.hypot(*mode))
+    along = mode / distance
+    other = np.abs(BESIDE - distance * np.maximum(np.rint(BESIDE / distance), 1.0)) > _MULTIPLE_WIDTH
+    other |= np.count_nonzero(other) < _LEAST_RAY
+    both = np.concatenate([-BESIDE, BESIDE])
+    lines = [-BESIDE[:, None] * along, BESIDE[other, None] * along]
+    is_surface = extent[0] > 0.0
+    if is_surface:
+        turned = mode[::-1] * extent / extent[::-1] * (1.0, -1.0)
+        angles = both / np.hypot(*turned)
+        angles = angles[np.abs(angles) < _ARC, None]
+        lines.append(mode * (np.cos(angles) - 1.0) + turned * np.sin(angles))
+        if anywhere:
+            lines += [both[:, None] * (np.sin(angle), np.cos(angle)) for angle in _DIRECTIONS]
+    mean = max(_mean_on_line(modes_at, mode, line, is_surface) for line in lines)
+    above_ridge = _FREEDOM_OF_LINE * ((places / FALSE_ALARM) ** (1.0 / _FREEDOM_OF_LINE) - 1.0)
+    return mean * float(np.interp(mean, (_LINE, _RIDGE), (_ABOVE_LINE, above_ridge)))
+
+
+def _mean_on_line(
+    modes_at: Callable[[Array, Array], Array], mode: Array, steps: Array, is_surface: bool
+) -> float:
+    """Return the mean power at some steps from a mode, near ones with more weight; or beside."""
+    distance = np.hypot(*steps.T)[:, None]
+    across = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / distance * np.sign(steps @ steps[-1])[:, None]
+    sides = _SIDES if is_surface else _SIDES[1:2]
+    places = np.rint(mode + steps + sides[:, None, None] * across).astype(np.int64)
+    power = modes_at(places[..., 0], places[..., 1])
+    middle = np.median(power, axis=1, keepdims=True)
+    power = np.minimum(power, np.where(middle > 0.0, _OUTLYING * middle, np.inf))
+    weights = (power > 0.0) / distance[:, 0]
+    return float(((power * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)).max())

@@ -27,6 +27,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 MOST = 32  # waves; more are a pattern
+MOST_REPEATED = 0.1  # share of rows or columns: a surface enlarged by repetition
 _ROUNDS = 3
 _LEFT = 0.05  # of the mean square increment, below which many waves are all there is
 _NONE_LEFT = 1e-8
@@ -156,7 +157,10 @@ def find_waves(surface: Surface) -> list[Wave]:
 
     Waves are searched in rounds, as a strong one hides others; none if there are more than a few dozen. The
     multiples of a wave, which the cusps of a turned surface have, are few places, and stand on its ray.
+    Blocks of equal heights are periodic, but no waves.
     """
+    if surface.repeated_share > MOST_REPEATED:
+        return []
     heights = surface.heights
     window = tuple(
         slice((n - size) // 2, (n - size) // 2 + size)

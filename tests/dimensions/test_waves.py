@@ -282,6 +282,46 @@ def test_offset_rows_and_a_narrow_band_are_no_waves():
     assert sum(wrong) == 0
 
 
+def drawn_ridges(seed):
+    """A profile along one direction, to the next point: its spectrum is a ray, folded at two spacings."""
+    y, x = np.mgrid[:128, :128]
+    across = x * np.cos(0.3 * seed) + y * np.sin(0.3 * seed)
+    return (
+        brownian((128, 128), 0.5, seed)
+        + 2.0 * brownian((400,), 0.5, 1000 + seed).values[np.clip((across + 150).astype(int), 0, 399)]
+    )
+
+
+def random_ridges(seed):
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:128, :128]
+    azimuth = rng.uniform(0.0, np.pi)
+    across = x * np.cos(azimuth) + y * np.sin(azimuth)
+    places = rng.uniform(-128.0, 192.0, rng.integers(10, 80))
+    ridges = sum(np.exp(-0.5 * ((across - place) / 2.0) ** 2) for place in places)
+    return brownian((128, 128), 0.5, seed) + 3.0 * STEP * ridges
+
+
+def test_ridges_are_no_waves():
+    """Once waves in 33 of 40 surfaces with drawn ridges, and in 6 of 40 with ridges at random."""
+    for surface in (*map(drawn_ridges, range(9)), *map(random_ridges, range(8))):
+        assert fc.dimensions.waves(surface).sizes["wave"] == 0
+
+
+@pytest.mark.parametrize("points", [np.repeat(np.arange(48), 2), np.rint(np.arange(96) / 1.7).astype(int)])
+def test_repeated_points_are_no_waves(points):
+    """Once a wave of two spacings in 25 of 40 surfaces."""
+    heights = brownian((96, 96), 0.7, 3).values
+    for repeated in (heights[np.ix_(points, points)], heights[points], heights[0, points]):
+        surface = fc.surfaces.from_array(repeated, SPACING)
+        assert fc.dimensions.waves(surface).sizes["wave"] == 0
+        result = fc.dimensions.estimate(surface)
+        assert np.isnan(result.ci_low[0])
+        assert "repeat their neighbours" in result.ci_low.attrs["reason"]
+    rounded = fc.surfaces.from_array(np.round(heights / STEP), SPACING)
+    assert np.isfinite(fc.dimensions.estimate(rounded).ci_low[0])
+
+
 @pytest.mark.filterwarnings("error")
 def test_shortest_profile_gives_no_warning():
     for seed in range(12):
