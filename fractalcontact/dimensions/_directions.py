@@ -24,12 +24,15 @@ from fractalcontact.dimensions._anisotropy import (
     fit_anisotropy,
 )
 from fractalcontact.dimensions._blur import CLEAR, fit_blurred
+from fractalcontact.dimensions._free_edges import LARGE
+from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
 from fractalcontact.dimensions._records import (
     CONSTANT,
     SIGNIFICANT,
     Estimate,
+    joined,
     normal_interval,
     plane,
     undefined,
@@ -52,6 +55,7 @@ from fractalcontact.dimensions._surface_input import (
     read_surfaces,
 )
 from fractalcontact.dimensions._transfer_functions import NONE, Window
+from fractalcontact.dimensions._waves import without_waves
 from fractalcontact.dimensions._whittle import LEAST_MODES, fit_interval
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -71,9 +75,12 @@ _IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surf
 _SHARE_COMPARED = 1 / 3  # of the surface, which a second difference may span in a test
 _ROUNDING = 1e-22  # of the largest mean square: the heights do not vary along that direction
 _BENT = 2.0  # standard deviations of the curvature from which on blur and noise are looked for
+_FAR_BENT = 10.0  # the same from which on the lags give no anisotropy ratio
 _LEFT = 0.1  # of a mean square difference, which noise must leave
 _NO_VARIATION = "the heights do not vary along this direction"
 _NO_MODEL = "the surface is not an anisotropic fractional Brownian one, and no model gives the scatter"
+_BLURRED = "the power law of the lags is bent, as by a blur, which changes their ratio: see `scales`"
+_FITTED = ("hurst", "standard_error")
 _FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
 
 
@@ -157,7 +164,7 @@ def directions(
         lattice = set(lattice_directions(chosen, surfaces[0].plane_spacing))
         ordered = sorted(lattice, key=lambda direction: direction.azimuth)
         azimuths = np.array([direction.azimuth for direction in ordered])
-        results = [_free_surface(single, ordered, window) for single in surfaces]
+        results = [_free_surface(single, ordered, window, is_default=scales is None) for single in surfaces]
     return _with_reasons(_dataset(surface, surfaces[0], azimuths, results), results)
 
 
@@ -172,6 +179,21 @@ class _Directional:
     @classmethod
     def of(cls, estimates: list[Estimate], anisotropy: Anisotropy) -> _Directional:
         return cls(estimates, anisotropy.defined(), anisotropy.reason)
+
+    def beside(self, by_modes: Estimate, note: str) -> _Directional:
+        """Return the estimates with intervals that hold that of the likelihood, where it finds more.
+
+        Without a model of the blur, the lags of a blurred surface give no anisotropy ratio.
+        """
+        known = [record for record in self.estimates if np.isfinite(record.ci_low)]
+        hurst, error = (float(np.mean([getattr(r, name) for r in known or [by_modes]])) for name in _FITTED)
+        found = by_modes.found_beside(hurst, error)
+        records = [replace(record, note=joined(note, record.note)) for record in self.estimates]
+        result = replace(self, estimates=[r.beside_modes(by_modes, found).limited() for r in records])
+        anisotropy = self.anisotropy
+        if anisotropy is None or anisotropy.reason or abs(anisotropy.curvature_z) < _FAR_BENT:
+            return result
+        return replace(result, anisotropy=replace(anisotropy, reason=_BLURRED).defined(), reason=_BLURRED)
 
 
 def _dataset(
@@ -213,11 +235,26 @@ def _with_reasons(result: xr.Dataset, results: Sequence[_Directional]) -> xr.Dat
     return result
 
 
-def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> _Directional:
-    """Measure a surface with free edges by its second differences."""
+def _free_surface(
+    surface: Surface, directions: Sequence[LatticeDirection], scales: Scales, *, is_default: bool
+) -> _Directional:
+    """Measure a surface with free edges by its second differences, without its single waves.
+
+    The intervals hold that of the likelihood, where it finds other than fractional Brownian heights.
+    """
     if surface.is_constant or surface.is_plane:
         record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
         return _Directional([record] * len(directions), None, record.note)
+    if not (is_default and surface.is_complete and surface.heights.size <= LARGE):
+        return _by_differences(surface, directions, scales)
+    without, waves_note = without_waves(surface)
+    result = _by_differences(without, directions, scales)
+    by_modes = likelihood(without, None, False)
+    return result.beside(by_modes, waves_note)
+
+
+def _by_differences(surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> _Directional:
+    """Measure a surface by its second differences."""
     equal = EqualLags.of(surface, directions, scales)
     differences, owner = SecondDifferences.at(surface, directions, [equal.multiples(d) for d in directions])
     every = lattice_directions(None, surface.plane_spacing)

@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,7 @@ _FIELDS = (
     "misfit",
 )
 _NAMES = (*_FIELDS, "fractal_dimension", "topothesy", "run_time", "method", "increment_lag")
+CHECKED = ("spectrum", "roughness_length", "higuchi", "detrended_fluctuation")  # curves with an interval
 IN_BLOCKS = ("increments", "spectrum", "variogram")  # methods that read dask arrays block by block
 
 
@@ -169,12 +171,16 @@ def estimate(
         announce_loading("fractalcontact.dimensions.estimate", {"surface": surface})
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):
+        by_modes = cache(lambda single=single: likelihood(single, window, bool(noise), psf))
         for column, name in enumerate(names):
             start = time.perf_counter()
             if name in ("default", "likelihood"):
-                record = likelihood(single, window, bool(noise), psf)
+                record = by_modes()
             else:
                 record = _ESTIMATORS[name](single, window, bool(noise))
+                if name in CHECKED and window is None and np.isfinite(record.ci_low) and not single.is_lazy:
+                    found = by_modes().found_beside(record.hurst, record.standard_error)
+                    record = record.beside_modes(by_modes(), found)
             if single.finest_scale:
                 record = record.gridded(single.finest_scale)
             estimates.append(record.limited())

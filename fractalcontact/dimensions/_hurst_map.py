@@ -9,20 +9,30 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import read_grid
+from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._increments import increments
-from fractalcontact.dimensions._records import Estimate, undefined
-from fractalcontact.dimensions._surface_input import check_surface, read_surfaces
+from fractalcontact.dimensions._likelihood import likelihood
+from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, undefined
+from fractalcontact.dimensions._surface_input import (
+    Scales,
+    check_scales,
+    check_surface,
+    read_scales,
+    read_surfaces,
+)
+from fractalcontact.dimensions._waves import without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along the edge of a window
 FEWEST = 25  # observed points in a window
+_SLIGHT = 2.0  # |z| of a bend that counts where the surface shows blur or noise
 _FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
 
 
-def _check(problems: Problems, *, surface: Any, window: Any, step: Any) -> None:
+def _check(problems: Problems, *, surface: Any, window: Any, step: Any, scales: Any) -> None:
     is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_FIELDS)
     is_number = problems.number("window", window, above=0.0)
     problems.number("step", step, above=0.0, optional=True)
@@ -32,10 +42,17 @@ def _check(problems: Problems, *, surface: Any, window: Any, step: Any) -> None:
     least, most = SMALLEST * max(grid.spacing), min(grid.extent)
     expected = f"a length from {least:g} m ({SMALLEST} points) to {most:g} m"
     problems.require(least * (1 - 1e-9) <= window <= most * (1 + 1e-9), "window", expected, window)
+    check_scales(problems, scales, surface)
 
 
 @public_result(title="Map of the Hurst exponent", check=_check, in_blocks=True)
-def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None) -> xr.Dataset:
+def hurst_map(
+    surface: xr.DataArray,
+    window: float,
+    *,
+    step: float | None = None,
+    scales: tuple[float, float] | None = None,
+) -> xr.Dataset:
     """Estimate the Hurst exponent in square windows that move over a surface.
 
     Parameters
@@ -47,6 +64,8 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
         Edge of a window in m, at least 16 points.
     step : float, optional
         Distance between neighbouring windows in m; by default half a window.
+    scales : (low, high), optional
+        Lags in m between which to fit, as (4, 16) spacings for a blurred surface. Default: the shortest.
 
     Returns
     -------
@@ -62,7 +81,8 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
 
     Notes
     -----
-    Windows that overlap have correlated errors: compare those at least one window apart.
+    Windows that overlap have correlated errors: compare those at least one window apart. Where the windows
+    together have a bent power law, as with blur or noise, there is no interval, and `reason` says so.
 
     Examples
     --------
@@ -72,7 +92,7 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
     >>> dict(result.hurst.sizes), round(float(result.hurst.mean()), 1)
     ({'y': 5, 'x': 7}, 0.7)
     """
-    grid = read_grid(surface)
+    grid, lags = read_grid(surface), read_scales(scales)
     edges = [max(SMALLEST, round(window / spacing)) for spacing in grid.spacing]
     edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
@@ -81,14 +101,23 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
         np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)
     )
     leading = surface.dims[:-2]
-    records = []
+    new = float(np.prod([min(1.0, jump / edge) for jump, edge in zip(steps, edges, strict=True)]))
+    records: list[Estimate] = []
+    notes: list[str] = []
     for plane in range(int(np.prod(surface.shape[:-2], dtype=int))):
         index = np.unravel_index(plane, surface.shape[:-2])
         single = surface.isel(dict(zip(leading, map(int, index), strict=True)))
+        if not has_blocks(single):
+            without, found = without_waves(read_surfaces(single)[0])
+            if found:
+                single, notes = single.copy(data=without.heights * without.unit), [*notes, found]
+        of_plane = []
         for row in rows:
             band = single.isel(y=slice(int(row), int(row) + edges[0])).compute()
             parts = (band.isel(x=slice(int(start), int(start) + edges[1])) for start in columns)
-            records += [_estimated(part) for part in parts]
+            of_plane += [_estimated(part, lags) for part in parts]
+        records += _without_bent(of_plane, new, single)
+    reasons = "; ".join(dict.fromkeys(record.reason for record in records if record.reason))
     shape = (*surface.shape[:-2], rows.size, columns.size)
     data: dict[str, Any] = {
         name: (surface.dims, np.reshape([getattr(record, name) for record in records], shape))
@@ -101,11 +130,37 @@ def hurst_map(surface: xr.DataArray, window: float, *, step: float | None = None
         spacing = grid.spacing[0 if dim == "y" else 1]
         first = float(place[0]) if place is not None else 0.5 * spacing
         coords[dim] = dim, first + (starts + 0.5 * (edge - 1)) * spacing
-    return xr.Dataset(data, coords=coords)
+    result = xr.Dataset(data, coords=coords)
+    for name in _FIELDS[1:] if reasons else ():
+        result[name].attrs["reason"] = reasons
+    if notes:
+        result["hurst"].attrs["comment"] = "; ".join(dict.fromkeys(notes))
+    return result
 
 
-def _estimated(part: xr.DataArray) -> Estimate:
+def _without_bent(records: list[Estimate], new: float, surface: xr.DataArray) -> list[Estimate]:
+    """Return the estimates of a surface, without intervals where the power laws of its windows are bent.
+
+    An exponent that differs from place to place bends no power law inside a window. `new` is the share of a
+    window that the one before does not have. A bend that chance might give counts with blur or noise.
+    """
+    bends = np.array([record.misfit for record in records if np.isfinite(record.misfit)])
+    z = float(bends.sum() * np.sqrt(new / bends.size)) if bends.size else 0.0
+    is_bent = abs(z) > SIGNIFICANT
+    if not is_bent and abs(z) > _SLIGHT and not has_blocks(surface):
+        whole = likelihood(read_surfaces(surface)[0], None, False)
+        is_bent = bool(np.isfinite(whole.blur_spread) or np.isfinite(whole.noise_height))
+    if not is_bent:
+        return records
+    reason = (
+        f"the exponent changes with the lag inside the windows ({z:+.1f} standard deviations), as with blur, "
+        "noise or marks: see `estimate`, and choose `scales` beyond them"
+    )
+    return [record if record.reason else record.without_interval(reason) for record in records]
+
+
+def _estimated(part: xr.DataArray, scales: Scales) -> Estimate:
     """Return the estimate of one window."""
     if np.count_nonzero(np.isfinite(part.values)) < FEWEST:
         return undefined(f"fewer than {FEWEST} points were observed")
-    return increments(read_surfaces(part)[0], None, False).limited()
+    return increments(read_surfaces(part)[0], scales, False).limited()

@@ -83,7 +83,10 @@ def increments(surface: Surface, scales: Scales, noise: bool) -> Estimate:
         if ground is not None:
             return replace(ground, rms_increment=ground.rms_increment * surface.unit, **window)
     error, low, high, note = _interval(surface, moments, unit, fit, blocks, lags)
-    return Estimate(fit.hurst, error, low, high, rms_increment=fit.rms_increment * unit, note=note, **window)
+    increment = fit.rms_increment * unit
+    return Estimate(
+        fit.hurst, error, low, high, rms_increment=increment, misfit=fit.noise_z, note=note, **window
+    )
 
 
 def without_steps(heights: Array, spacing: tuple[float, float], full_hurst: float) -> Estimate | None:

@@ -13,6 +13,7 @@ ASKED = "asked for"  # the window of scales
 CONSTANT = "a constant height has no Hurst exponent"
 NORMAL = 1.959963984540054  # 97.5 % quantile of the normal distribution
 GRIDDING = 0.035  # largest error of H from the finest scale of a gridded surface on, as measured
+_DIFFERENT = 2.5  # standard errors between two methods beyond which an interval holds both
 _ROUNDING = 1e-9  # rounding of a slope
 
 
@@ -65,6 +66,22 @@ class Estimate:
         """Widen the interval until it holds another one, for the reason in the note."""
         low, high = min(self.ci_low, low), max(self.ci_high, high)
         return replace(self, ci_low=low, ci_high=high, note=joined(self.note, note))
+
+    def found_beside(self, hurst: float, error: float) -> str:
+        """Return what this estimate, of the modes, finds beside another: empty if they agree."""
+        if self.note:
+            return self.note
+        differ = abs(hurst - self.hurst) > _DIFFERENT * float(np.hypot(error, self.standard_error))
+        return f"{self.hurst:.2f}, without offsets of rows and columns" if differ else ""
+
+    def beside_modes(self, by_modes: Estimate, found: str) -> Estimate:
+        """Widen an interval for fractional Brownian heights where the modes show others."""
+        if not (found and np.isfinite(self.ci_low)):
+            return self
+        if not np.isfinite(by_modes.ci_low):
+            return self.without_interval(f"`likelihood` gives none: {found}")
+        note = f"the interval, of fractional Brownian heights, also holds that of `likelihood`: {found}"
+        return self.holding(by_modes.ci_low, by_modes.ci_high, note)
 
     def averaged(self, other: Estimate, share: float, note: str) -> Estimate:
         """Return the mean with another estimate, of the weight `share`; the interval holds both."""

@@ -169,7 +169,7 @@ class Surface:
             largest = float(np.nanmax(np.abs(lines)))
             straight = lines[1:-1][bend <= 8.0 * np.spacing(largest)]
             straight = np.rint(straight * (1e9 / largest)) if largest > 0 else straight
-            if np.unique(straight).size > 0.9 * straight.size:
+            if np.unique(straight).size > 0.9 * straight.size and not _is_rounded(middle):
                 share = max(share, straight.size / known)
         return share
 
@@ -214,6 +214,12 @@ class Surface:
         for start in range(0, ny, rows):
             slab = self.source.isel(y=slice(start, start + rows + overlap)).values
             yield np.ascontiguousarray(slab, dtype=np.float64), min(rows, ny - start)
+
+
+def _is_rounded(heights: Array) -> bool:
+    """Return whether many heights are equal, so that some lie on lines by chance."""
+    known = heights[np.isfinite(heights)]
+    return bool(np.unique(known).size < 0.9 * known.size)
 
 
 def is_lazy(array: xr.DataArray) -> bool:

@@ -332,3 +332,25 @@ def test_regular_gaps_are_isotropic():
     )
     assert float(result["isotropy_p_value"]) > 0.01
     assert ((result["ci_low"] - 0.05 < 0.5) & (result["ci_high"] + 0.05 > 0.5)).all()
+
+
+def test_marks_are_taken_out_of_all_directions():
+    """With the wave, the exponents of H = 0.3 reach from 0.2 to 0.6."""
+    y, x = np.mgrid[:128, :128]
+    wave = 1e-6 * np.sin(2.0 * np.pi * (0.13 * x + 0.09 * y) + 1.0)
+    result = fc.dimensions.directions(brownian(128, 0.3, 5) + wave)
+    assert ((result.ci_low < 0.3) & (result.ci_high > 0.3)).mean() > 0.7
+    assert np.ptp(result.hurst.values) < 0.1
+    assert "wave" in result.hurst.attrs["reason"]
+
+
+def test_intervals_hold_that_of_the_modes_where_the_lags_are_bent():
+    """A ratio of 2 with a blur of 0.7 spacings: the lags alone have narrow intervals at other exponents."""
+    stretched = fc.surfaces.fbm((140, 140), (2.0, 1.0), hurst=0.3, rms_increment=1.0, rng=7)
+    blurred = gaussian_filter(stretched.values, 0.7)[6:-6, 6:-6]
+    result = fc.dimensions.directions(fc.surfaces.from_array(blurred, 1.0))
+    held = (result.ci_low < 0.3) & (result.ci_high > 0.3)
+    assert (held | np.isnan(result.ci_low)).mean() > 0.7
+    assert np.isnan(result.anisotropy_ratio)  # the blur makes it 1.35
+    assert "bent" in result.anisotropy_ratio.attrs["reason"]
+    assert result.isotropy_p_value < 0.01

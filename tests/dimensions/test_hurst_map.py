@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -55,3 +56,24 @@ def test_stack_and_limits():
     for window in (8 * SPACING, 64 * SPACING, -1.0):
         with pytest.raises(InvalidInput, match="window"):
             fc.dimensions.hurst_map(stack, window)
+
+
+def test_blurred_windows_have_no_interval_and_the_reason():
+    rng = np.random.default_rng(5)
+    sharp = brownian((128, 128), 0.5, 6)
+    blurred = sharp.copy(data=gaussian_filter(sharp.values, 0.7))
+    result = fc.dimensions.hurst_map(blurred, 32 * SPACING)
+    assert np.isnan(result.ci_low).all()
+    assert "blur" in result.ci_low.attrs["reason"]
+    # lags beyond the blur have an interval, which holds the exponent in most windows
+    longer = fc.dimensions.hurst_map(blurred, 64 * SPACING, scales=(8 * SPACING, 32 * SPACING))
+    inside = (longer.ci_low < 0.5) & (longer.ci_high > 0.5)
+    assert inside.mean() > 0.8
+    # a single wave is taken out of all windows, and named
+    y, x = np.mgrid[:128, :128]
+    marked = sharp + 1e-6 * np.sin(2.0 * np.pi * (0.13 * x + 0.09 * y) + rng.uniform(0.0, 6.0))
+    result = fc.dimensions.hurst_map(marked, 32 * SPACING)
+    assert "wave" in result.hurst.attrs["comment"]
+    assert ((result.ci_low < 0.5) & (result.ci_high > 0.5)).mean() > 0.85
+    exact = fc.dimensions.hurst_map(sharp, 32 * SPACING)
+    assert "reason" not in exact.ci_low.attrs
