@@ -180,7 +180,7 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
         estimate, lag = _with_blur(free, comparison, blurred)
         estimate = _allowing_rounding(estimate, comparison, free)
         estimate = _or_neither(estimate, free, comparison, parts)
-    elif comparison is not None and (several := _without_aliases(free, comparison, blurred, parts)):
+    elif comparison is not None and (several := _several(free, comparison, blurred, parts)):
         estimate, lag = several
     else:
         modes = free.modes()
@@ -277,22 +277,27 @@ def _with_blur(free: FreeEdges, comparison: Comparison, fit: BlurredFit) -> tupl
     return estimate, round(_BEYOND * fit.spread)
 
 
-def _without_aliases(
+def _several(
     free: FreeEdges, comparison: Comparison, fit: BlurredFit | None, parts: Heterogeneity
 ) -> tuple[Estimate, int] | None:
-    """Return the estimate of waves without aliases that have several exponents, and a lag; None otherwise.
+    """Return the estimate of several exponents of a surface on which no blur is seen, and a lag; or None.
 
     `fit` is that of blur and noise. It is made, if it is not there, where one exponent does not agree with
-    the octaves of all modes.
+    the modes. With aliases a run of octaves is left to `_longest_run`; its interval holds a slow roll-off.
     """
     window = comparison.window
-    if not free.is_default or parts.note or agreement(window, comparison.plain) > LEAST_AGREEMENT:
+    if not free.is_default or parts.note:
+        return None
+    if abs(comparison.misfit) < SIGNIFICANT and agreement(window, comparison.plain) > LEAST_AGREEMENT:
         return None
     fit = _blurred_fit(free, comparison) if fit is None else fit
     if fit is None:
         return None
     explained = Explanations.likelier(fit, window.power, window.frame)
-    several = None if explained.has_aliases else several_exponents(explained, free.surface)
+    if explained.has_aliases and not explained.is_rolloff:
+        run = _longest_run(free, window) if fit.is_even and abs(comparison.misfit) > SIGNIFICANT else None
+        return None if run is None else (explained.beside_rolloff(run[0], explained.run_excess), run[1])
+    several = several_exponents(explained, free.surface)
     return None if several is None else (several, _lag(several, free.surface))
 
 

@@ -27,7 +27,7 @@ _FIRST, _LAST = np.log(LOWEST + _OFFSET), np.log(HIGHEST + _OFFSET)
 NODES = np.exp(0.5 * (_FIRST + _LAST) - 0.5 * (_LAST - _FIRST) * np.cos(_ANGLES)) - _OFFSET
 SMOOTH = 1.3  # exponent up to which the sums over the covariance are exact enough
 _PER = 12  # inverse relative width of a block
-_LARGEST = 1024  # points along an axis up to which the table is summed over the lattice
+LARGEST = 1024  # points along an axis up to which the table is summed over the lattice
 _ALIASES = 2  # aliases along each axis that are summed one by one
 _INVERSE = np.linalg.inv(np.polynomial.chebyshev.chebvander(-np.cos(_ANGLES), _DEGREE))
 
@@ -65,6 +65,8 @@ class Frame:
         Wavenumber along each axis at the centre, rad per spacing of x.
     logs : ndarray, shape (nodes, blocks)
         Logarithm of the expected power of fractional Brownian heights.
+    images : int
+        Aliases along each axis that are summed one by one; 0 if there are no waves beyond the sampling.
     """
 
     shape: tuple[int, ...]
@@ -74,6 +76,7 @@ class Frame:
     count: Array
     waves: tuple[Array, ...]
     logs: Array
+    images: int = _ALIASES
 
     @property
     def axes(self) -> int:
@@ -99,7 +102,7 @@ class Frame:
     @cached_property
     def aliases(self) -> Array:
         """Squared wavenumbers of the blocks and of their nearest aliases: (aliases, blocks)."""
-        return alias_squares(self.waves, self.spacing, _ALIASES)
+        return alias_squares(self.waves, self.spacing, self.images)
 
     @cached_property
     def alias_logs(self) -> Array:
@@ -109,14 +112,14 @@ class Frame:
     @cached_property
     def near(self) -> Array:
         """Indices of the aliases at most one period away along each axis."""
-        offsets = np.arange(-_ALIASES, _ALIASES + 1)
+        offsets = np.arange(-self.images, self.images + 1)
         steps = np.abs(np.stack(np.meshgrid(*[offsets] * self.axes, indexing="ij"))).max(axis=0).ravel()
         return np.flatnonzero(steps <= 1)
 
     @cached_property
     def tail_start(self) -> Array:
         """Wavenumbers, one for each of some azimuths, beyond which aliases are summed as an integral."""
-        edge = (2 * _ALIASES + 1) * np.pi
+        edge = (2 * self.images + 1) * np.pi
         if self.axes == 1:
             return np.array([edge])
         angle = (np.arange(16) + 0.5) / 16 * np.pi / 2
@@ -132,11 +135,13 @@ class Frame:
     @cached_property
     def unaliased(self) -> Frame:
         """The same blocks of surfaces that have no waves beyond the sampling, and so no aliases."""
-        density = -(NODES[:, None] + 0.5 * self.axes) * np.log(self.squares)
-        return replace(self, logs=self.logs - self.densities + density)
+        bare = replace(self, images=0)
+        return replace(bare, logs=self.logs - self.densities + bare.densities)
 
     def tail(self, hurst: float, square: float) -> tuple[float, float, float]:
         """Return the power of far aliases under a Gaussian blur, and its derivatives by H and `square`."""
+        if not self.images:
+            return 0.0, 0.0, 0.0
         x = np.linspace(0.0, 20.0, 80)
         start = self.tail_start[:, None]
         q = start * np.exp(x)
@@ -150,6 +155,25 @@ class Frame:
         weights = (value, -2.0 * np.log(q) * value, -q * q * value)
         power, slope, fall = (float(np.mean(np.trapezoid(w, x, axis=1))) for w in weights)
         return power, slope, fall
+
+    def rolled_densities(self, hurst: float, square: float) -> tuple[Array, Array, Array]:
+        """Return the logarithm of the density (q^2 + square)^(-H - axes / 2), and two derivatives.
+
+        Aliases are included. The derivatives are those by H and by the logarithm of `square`.
+        """
+        squares, power = self.aliases + square, hurst + 0.5 * self.axes
+        logs = np.log(squares)
+        terms = np.exp(-power * logs)
+        total, by_hurst = terms.sum(0), -(terms * logs).sum(0)
+        by_square = -power * square * (terms / squares).sum(0)
+        if self.images:
+            start = self.tail_start**2 + square
+            measure = self.spacing[0] / (2.0 * np.pi) if self.axes == 2 else 1.0 / np.pi
+            tails = 0.5 * measure / hurst * start**-hurst
+            total = total + tails.mean()
+            by_hurst = by_hurst - np.mean(tails * (np.log(start) + 1.0 / hurst))
+            by_square = by_square - hurst * square * np.mean(tails / start)
+        return np.log(total), by_hurst / total, by_square / total
 
     def mean(self, values: Array) -> Array:
         """Average the modes of each block: shape (modes along each axis from 1) to (blocks,)."""
@@ -192,7 +216,7 @@ def frame(shape: tuple[int, ...], spacing: tuple[float, ...]) -> Frame:
     waves = _waves(shape, spacing, [c[i] for c, i in zip(centres, index, strict=True)])
     if len(shape) == 1:
         logs = np.log(_profile_power(shape[0]))[:, centres[0] - 2]
-    elif min(shape) <= _LARGEST:
+    elif min(shape) <= LARGEST:
         power = _power_at(shape, spacing, centres)[:, index[0], index[1]]
         logs = _logarithm(power, Frame(shape, spacing, starts, index, count, waves, count))
     else:
@@ -221,9 +245,9 @@ def _extrapolated(shape: tuple[int, ...], spacing: tuple[float, ...], centres: A
     Beyond the first modes they differ by a factor that depends on the number of the mode, and so little on
     the size that a smaller lattice gives it.
     """
-    factor = _LARGEST / min(shape)
+    factor = LARGEST / min(shape)
     small = tuple(round(n * factor) for n in shape)
-    ends = [np.minimum(c, _LARGEST // 2) for c in centres]
+    ends = [np.minimum(c, LARGEST // 2) for c in centres]
     unique = [np.unique(e) for e in ends]
     grid = np.unravel_index(range(unique[0].size * unique[1].size), (unique[0].size, unique[1].size))
     waves = _waves(small, spacing, [u[i] for u, i in zip(unique, grid, strict=True)])
@@ -263,6 +287,13 @@ def expected_power_at(
 ) -> Callable[[float], Array]:
     """Return a function of H: the expected power of the modes of given numbers, (rows, columns)."""
     return summed(shape, spacing, [_weights(n, k) for n, k in zip(shape, modes, strict=True)])
+
+
+def lattice_power(frame: Frame, covariance: Array) -> Array:
+    """Return the expected power of the blocks of a surface from its covariance at the lags (ny, nx)."""
+    centres = [(s[:-1] + s[1:] - 1) // 2 for s in frame.starts]
+    along_y, along_x = (_weights(n, k) for n, k in zip(frame.shape, centres, strict=True))
+    return np.asarray((along_y @ covariance @ along_x.T)[frame.index])
 
 
 def summed(shape: tuple[int, ...], spacing: tuple[float, ...], weights: Any) -> Callable[[float], Array]:

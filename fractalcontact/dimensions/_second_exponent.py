@@ -53,6 +53,7 @@ _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval o
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
 NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
+_OR_ROLLOFF = "a slow roll-off explains the waves nearly as well: the interval holds its exponent"
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 
 
@@ -111,7 +112,7 @@ class Explanations:
             return aliased
         unaliased = cls(fit, frame_blocks(means, frame.unaliased), has_aliases=False)
         shortest = unaliased.record[0].fit
-        if shortest.low > 1.0 or shortest.high < 0.0:
+        if (shortest.low > 1.0 or shortest.high < 0.0) and not unaliased.is_rolloff:
             return aliased
         if unaliased.run_excess > _FAR and unaliased.rolloff_excess > _FAR:
             return aliased
@@ -123,14 +124,23 @@ class Explanations:
     @cached_property
     def inside(self) -> Array:
         """Blocks on which the explanations are compared: those of blur and noise, without aliases all."""
-        return self.fit.inside if self.has_aliases else np.ones(self.blocks.count.size, dtype=bool)
+        return self.fit.inside if self.has_aliases else self.everywhere
 
     @cached_property
     def reference(self) -> float:
-        """Penalised deviance of blur and noise; octaves of blocks that they leave out have their own law."""
-        parts = [octave.inside & self.inside & ~self.fit.inside for octave in self.record]
+        """Penalised deviance of blur and noise on the blocks that are compared."""
+        return self._reference(self.inside)
+
+    def _reference(self, inside: Array) -> float:
+        """Return that of some blocks; octaves of blocks that blur and noise leave out have their own law."""
+        parts = [octave.inside & inside & ~self.fit.inside for octave in self.record]
         laws = [fit_power_law(self.blocks, part) for part in parts if np.any(part)]
         return self.fit.penalised + 2.0 + sum(law.deviance + 4.0 for law in laws)
+
+    @cached_property
+    def everywhere(self) -> Array:
+        """All blocks."""
+        return np.ones(self.blocks.count.size, dtype=bool)
 
     @cached_property
     def record(self) -> list[Octave]:
@@ -175,14 +185,26 @@ class Explanations:
 
     @cached_property
     def rolloff(self) -> RollOff | None:
-        """A slow roll-off of a fractal exponent, without aliases."""
-        fit = None if self.has_aliases else fit_rolloff(self.blocks, self.inside)
-        return fit if fit is not None and _LEAST_EXPONENT < fit.law.hurst < 1.0 else None
+        """A slow roll-off of a fractal exponent; all waves belong to it."""
+        fit = fit_rolloff(self.blocks, self.everywhere)
+        is_fractal = fit is not None and fit.law.hurst > _LEAST_EXPONENT and fit.law.low < 1.0
+        return fit if is_fractal else None
 
     @cached_property
     def rolloff_excess(self) -> float:
         """`excess` of the slow roll-off; infinite without one."""
-        return np.inf if self.rolloff is None else self.excess(self.rolloff.penalised)
+        return np.inf if self.rolloff is None else self.rolloff.penalised - self._reference(self.everywhere)
+
+    @property
+    def is_rolloff(self) -> bool:
+        """Whether a slow roll-off is the likeliest."""
+        return self.choice is not None and self.choice[0] == "rolloff"
+
+    def beside_rolloff(self, estimate: Estimate, excess: float) -> Estimate:
+        """Return an estimate with an `excess` that holds a slow roll-off that is nearly as likely."""
+        if self.rolloff is None or self.is_rolloff or self.rolloff_excess > excess + _ALIKE:
+            return estimate
+        return estimate.holding(self.rolloff.law.low, self.rolloff.law.high, _OR_ROLLOFF)
 
     @cached_property
     def single(self) -> float:
@@ -217,7 +239,8 @@ class Explanations:
     def _choice(self, limit: float) -> tuple[str, float] | None:
         two, knee, run = self.two, self.likely_knee, self.run
         excess = np.inf if two is None else self.excess(two.penalised)
-        if self.rolloff_excess < min(limit, excess, self.run_excess):
+        rivals = [excess, self.run_excess] if run.last > run.first else [excess]
+        if self.rolloff_excess < min(limit, *rivals):
             return "rolloff", self.rolloff_excess
         if two is not None and two.rough.hurst > _LEAST_EXPONENT and excess < limit:
             return "two", excess
@@ -257,6 +280,7 @@ def several_exponents(explained: Explanations, surface: Surface) -> Estimate | N
         estimate = run_estimate(explained.run, surface)
     if not explained.has_aliases:
         estimate = replace(estimate, note=joined(estimate.note, NO_ALIASES))
+    estimate = explained.beside_rolloff(estimate, excess)
     if not fit.is_good or excess < (-_TWO_ALONE if kind == "two" else -_UNDECIDED):
         return estimate
     return estimate.holding(fit.low if fit.low > LOWEST else 0.0, fit.high, _OR_NOISE)
@@ -278,6 +302,8 @@ def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, floa
         ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
     if knee is not None and explained.excess(knee.penalised) < _ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
+    if explained.rolloff is not None and explained.rolloff_excess < _ALIKE:
+        ranges.append((explained.rolloff.law.low, explained.rolloff.law.high))
     if explained.rival is not None:
         ranges += explained.rival.possible
     if has_second or not is_bent:
