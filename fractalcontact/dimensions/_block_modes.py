@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._cosine_modes import (
+from fractalcontact.base import fft
+from fractalcontact.dimensions._cosine_modes import Lattice, expected_power, mode_power
+from fractalcontact.dimensions._gapped_modes import (
     GappedModes,
-    Lattice,
-    expected_power,
-    mode_power,
+    approximate_excess,
     relative_excess,
     relative_white_excess,
+    with_lines,
 )
 from fractalcontact.dimensions._harmonic_interpolation import Filling
 from fractalcontact.dimensions._mode_blocks import LOWEST, SMOOTH, block_starts, block_weights, summed
@@ -30,6 +31,11 @@ _MODERATE = 0.15  # share of missing points up to which one probe is enough
 _BORDER = 0.95  # the same for the share of the border that was observed
 _STEEP = 0.7  # exponent up to which one probe is enough in any case
 _MANY = 0.3  # the same for the standard error of a surface of fewer points
+_FINE = 1 << 20  # points from which on modes beside gaps are taken as independent, but for the border
+_COARSE = 1 << 18  # points of the lattice on which the effect of gaps near the border is found
+_FEWEST = 128  # along its shorter side
+_COARSE_PROBES = 2
+_SETTLED = 0.25  # share of the highest mode of the coarse lattice from which on the effect falls as 1 / k
 
 
 @dataclass(frozen=True)
@@ -38,21 +44,40 @@ class BlockGaps:
 
     Attributes
     ----------
-    lattice : Lattice
+    spacing : tuple of float
+        (dy / dx, 1)
     filling : Filling
     starts, count : as in `Frame`, for all blocks
     chosen : ndarray of bool
         Blocks that are fitted.
     pilot : float
         An exponent near that of the surface.
+    model : callable
+        Hurst exponent to the expected power of all blocks of the complete surface.
     """
 
-    lattice: Lattice
+    spacing: tuple[float, float]
     filling: Filling
     starts: tuple[Array, Array]
     count: Array
     chosen: Array
     pilot: float
+    model: Callable[[float], Array]
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """Distances on the lattice."""
+        return Lattice.of(self.filling.observed.shape, self.spacing)
+
+    @cached_property
+    def coarse_shape(self) -> tuple[int, int] | None:
+        """Shape of a coarser lattice for the effect of gaps near the border; None if this is small."""
+        shape = self.filling.observed.shape
+        step = np.sqrt(self.count.sum() / _COARSE)
+        if self.count.sum() < _FINE or min(shape) < step * _FEWEST:
+            return None
+        ny, nx = (fft.fast_length(int(n / step)) for n in shape)
+        return ny, nx
 
     @cached_property
     def missing(self) -> float:
@@ -70,8 +95,34 @@ class BlockGaps:
         return 2 if is_large and hurst > _STEEP else 1
 
     def excess(self, hurst: float) -> Array:
-        """Return the excess of the expected power over that of the complete surface."""
-        return self._mean(relative_excess(self.lattice, self.filling, hurst, self.probes(hurst)))
+        """Return the excess of the expected power over that of the complete surface.
+
+        That of a large surface is found for independent modes. They are wrong near the border of the
+        surface, and so for gaps there; the difference is found on a coarser lattice. It depends on the number
+        of the mode, and not on the size of the surface.
+        """
+        if self.coarse_shape is None:
+            return self._mean(relative_excess(self.lattice, self.filling, hurst, self.probes(hurst)))
+        # the fit has its first node there, up to a rounding of its logarithm: the model is at hand
+        blocks = self.model(float(np.exp(np.log(hurst)))).reshape(self.count.shape)
+        power = with_lines(_in_each_mode(blocks, self.starts), self.spacing, hurst)
+        approximate = _means(approximate_excess(power, self.filling, self.probes(hurst)), self.starts)
+        return np.asarray((approximate + self._beside_border(self.coarse_shape, hurst))[self.chosen])
+
+    def _beside_border(self, shape: tuple[int, int], hurst: float) -> Array:
+        """Return the excess of each block beyond that of independent modes, from a coarser lattice."""
+        fine = self.filling.observed
+        observed = _coarser(fine, shape)
+        if observed.all() or not observed.any():
+            return np.zeros(self.count.shape)
+        steps = [n / m for n, m in zip(fine.shape, shape, strict=True)]
+        spacing = self.spacing[0] * steps[0] / steps[1], 1.0
+        lattice, filling = Lattice.of(shape, spacing), Filling(observed, spacing)
+        power = with_lines(expected_power(lattice, hurst), spacing, hurst)
+        excess = relative_excess(lattice, filling, hurst, _COARSE_PROBES)
+        excess -= approximate_excess(power, filling, _COARSE_PROBES)
+        starts = block_starts(shape[0], 1), block_starts(shape[1], 1)
+        return _extended(_means(excess, starts), starts, self.starts)
 
     @cached_property
     def white(self) -> Array:
@@ -79,7 +130,7 @@ class BlockGaps:
         return self._mean(relative_white_excess(self.filling, self.probes(self.pilot)))
 
     def _mean(self, values: Array) -> Array:
-        return np.asarray((_sums(values, self.starts) / self.count)[self.chosen])
+        return np.asarray(_means(values, self.starts)[self.chosen])
 
     def error(self, fit: WhittleFit) -> float:
         """Return the standard error of H by the sandwich formula, see `_cosine_modes.FreeModes.error`."""
@@ -124,19 +175,20 @@ class BlockModes:
     ) -> BlockModes:
         """Fill a surface and collect its modes; `pilot` is an exponent near its own."""
         observed = np.isfinite(heights)
-        filling, values = Filling(observed, spacing), heights[observed]
-        modes = cls.of(mode_power(filling(values - values.mean())), spacing, None)
+        filling = Filling(observed, spacing)
+        modes = cls.of(mode_power(filling(heights - heights[observed].mean())), spacing, None)
         shape = heights.shape[0], heights.shape[1]
         starts = block_starts(shape[0], 1), block_starts(shape[1], 1)
         blocks = starts[0].size - 1, starts[1].size - 1
         chosen = between(modes.order, scales)
         gaps = BlockGaps(
-            Lattice.of(shape, spacing),
+            spacing,
             filling,
             starts,
             modes.count.reshape(blocks),
             chosen.reshape(blocks),
             float(np.clip(pilot, LOWEST, _SMOOTHEST)),
+            modes.model,
         )
         return replace(modes.part(chosen), gaps=gaps)
 
@@ -250,3 +302,64 @@ def _sums(values: Array, starts: tuple[Array, Array]) -> Array:
     """Sum modes (ny - 1, nx - 1) over blocks."""
     rows = np.add.reduceat(values, starts[0][:-1] - 1, axis=0)
     return np.asarray(np.add.reduceat(rows, starts[1][:-1] - 1, axis=1))
+
+
+def _means(values: Array, starts: tuple[Array, Array]) -> Array:
+    """Average modes (ny - 1, nx - 1) over blocks."""
+    return np.asarray(_sums(values, starts) / np.outer(*(np.diff(s) for s in starts)))
+
+
+def _centres(starts: Array) -> Array:
+    return (starts[:-1] + starts[1:] - 1) // 2
+
+
+def _in_each_mode(power: Array, starts: tuple[Array, Array]) -> Array:
+    """Interpolate the power of blocks, which is near a power law, at every mode: (ny - 1, nx - 1)."""
+    along_y, along_x = (_interpolation(s) for s in starts)
+    result = along_y @ (np.log(power) @ along_x.T)
+    return np.asarray(np.exp(result, out=result))
+
+
+def _interpolation(starts: Array) -> Array:
+    """Return the weights of the blocks along an axis in linear interpolation by ln k: (modes, blocks)."""
+    logs, centres = np.log(np.arange(1, starts[-1])), np.log(_centres(starts))
+    below = np.clip(np.searchsorted(centres, logs, "right") - 1, 0, centres.size - 2)
+    share = (logs - centres[below]) / np.diff(centres)[below]
+    weights = np.zeros((logs.size, centres.size))
+    weights[np.arange(logs.size), below] = 1.0 - share
+    weights[np.arange(logs.size), below + 1] = share
+    return weights
+
+
+def _coarser(observed: Array, shape: tuple[int, int]) -> Array:
+    """Return the points of a coarser lattice of whose cells at least half was observed."""
+    first = [np.arange(m) * n // m for n, m in zip(observed.shape, shape, strict=True)]
+    rows = np.add.reduceat(observed, first[0], axis=0, dtype=np.int32)
+    size = np.outer(*(np.diff(f, append=n) for f, n in zip(first, observed.shape, strict=True)))
+    return np.asarray(2 * np.add.reduceat(rows, first[1], axis=1) >= size)
+
+
+def _extended(values: Array, coarse: tuple[Array, Array], fine: tuple[Array, Array]) -> Array:
+    """Return values of the blocks of a coarse lattice for those of a fine one.
+
+    The same modes up to a share of the highest one; beyond, those of fewer waves along the same direction,
+    divided by how many times fewer, so that the highest modes meet.
+    """
+    modes, known = [_centres(s) for s in fine], [_centres(s) for s in coarse]
+    steps = [f[-1] / c[-1] for f, c in zip(fine, coarse, strict=True)]
+    height = np.maximum(*np.meshgrid(*(k / s[-1] for k, s in zip(modes, fine, strict=True)), indexing="ij"))
+    step = float(np.sqrt(steps[0] * steps[1]))
+    least = _SETTLED / step
+    times = step ** np.clip(np.log(height / least) / np.log(1.0 / least), 0.0, 1.0)
+    places = [
+        np.interp(k / times, c, np.arange(c.size))
+        for k, c in zip((modes[0][:, None], modes[1]), known, strict=True)
+    ]
+    (y, x), (lower_y, lower_x) = places, (p.astype(int) for p in places)
+    share_y, share_x = y - lower_y, x - lower_x
+    upper_y, upper_x = (
+        np.minimum(i + 1, m - 1) for i, m in zip((lower_y, lower_x), values.shape, strict=True)
+    )
+    below = (1.0 - share_x) * values[lower_y, lower_x] + share_x * values[lower_y, upper_x]
+    above = (1.0 - share_x) * values[upper_y, lower_x] + share_x * values[upper_y, upper_x]
+    return np.asarray(((1.0 - share_y) * below + share_y * above) / times)

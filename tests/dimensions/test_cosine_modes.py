@@ -6,13 +6,10 @@ import scipy.fft
 import scipy.stats
 
 from fractalcontact.dimensions import _cosine_modes
-from fractalcontact.dimensions._harmonic_interpolation import Filling
 
 
-def squares(shape, steps, observed=None):
+def squares(shape, steps):
     y, x = (p.ravel() for p in np.indices(shape))
-    if observed is not None:
-        y, x = y[observed.ravel()], x[observed.ravel()]
     return (steps[0] * (y[:, None] - y)) ** 2 + (steps[1] * (x[:, None] - x)) ** 2
 
 
@@ -20,15 +17,6 @@ def orthonormal_modes(shape):
     """Rows: orthonormal cosine modes that vary along both axes."""
     points = np.eye(shape[0] * shape[1]).reshape(-1, *shape)
     return scipy.fft.dctn(points, axes=(1, 2), norm="ortho")[:, 1:, 1:].reshape(points.shape[0], -1).T
-
-
-@pytest.fixture(scope="module")
-def holes():
-    rng = np.random.default_rng(5)
-    observed = rng.random((12, 14)) > 0.15
-    observed[4:7, 0:4] = False
-    observed[0, -1] = observed[-1, 0] = observed[0, 0] = observed[-1, -1] = True
-    return observed
 
 
 @pytest.mark.parametrize("shape", [(9, 9), (8, 13), (3, 20)])
@@ -62,83 +50,6 @@ def test_wavelengths_along_diagonal():
     lengths = _cosine_modes.wavelengths(_cosine_modes.Lattice.of((10, 20), (2.0, 1.0)))
     assert lengths.shape == (9, 19)
     assert lengths[0, 0] == pytest.approx(1.0 / np.hypot(1 / 40, 1 / 40))
-
-
-def test_filling_of_plane_and_transpose(holes):
-    filling = Filling(holes, (2.0, 1.0))
-    y, x = np.indices(holes.shape)
-    plane = 0.3 * y - 0.1 * x + 5.0
-    assert np.abs(filling(plane[holes])).max() < 1e-12
-    rng = np.random.default_rng(6)
-    surface, values = rng.standard_normal(holes.shape), rng.standard_normal(holes.sum())
-    assert np.sum(filling(values) * surface) == pytest.approx(values @ filling.transpose(surface), rel=1e-12)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 1.3])
-def test_large_gaps_are_harmonic(ratio):
-    """Each missing height is the weighted mean of its neighbours, whichever solver is used."""
-    rng = np.random.default_rng(9)
-    observed = rng.random((260, 301)) > 0.05
-    observed[20:230, 40:240] = False  # 2^15 points and more are not eliminated
-    observed[:, -30:-20] = False
-    observed[100:104, 100:104] = True
-    filling = Filling(observed, (ratio, 1.0))
-    values = np.cumsum(rng.standard_normal(observed.shape), axis=1)[observed]
-    filled = np.pad(filling(values), 1, mode="edge")  # the border has no neighbour beyond it
-    vertical = filled[2:, 1:-1] + filled[:-2, 1:-1] - 2.0 * filled[1:-1, 1:-1]
-    along = filled[1:-1, 2:] + filled[1:-1, :-2] - 2.0 * filled[1:-1, 1:-1]
-    assert np.abs((vertical / ratio**2 + along)[~observed]).max() < 1e-6 * np.std(values)
-    surface = rng.standard_normal(observed.shape)
-    assert np.sum(filling(values) * surface) == pytest.approx(values @ filling.transpose(surface), rel=1e-7)
-
-
-def test_filling_without_gaps_removes_plane():
-    observed = np.ones((5, 6), dtype=bool)
-    values = np.random.default_rng(7).standard_normal(30)
-    filled = Filling(observed, (1.0, 1.0))(values)
-    columns = np.stack([np.ones(30), *(p.ravel() for p in np.indices((5, 6)))], axis=1)
-    rest = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
-    np.testing.assert_allclose(filled.ravel(), rest, atol=1e-13)
-
-
-def test_gapped_modes_equal_dense_algebra(holes):
-    hurst = 0.6
-    lattice = _cosine_modes.Lattice.of(holes.shape, (1.0, 1.0))
-    gapped = _cosine_modes.GappedModes(lattice, holes, 0.5, probes=500)
-    filling = Filling(holes, (1.0, 1.0))
-    operator = np.array([_cosine_modes.cosine_modes(filling(e)).ravel() for e in np.eye(holes.sum())]).T
-    dense = operator @ (-(squares(holes.shape, (1, 1), holes) ** hurst) / (1 - hurst)) @ operator.T
-    complete = _cosine_modes.expected_power(lattice, hurst).ravel()
-    reference = gapped.reference_power().ravel()
-    excess = gapped.excess(hurst)[0].ravel()
-    assert np.sum((np.diag(dense) - complete) / reference) == pytest.approx(
-        np.sum(excess / reference), rel=0.04
-    )
-    white = np.sum(operator**2, axis=1) - 1.0
-    assert np.sum(white / reference) == pytest.approx(
-        np.sum(gapped.white_excess().ravel() / reference), rel=0.04
-    )
-    weights = np.random.default_rng(8).standard_normal((2, *gapped.reference_power().shape))
-    scaled = dense / np.sqrt(np.outer(reference, reference))
-    exact = [[2 * np.sum(a.ravel()[:, None] * scaled * b.ravel() * scaled) for b in weights] for a in weights]
-    result = gapped.score_covariance(weights, hurst)
-    np.testing.assert_allclose(np.diag(result), np.diag(exact), rtol=0.05)
-    assert abs(result[0, 1] - exact[0][1]) < 0.1 * np.sqrt(exact[0][0] * exact[1][1])
-
-
-def test_relative_excess_equals_dense_algebra(holes):
-    """Without the scatter of the left-out points, few probes are as good as many of `GappedModes`."""
-    hurst = 0.6
-    lattice, filling = _cosine_modes.Lattice.of(holes.shape, (1.0, 1.0)), Filling(holes, (1.0, 1.0))
-    operator = np.array([_cosine_modes.cosine_modes(filling(e)).ravel() for e in np.eye(holes.sum())]).T
-    dense = operator @ (-(squares(holes.shape, (1, 1), holes) ** hurst) / (1 - hurst)) @ operator.T
-    complete = _cosine_modes.expected_power(lattice, hurst).ravel()
-    excess = _cosine_modes.relative_excess(lattice, filling, hurst, 300).ravel()
-    np.testing.assert_allclose(excess.sum(), np.sum(np.diag(dense) / complete - 1.0), rtol=0.01)
-    assert np.abs(excess - (np.diag(dense) / complete - 1.0)).max() < 0.12
-    white = _cosine_modes.relative_white_excess(filling, 300).ravel()
-    np.testing.assert_allclose(white.sum(), np.sum(operator**2) - white.size, rtol=0.03)
-    assert np.abs(white - (np.sum(operator**2, axis=1) - 1.0)).max() < 0.12
 
 
 @pytest.mark.parametrize("shape", [(9, 9), (40, 31)])
