@@ -430,7 +430,7 @@ def _flatness(power: Array, window: Window, spread: Array) -> float:
     """
     from scipy.special import polygamma, psi
 
-    count = window.count
+    count = window.frame.modes[window.inside]
     with np.errstate(divide="ignore"):
         logs = window.frame.mean(np.log(np.maximum(power, 1e-12 * power.mean())))[window.inside]
         means = np.log(window.power)

@@ -16,12 +16,14 @@ from fractalcontact.dimensions import _blur_fit, _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._restored_power import MOST_MISSING, restored_power
+from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
 from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, TRANSFER, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _LEAST = 12  # modes of an octave
+_FIRST_GUESS = 0.5  # exponent of the modes beside gaps
 _STEPS, _LONGEST_STEP = 60, 0.5
 _SCORING_STEPS = 40  # of a fit of two or three parameters
 _FLAT = 1.2  # times their standard errors: the likelihood is flatter than a parabola
@@ -47,7 +49,11 @@ _NAMES = (
 
 
 def _check(problems: Problems, *, surface: Any) -> None:
-    check_surface(problems, surface, smallest=16, gaps=False, squares=True, reserved=_NAMES)
+    is_plane = "y" in getattr(surface, "dims", ())
+    is_valid = check_surface(problems, surface, smallest=16, gaps=is_plane, squares=True, reserved=_NAMES)
+    if is_valid and is_plane and not is_lazy(surface):
+        most = float(surface.isnull().mean(["y", "x"]).max())
+        problems.require(most <= MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")
 
 
 @public_result(
@@ -62,8 +68,8 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     Parameters
     ----------
     surface : DataArray
-        Heights in m, dims (..., y, x) or (..., x) for a profile, without gaps; at least 16 points along
-        each axis.
+        Heights in m, dims (..., y, x), of which up to half may be missing, or (..., x) for a profile without
+        gaps; at least 16 points along each axis.
 
     Returns
     -------
@@ -78,7 +84,7 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
     Raises
     ------
     InvalidInput
-        Heights are missing, an axis is not uniform, or an axis has fewer than 16 points.
+        More heights are missing, an axis is not uniform, or an axis has fewer than 16 points.
 
     Notes
     -----
@@ -201,8 +207,8 @@ class Run:
 
 
 def blocks_of(surface: Surface) -> Blocks:
-    """Return the blocks of a complete surface or profile."""
-    if all(surface.grid.periodic):
+    """Return the blocks of a surface or a complete profile; a periodic surface with gaps counts as free."""
+    if all(surface.grid.periodic) and surface.is_complete:
         power, count, wavelength = _periodic(surface)
         return Blocks(power, count, wavelength, None, surface.axes)
     if surface.axes == 1:
@@ -211,8 +217,13 @@ def blocks_of(surface: Surface) -> Blocks:
 
 
 def free_blocks(heights: Array, spacing: tuple[float, ...]) -> Blocks:
-    """Return the blocks of complete heights with free edges, (ny, nx) or (n,)."""
+    """Return the blocks of heights with free edges, (ny, nx), or (n,) without gaps."""
     frame = _mode_blocks.frame(heights.shape, spacing)
+    if np.isnan(heights).any():
+        lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), (spacing[0], spacing[1]))
+        power, share = restored_power(heights, lattice, _FIRST_GUESS)
+        frame = frame.weakened(share)
+        return frame_blocks(frame.mean(power), frame)
     power = (
         _cosine_modes.mode_power(heights) if heights.ndim == 2 else _mode_blocks.profile_modes(heights) ** 2
     )

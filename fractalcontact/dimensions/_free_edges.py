@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _whittle
+from fractalcontact.dimensions import _mode_blocks, _whittle
 from fractalcontact.dimensions._block_modes import BlockModes
 from fractalcontact.dimensions._cosine_modes import (
     Lattice,
@@ -20,6 +21,8 @@ from fractalcontact.dimensions._gapped_modes import PROBES, GappedModes
 from fractalcontact.dimensions._harmonic_interpolation import Filling
 from fractalcontact.dimensions._increment_moments import Moments
 from fractalcontact.dimensions._increments import closed_form
+from fractalcontact.dimensions._mode_blocks import Frame
+from fractalcontact.dimensions._restored_power import MOST_MISSING, restored_power
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -151,7 +154,9 @@ class FreeEdges:
     heights : ndarray, shape (ny, nx)
         Without the rows and columns at the border where nothing was observed.
     power : ndarray, optional
-        Squared cosine modes; None with gaps.
+        Squared cosine modes of the complete surface; None with gaps, unless they were restored.
+    share : ndarray, optional
+        Information of each restored mode over that of one of a complete surface; None without gaps.
     scales, noise
         As in `fractalcontact.dimensions.estimate`.
     spread : float, optional
@@ -167,6 +172,7 @@ class FreeEdges:
     noise: bool
     spread: float | None
     pilot: float
+    share: Array | None = None
 
     @property
     def is_default(self) -> bool:
@@ -174,14 +180,35 @@ class FreeEdges:
         is_asked = self.scales is not None or self.spread is not None or self.noise
         return not (is_asked or self.surface.finest_scale)
 
+    @property
+    def is_large(self) -> bool:
+        """Whether the modes beside gaps are taken in blocks."""
+        return self.heights.size >= _LARGE_GAPPED
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Blocks of the modes, with the information that is left beside gaps."""
+        frame = _mode_blocks.frame(self.heights.shape, self.surface.plane_spacing)
+        return frame if self.share is None else frame.weakened(self.share)
+
+    def restored(self) -> FreeEdges:
+        """Return the surface with the power that its modes would have without gaps, if these are few."""
+        is_sparse = np.mean(np.isnan(self.heights)) > MOST_MISSING
+        if self.power is not None or self.surface.finest_scale or is_sparse:
+            return self
+        lattice = Lattice.of((self.heights.shape[0], self.heights.shape[1]), self.surface.plane_spacing)
+        power, share = restored_power(self.heights, lattice, self.pilot)
+        return replace(self, power=power, share=share)
+
     def modes(self) -> SurfaceModes:
         """Return the modes of the window; those of a large surface in blocks."""
-        heights, power, spacing = self.heights, self.power, self.surface.plane_spacing
+        heights, spacing = self.heights, self.surface.plane_spacing
+        power = self.power if self.share is None else None
         dx = self.surface.spacing[1]
         window = None if self.scales is None else (self.scales[0] / dx, self.scales[1] / dx)
         if power is not None and heights.size > LARGE:
             return BlockModes.of(power, spacing, window)
-        if power is None and heights.size >= _LARGE_GAPPED:
+        if power is None and self.is_large:
             return BlockModes.of_gapped(heights, spacing, window, self.pilot)
         lattice = Lattice.of((heights.shape[0], heights.shape[1]), spacing)
         chosen = between(wavelengths(lattice), window)

@@ -6,13 +6,14 @@ spectrum between cut-offs. Profiles with free ends: the exact likelihood of thei
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _cosine_modes, _mode_blocks
+from fractalcontact.dimensions import _cosine_modes
 from fractalcontact.dimensions._blur import (
     BLUR_WINDOW,
     CLEAR,
@@ -93,7 +94,6 @@ _LINEAR = (
     "are those of the interpolation; grid the points with fractalcontact.surfaces.from_points, or give "
     "`scales` from eight distances of the points on"
 )
-_FEW_GAPS = 0.002  # share of the heights that may be filled without an effect on the waves
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
 _SEPARABLE = (
     "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
@@ -165,6 +165,16 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     moments = cache(lambda stride: increment_moments([(levelled, len(levelled))], levelled.shape, stride))
     compared_parts = cache(lambda hurst, stride: heterogeneity(moments(stride), spacing, hurst))
     free = FreeEdges(surface, heights, power, scales, noise, spread, first_exponent(moments(1), spacing))
+    return _explained(free if free.is_large else free.restored(), compared_parts)
+
+
+def _explained(free: FreeEdges, compared_parts: Callable[[float, int], Heterogeneity]) -> Estimate:
+    """Return the estimate of the likeliest explanation of the modes.
+
+    `compared_parts` compares the blocks of the surface, given an exponent and a stride. The modes beside the
+    gaps of a large surface are restored only where one exponent does not describe them.
+    """
+    surface, scales, noise, spread = free.surface, free.scales, free.noise, free.spread
     stride = _stride(scales, max(surface.spacing))
     if window := _window_without_aliases(free):
         return window
@@ -188,13 +198,17 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
             return undefined(f"{modes.number:.0f} modes in the window, at least {LEAST_MODES} are needed")
         fit = modes.fit(free.pilot, noise)
         parts = compared_parts(fit.hurst, stride)
+        if free.power is None and not _SLIGHT[0] < fit.misfit < _SLIGHT[1]:
+            restored = free.restored()
+            if restored.power is not None:
+                return _explained(restored, compared_parts)
         if ground := _ground(free, parts, fit.hurst, fit.misfit):
             return ground
         is_even = blurred is None or blurred.is_even
         estimate, lag = _without_blur(free, modes, fit, parts, comparison, is_even=is_even)
     parts = compared_parts(estimate.hurst, max(stride, lag))
     low, high = parts.widened(estimate.hurst, estimate.ci_low, estimate.ci_high)
-    rounding = "" if noise else rounding_note(heights, estimate.standard_error)
+    rounding = "" if noise else rounding_note(free.heights, estimate.standard_error)
     periodic_note = "a periodic surface with gaps is treated as free" if all(surface.grid.periodic) else ""
     return replace(
         estimate,
@@ -225,11 +239,11 @@ def _ground(free: FreeEdges, parts: Heterogeneity, hurst: float, misfit: float) 
 def _comparison(free: FreeEdges) -> Comparison | None:
     """Compare the surface with one that is blurred and noisy; None where that is not known.
 
-    With gaps, with few modes, and where gridding has removed short waves, as a blur does.
+    With many gaps, with few modes, and where gridding has removed short waves, as a blur does.
     """
     if free.power is None or free.power.size < _LEAST_NUMBER or free.surface.finest_scale:
         return None
-    frame = _mode_blocks.frame(free.heights.shape, free.surface.plane_spacing)
+    frame = free.frame
     inside = chosen_blocks(frame, free.surface, free.scales)
     if frame.count[inside].sum() < _LEAST_NUMBER:
         return None
@@ -246,7 +260,7 @@ def _shows_blur(free: FreeEdges, comparison: Comparison, parts: Heterogeneity) -
 
 def _blurred_fit(free: FreeEdges, comparison: Comparison) -> BlurredFit | None:
     """Fit blur and noise in the largest window that a model of them fits; None if it has too few modes."""
-    assert free.power is not None  # a surface with gaps is not compared
+    assert free.power is not None  # it was compared
     window = comparison.window
     return fit_blurred(
         free.power,
@@ -307,7 +321,7 @@ def _window_without_aliases(free: FreeEdges) -> Estimate | None:
         return None
     if free.noise or free.spread is not None:
         return None
-    frame = _mode_blocks.frame(free.heights.shape, free.surface.plane_spacing)
+    frame = free.frame
     inside = chosen_blocks(frame, free.surface, free.scales)
     blocks = frame_blocks(frame.mean(free.power), frame)
     unaliased = with_or_without_aliases(blocks)
@@ -365,11 +379,9 @@ def _without_blur(
     """
     is_bent = abs(fit.misfit) > SIGNIFICANT * parts.widening
     run = None
-    if is_bent and free.scales is None and free.spread is None:
-        if comparison is not None and (is_even or fit.hurst >= 1.0):
-            run = _longest_run(free, comparison.window, is_even=is_even)
-        elif free.power is None and not free.noise:
-            run = _run_beside_gaps(free)
+    is_default = free.scales is None and free.spread is None
+    if is_bent and is_default and comparison is not None and (is_even or fit.hurst >= 1.0):
+        run = _longest_run(free, comparison.window, is_even=is_even)
     if run is not None:
         estimate, lag = run
         return replace(estimate, misfit=fit.misfit), lag
@@ -397,7 +409,8 @@ def _plain(free: FreeEdges, modes: SurfaceModes, fit: WhittleFit, comparison: Co
         low, high = float(np.fmin(low, with_noise.ci_low)), float(np.fmax(high, with_noise.ci_high))
     if comparison is not None:
         ends = comparison.interval(_WEAK_NOISE, blur=scales is None)
-        low, high = ends if not estimate.note else (min(low, ends[0]), max(high, ends[1]))
+        is_whole = free.share is None and not estimate.note
+        low, high = ends if is_whole else (min(low, ends[0]), max(high, ends[1]))
     return replace(
         estimate,
         ci_low=low,
@@ -446,25 +459,6 @@ def _longest_run(free: FreeEdges, window: Window, *, is_even: bool = True) -> tu
         sectors = fit_interval(part, run.fit.hurst, False)[1]
         estimate = estimate.holding(sectors.ci_low, sectors.ci_high, sectors.note)
     return estimate, max(1, round(0.5 * run.low))
-
-
-def _run_beside_gaps(free: FreeEdges) -> tuple[Estimate, int] | None:
-    """Return `_longest_run` of a surface with few gaps, which are filled.
-
-    None if they are many, or if few waves dominate the modes.
-    """
-    if free.surface.finest_scale:
-        return None
-    filled = without_small_gaps(free.heights, free.surface.plane_spacing, _FEW_GAPS)
-    if np.isnan(filled).any():
-        return None
-    frame = _mode_blocks.frame(filled.shape, free.surface.plane_spacing)
-    power = _cosine_modes.mode_power(filled)
-    fit = fit_blurred(power, frame)
-    if fit is None or not fit.is_even:
-        return None
-    window = Window(frame, np.ones(frame.count.size, dtype=bool), frame.mean(power))
-    return _longest_run(replace(free, heights=filled, power=power), window)
 
 
 def _stride(scales: Scales, spacing: float) -> int:

@@ -60,13 +60,15 @@ class Frame:
     index : tuple of ndarray, shape (blocks,)
         Number of each block along each axis. Where both axes are alike, two mirrored blocks are one.
     count : ndarray, shape (blocks,)
-        Modes in each block.
+        Modes in each block; beside gaps, so many independent ones as have its information.
     waves : tuple of ndarray, shape (blocks,)
         Wavenumber along each axis at the centre, rad per spacing of x.
     logs : ndarray, shape (nodes, blocks)
         Logarithm of the expected power of fractional Brownian heights.
     images : int
         Aliases along each axis that are summed one by one; 0 if there are no waves beyond the sampling.
+    share : ndarray, shape (blocks,), or float
+        Information of a mode over that of one of a complete surface.
     """
 
     shape: tuple[int, ...]
@@ -77,11 +79,17 @@ class Frame:
     waves: tuple[Array, ...]
     logs: Array
     images: int = _ALIASES
+    share: Array | float = 1.0
 
     @property
     def axes(self) -> int:
         """Number of axes: 1 for a profile."""
         return len(self.shape)
+
+    @property
+    def modes(self) -> Array:
+        """Number of modes in each block."""
+        return np.asarray(self.count / self.share)
 
     @cached_property
     def squares(self) -> Array:
@@ -182,7 +190,12 @@ class Frame:
         total = values[self.index]
         if self.is_mirrored:
             total = total + np.where(self.index[0] == self.index[1], 0.0, values[self.index[::-1]])
-        return np.asarray(total / self.count)
+        return np.asarray(total / self.modes)
+
+    def weakened(self, share: Array) -> Frame:
+        """Return the same blocks with less information; `share` is given for each mode, as in `mean`."""
+        of_blocks = self.mean(share)
+        return replace(self, count=self.count * of_blocks, share=of_blocks)
 
     @property
     def is_mirrored(self) -> bool:

@@ -119,3 +119,36 @@ def test_spread_is_checked(value):
     surface = fc.surfaces.fbm((32, 32), SPACING, hurst=0.5, rms_increment=STEP, rng=4)
     with pytest.raises(ValueError, match="psf"):
         fc.dimensions.estimate(surface, psf=value)
+
+
+def without_points(surface, kind):
+    """Return a surface without a twentieth of its points: scattered ones, or a block."""
+    missing = np.zeros(surface.shape, dtype=bool)
+    if kind == "block":
+        missing[30:59, 50:79] = True
+    else:
+        missing |= np.random.default_rng(3).random(surface.shape) < 0.05
+    return surface.where(~missing)
+
+
+@pytest.mark.parametrize("kind", ["block", "scattered"])
+@pytest.mark.parametrize(("hurst", "spread", "noise"), [(0.3, 0.7, 0.0), (0.7, 1.0, 0.05), (0.5, 2.0, 0.0)])
+def test_blur_beside_gaps_is_in_the_model(hurst, spread, noise, kind):
+    """Once 1.00 [0.95, 1.00] for 0.3: the exponent of a smooth surface."""
+    surface = blurred(hurst, spread, noise)
+    complete, gapped = estimated(surface), estimated(without_points(surface, kind))
+    assert gapped.ci_low < hurst < gapped.ci_high
+    assert abs(gapped.hurst - complete.hurst) < 0.5 * (complete.ci_high - complete.ci_low)
+    assert gapped.ci_high - gapped.ci_low < 1.5 * (complete.ci_high - complete.ci_low)
+    assert float(gapped.blur_spread) / SPACING == pytest.approx(spread, abs=0.3)
+
+
+def test_scaling_beside_gaps_equals_that_of_the_complete_surface():
+    surface = blurred(0.5, 1.0)
+    complete, gapped = (fc.dimensions.scaling(each) for each in (surface, without_points(surface, "block")))
+    error = (complete.ci_high - complete.ci_low) / 3.92
+    assert (abs(gapped.hurst - complete.hurst) < 2.0 * error)[1:].all()
+    assert (gapped.hurst[:2] > 1.2).all()
+    assert gapped.hurst[2] < 1.0
+    with pytest.raises(ValueError, match="at least half of the heights"):
+        fc.dimensions.scaling(surface.where(surface.x < surface.x[50]))

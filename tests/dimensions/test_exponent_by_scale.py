@@ -84,11 +84,13 @@ def test_coverage_of_octaves():
     assert result.in_window.all("wavelength").mean() > 0.95
 
 
-def test_gaps_are_refused():
+def test_many_gaps_are_refused():
     heights = brownian(0.5, 1e-6, 1, (32, 32)).copy()
-    heights[3, 3] = np.nan
-    with pytest.raises(ValueError, match="fill"):
+    heights[:, :17] = np.nan
+    with pytest.raises(ValueError, match="at least half of the heights"):
         scaling(heights)
+    with pytest.raises(ValueError, match="fill"):
+        fc.dimensions.scaling(fc.surfaces.from_array(heights, SPACING).isel(y=0))
 
 
 def test_estimate_reports_the_window_of_a_surface_with_two_exponents():
