@@ -24,6 +24,7 @@ from fractalcontact.dimensions._anisotropy import (
     fit_anisotropy,
 )
 from fractalcontact.dimensions._blur import CLEAR, fit_blurred
+from fractalcontact.dimensions._filled_points import filled_points, with_gaps
 from fractalcontact.dimensions._free_edges import LARGE
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._mode_blocks import Frame
@@ -245,6 +246,11 @@ def _free_surface(
     if surface.is_constant or surface.is_plane:
         record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
         return _Directional([record] * len(directions), None, record.note)
+    filled = filled_points(surface)
+    if filled is not None:
+        surface, note = with_gaps(without_waves(surface)[0], filled)
+        result = _by_differences(surface, directions, scales)
+        return replace(result, estimates=[replace(r, note=joined(note, r.note)) for r in result.estimates])
     if not (is_default and surface.is_complete and surface.heights.size <= LARGE):
         return _by_differences(surface, directions, scales)
     without, waves_note = without_waves(surface)

@@ -12,9 +12,10 @@ from fractalcontact.base.grid import read_grid
 from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._filled_points import filled_points, with_gaps
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
-from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, undefined
+from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, joined, undefined
 from fractalcontact.dimensions._surface_input import (
     Scales,
     check_scales,
@@ -108,8 +109,10 @@ def hurst_map(
         index = np.unravel_index(plane, surface.shape[:-2])
         single = surface.isel(dict(zip(leading, map(int, index), strict=True)))
         if not has_blocks(single):
-            without, found = without_waves(read_surfaces(single)[0])
-            if found:
+            whole = read_surfaces(single)[0]
+            without, waves = without_waves(whole)
+            without, filled = with_gaps(without, filled_points(whole))
+            if found := joined(waves, filled):
                 single, notes = single.copy(data=without.heights * without.unit), [*notes, found]
         of_plane = []
         for row in rows:

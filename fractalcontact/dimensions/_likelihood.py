@@ -34,6 +34,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     window_of,
     with_or_without_aliases,
 )
+from fractalcontact.dimensions._filled_points import filled_points, with_gaps
 from fractalcontact.dimensions._free_edges import (
     LARGE,
     FreeEdges,
@@ -130,9 +131,11 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
     if scales is None and not surface.finest_scale:
         made = _LINEAR if surface.linear_share > _INTERPOLATED else ""
         made = _REPEATED if surface.repeated_share > MOST_REPEATED else made
+    filled = None if made else filled_points(surface)
     surface, wave_note = without_waves(surface)
+    surface, gap_note = with_gaps(surface, filled)
     estimate = _fitted(surface, scales, noise, psf)
-    estimate = replace(estimate, note=joined(wave_note, estimate.note))
+    estimate = replace(estimate, note=joined(wave_note, gap_note, estimate.note))
     if made and not estimate.reason:
         return replace(estimate.without_interval(made), note=joined(made, estimate.note))
     return estimate

@@ -131,7 +131,8 @@ class Surface:
     @property
     def is_complete(self) -> bool:
         """Whether no height is missing."""
-        return bool(np.isfinite(self.raw.min()))
+        heights = self.raw if self._heights is None else self._heights
+        return bool(np.isfinite(heights.min()))
 
     @property
     def is_constant(self) -> bool:

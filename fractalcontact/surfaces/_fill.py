@@ -49,7 +49,7 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # no
         Heights in metres, dims (..., y, x) or (..., x).
     at_most : float
         Largest accepted fraction of missing points. Filled heights were not measured: with more than a few,
-        crop the surface, or use a method that allows gaps.
+        crop the surface, or use a method that allows gaps. `dimensions.estimate` counts them as missing.
 
     Returns
     -------
