@@ -325,7 +325,8 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
     if heights.size == 0:
         problems.add("surface", "at least one surface", f"shape {heights.shape}")
         return
-    if np.isfinite(heights.min()) and np.isfinite(heights.max()):
+    distinct = _distinct(heights)
+    if np.isfinite(distinct.min()) and np.isfinite(distinct.max()):
         return
     core = int(np.prod(heights.shape[-axes:]))
     if not gaps:
@@ -336,11 +337,16 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
 
 def _check_number_of_points(problems: Problems, stack: Array, smallest: int) -> None:
     size = stack.shape[1]
-    if size >= smallest and np.isfinite(stack.min()):
+    if size >= smallest and np.isfinite(_distinct(stack).min()):
         return
     counts = np.count_nonzero(np.isfinite(stack), axis=1)
     if counts.min() < smallest:
         problems.add("surface", f"at least {smallest} observed points", int(counts[counts < smallest][0]))
+
+
+def _distinct(values: Array) -> Array:
+    """Return values without the repetitions of a broadcast, as of the surface of a scene that is planned."""
+    return values[tuple(slice(1 if step == 0 else None) for step in values.strides)]
 
 
 def _check_squares(problems: Problems, stack: Array) -> None:
