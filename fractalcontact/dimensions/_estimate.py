@@ -42,6 +42,7 @@ from fractalcontact.dimensions._surface_input import (
     Surface,
     check_scales,
     check_surface,
+    has_gaps,
     read_scales,
     read_surfaces,
 )
@@ -50,8 +51,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 # bytes of a point at the peak of a method: of maximum likelihood on a torus, on a rectangle and, beyond a
 # million points, by blocks of modes (`_likelihood`), which take 61, and 127 where a surface is smooth but for
-# spikes: a factor of 1.45 from either; and of others
-PERIODIC_BYTES, FREE_BYTES, BLOCK_BYTES = 97.0, 156.0, 88.0
+# spikes: a factor of 1.45 from either; with gaps, which take 98 to 185, and 283 where two fifths are missing;
+# and of others
+PERIODIC_BYTES, FREE_BYTES, BLOCK_BYTES, GAPPED_BYTES = 97.0, 156.0, 88.0, 195.0
 METHOD_BYTES = {"variogram": 325.0, "increments": 16.0, "madogram": 16.0}
 
 _FIELDS = (
@@ -97,6 +99,7 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     methods = arguments.get("methods")
     points = math.prod(plane.shape)
     default = BLOCK_BYTES if points > 1 << 20 else PERIODIC_BYTES if plane.periodic else FREE_BYTES
+    default = GAPPED_BYTES if has_gaps(arguments.get("surface")) else default
     most = max((METHOD_BYTES.get(name, default) for name in word_tuple(methods)), default=default)
     return most * points
 

@@ -9,6 +9,7 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base import threads
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.memory import peak_of
 from fractalcontact.base.results import provenance_of
 
 VARIABLES = {
@@ -335,3 +336,16 @@ def test_heights_whose_squares_overflow(rough, factor):
     for curve in ("spectrum", "variogram", "second_variogram", "cube_counts", "roughness_length"):
         with pytest.raises(InvalidInput, match="whose squares are numbers"):
             getattr(fc.dimensions, curve)(far)
+
+
+def test_memory_beside_gaps_is_stated(rough):
+    """Gaps are filled and found in transforms of their own: from a million points on, twice the memory."""
+    heights = np.broadcast_to(0.0, (2048, 2048))
+    complete = fc.surfaces.from_array(heights, 1e-4)
+    gapped = complete.copy(data=np.zeros(heights.shape))
+    gapped[:10] = np.nan
+    stated = [
+        peak_of(fc.dimensions.estimate.memory, {"surface": s, "methods": None}) for s in (complete, gapped)
+    ]
+    assert 1.5 < stated[1] / stated[0] < 3.0
+    assert 98 < stated[1] / heights.size < 283

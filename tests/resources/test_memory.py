@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import fractalcontact as fc
+
 FACTOR = 1.5
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/status").is_file(), reason="the peak of a process is read on Linux"
@@ -17,11 +19,8 @@ import json, sys
 from fractalcontact.base.process import block_dask_import, peak_memory
 block_dask_import()
 from fractalcontact import scenes
-if len(sys.argv) > 2:
-    scenes.run(sys.argv[1], out=sys.argv[2], progress=False)
-    print(peak_memory())
-else:
-    print(max(scenes.plan(scenes.load(sys.argv[1])).memory.values()))
+scenes.run(sys.argv[1], out=sys.argv[2], progress=False)
+print(peak_memory())
 """
 
 SURFACE = """
@@ -108,7 +107,7 @@ def check(scene, tmp_path):
     if "\n" in scene:
         (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
         scene = str(tmp_path / "scene.toml")
-    stated = answer(scene)
+    stated = max(fc.scenes.plan(fc.scenes.load(scene)).memory.values())
     answer(scene, str(tmp_path / "first"))  # compiles what is not in the cache, which takes memory of its own
     used = answer(scene, str(tmp_path / "second"))
     assert 1 / FACTOR <= stated / used <= FACTOR, (stated / 1e6, used / 1e6)
