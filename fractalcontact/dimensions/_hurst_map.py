@@ -37,13 +37,13 @@ def _check(problems: Problems, *, surface: Any, window: Any, step: Any, scales: 
     is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_FIELDS)
     is_number = problems.number("window", window, above=0.0)
     problems.number("step", step, above=0.0, optional=True)
+    check_scales(problems, scales, surface if is_valid else None)
     if not (is_valid and is_number):
         return
     grid = read_grid(surface)
     least, most = SMALLEST * max(grid.spacing), min(grid.extent)
     expected = f"a length from {least:g} m ({SMALLEST} points) to {most:g} m"
     problems.require(least * (1 - 1e-9) <= window <= most * (1 + 1e-9), "window", expected, window)
-    check_scales(problems, scales, surface)
 
 
 @public_result(title="Map of the Hurst exponent", check=_check, in_blocks=True)

@@ -115,7 +115,7 @@ REQUIREMENTS = {
     "dimensions/default": _EXACT,
     "dimensions/likelihood": _EXACT,
     "dimensions/increments": _EXACT,
-    "dimensions/spectrum": Requirement((FFT, "scipy.optimize")),
+    "dimensions/spectrum": Requirement((FFT, "scipy.optimize"), _SUMS.kernels),
     "dimensions/higuchi": Requirement((FFT,)),
     "dimensions/detrended_fluctuation": Requirement((FFT, "scipy.optimize")),
     "dimensions/divider": Requirement((FFT,), ("dividers",)),
