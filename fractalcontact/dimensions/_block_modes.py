@@ -171,11 +171,16 @@ class BlockModes:
 
     @classmethod
     def of_gapped(
-        cls, heights: Array, spacing: tuple[float, float], scales: Scales, pilot: float
+        cls,
+        heights: Array,
+        spacing: tuple[float, float],
+        scales: Scales,
+        pilot: float,
+        filling: Filling | None = None,
     ) -> BlockModes:
         """Fill a surface and collect its modes; `pilot` is an exponent near its own."""
         observed = np.isfinite(heights)
-        filling = Filling(observed, spacing)
+        filling = Filling(observed, spacing) if filling is None else filling
         modes = cls.of(mode_power(filling(heights - heights[observed].mean())), spacing, None)
         shape = heights.shape[0], heights.shape[1]
         starts = block_starts(shape[0], 1), block_starts(shape[1], 1)

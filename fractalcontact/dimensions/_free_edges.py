@@ -61,15 +61,25 @@ class FreeModes:
 
     @classmethod
     def of(
-        cls, heights: Array, lattice: Lattice, chosen: Array, pilot: float, power: Array | None = None
+        cls,
+        heights: Array,
+        lattice: Lattice,
+        chosen: Array,
+        pilot: float,
+        power: Array | None = None,
+        filling: Filling | None = None,
     ) -> FreeModes:
-        """Transform a surface; `pilot` is an exponent near its own, `power` its modes if complete."""
+        """Transform a surface.
+
+        `pilot` is an exponent near its own; `power` are its modes if complete, `filling` that of its gaps,
+        if they are at hand.
+        """
         observed = np.isfinite(heights)
         order, sector = wavelengths(lattice)[chosen], wavenumber_ratio(lattice)[chosen] > 1.0
         if observed.all():
             power = mode_power(heights) if power is None else power
             return cls(lattice, chosen, power[chosen], order, sector)
-        gapped = GappedModes(lattice, observed, pilot, _probes(observed))
+        gapped = GappedModes(lattice, observed, pilot, _probes(observed), filling)
         return cls(lattice, chosen, gapped.power(heights)[chosen], order, sector, gapped)
 
     def scatter(self, fit: _whittle.WhittleFit) -> float:
@@ -157,6 +167,8 @@ class FreeEdges:
         Squared cosine modes of the complete surface; None with gaps, unless they were restored.
     share : ndarray, optional
         Information of each restored mode over that of one of a complete surface; None without gaps.
+    filling : Filling, optional
+        Interpolation over the gaps, where it is at hand.
     scales, noise
         As in `fractalcontact.dimensions.estimate`.
     spread : float, optional
@@ -173,6 +185,7 @@ class FreeEdges:
     spread: float | None
     pilot: float
     share: Array | None = None
+    filling: Filling | None = None
 
     @property
     def is_default(self) -> bool:
@@ -197,8 +210,9 @@ class FreeEdges:
         if self.power is not None or self.surface.finest_scale or is_sparse:
             return self
         lattice = Lattice.of((self.heights.shape[0], self.heights.shape[1]), self.surface.plane_spacing)
-        power, share = restored_power(self.heights, lattice, self.pilot)
-        return replace(self, power=power, share=share)
+        filling = Filling(np.isfinite(self.heights), lattice.spacing)
+        power, share = restored_power(self.heights, lattice, self.pilot, filling)
+        return replace(self, power=power, share=share, filling=filling)
 
     def modes(self) -> SurfaceModes:
         """Return the modes of the window; those of a large surface in blocks."""
@@ -209,10 +223,10 @@ class FreeEdges:
         if power is not None and heights.size > LARGE:
             return BlockModes.of(power, spacing, window)
         if power is None and self.is_large:
-            return BlockModes.of_gapped(heights, spacing, window, self.pilot)
+            return BlockModes.of_gapped(heights, spacing, window, self.pilot, self.filling)
         lattice = Lattice.of((heights.shape[0], heights.shape[1]), spacing)
         chosen = between(wavelengths(lattice), window)
-        return FreeModes.of(heights, lattice, chosen, self.pilot, power)
+        return FreeModes.of(heights, lattice, chosen, self.pilot, power, self.filling)
 
 
 def _probes(observed: Array) -> int:

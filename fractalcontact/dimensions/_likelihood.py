@@ -171,11 +171,16 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     return _explained(free if free.is_large else free.restored(), compared_parts)
 
 
-def _explained(free: FreeEdges, compared_parts: Callable[[float, int], Heterogeneity]) -> Estimate:
+def _explained(
+    free: FreeEdges,
+    compared_parts: Callable[[float, int], Heterogeneity],
+    plain: tuple[SurfaceModes, WhittleFit] | None = None,
+) -> Estimate:
     """Return the estimate of the likeliest explanation of the modes.
 
-    `compared_parts` compares the blocks of the surface, given an exponent and a stride. The modes beside the
-    gaps of a large surface are restored only where one exponent does not describe them.
+    `compared_parts` compares the blocks of the surface, given an exponent and a stride; `plain` is the fit of
+    one exponent, if it was made. The modes beside the gaps of a large surface are restored only where one
+    exponent does not describe them.
     """
     surface, scales, noise, spread = free.surface, free.scales, free.noise, free.spread
     stride = _stride(scales, max(surface.spacing))
@@ -196,15 +201,15 @@ def _explained(free: FreeEdges, compared_parts: Callable[[float, int], Heterogen
     elif comparison is not None and (several := _several(free, comparison, blurred, parts)):
         estimate, lag = several
     else:
-        modes = free.modes()
+        modes = free.modes() if plain is None else plain[0]
         if modes.number < LEAST_MODES:
             return undefined(f"{modes.number:.0f} modes in the window, at least {LEAST_MODES} are needed")
-        fit = modes.fit(free.pilot, noise)
+        fit = modes.fit(free.pilot, noise) if plain is None else plain[1]
         parts = compared_parts(fit.hurst, stride)
         if free.power is None and not _SLIGHT[0] < fit.misfit < _SLIGHT[1]:
             restored = free.restored()
             if restored.power is not None:
-                return _explained(restored, compared_parts)
+                return _explained(restored, compared_parts, (modes, fit))
         if ground := _ground(free, parts, fit.hurst, fit.misfit):
             return ground
         is_even = blurred is None or blurred.is_even

@@ -31,7 +31,9 @@ _FEW_MODES = 80.0  # of a block, times the surfaces, below which the ratio is ra
 _SEED = 20261122
 
 
-def restored_power(heights: Array, lattice: Lattice, pilot: float) -> tuple[Array, Array]:
+def restored_power(
+    heights: Array, lattice: Lattice, pilot: float, filling: Filling | None = None
+) -> tuple[Array, Array]:
     """Return the squared modes that vary along both axes, and how much a mode counts.
 
     Parameters
@@ -41,6 +43,8 @@ def restored_power(heights: Array, lattice: Lattice, pilot: float) -> tuple[Arra
     lattice : Lattice
     pilot : float
         A Hurst exponent whose spectrum is the first guess.
+    filling : Filling, optional
+        That of the gaps, if it is at hand.
 
     Returns
     -------
@@ -50,11 +54,11 @@ def restored_power(heights: Array, lattice: Lattice, pilot: float) -> tuple[Arra
         where most of the power is that of the filling.
     """
     observed = np.isfinite(heights)
-    filling = Filling(observed, lattice.spacing)
+    filling = Filling(observed, lattice.spacing) if filling is None else filling
     filled = _modes(filling(heights - heights[observed].mean())) ** 2
     order = -np.log(wavelengths(lattice))
     ring = np.floor(_PER_OCTAVE / np.log(2.0) * (order - order.min()) + 1e-9).astype(int)
-    ring = np.unique(ring, return_inverse=True)[1].ravel()
+    ring = (np.cumsum(np.bincount(ring.ravel()) > 0) - 1)[ring.ravel()]  # without empty ones
     count = np.bincount(ring)
     centres = np.bincount(ring, order.ravel()) / count
 
