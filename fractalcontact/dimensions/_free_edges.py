@@ -30,6 +30,10 @@ Array = np.ndarray[Any, np.dtype[Any]]
 LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
 _LARGE_GAPPED = 1 << 17  # the same of a surface with gaps
 _ROUNDING = 1e-26  # relative rounding of the mean square in transforms
+_FORM = 0.75  # share of the squared modes in a product x y from which on it is a form, no roughness
+_LEVELLED = 0.4  # power of the longest waves along lines over that of shorter ones, if lines were levelled
+_ALONG, _ACROSS = 6, 16  # waves along a line that are as strong, and those across them from which on they are
+_LEAST_WAVES = 48  # across the lines
 _SMALL_GAPS = 0.05  # share of the cells of a gridded surface
 _FEW_POINTS = 1 << 13  # points up to which all probes are taken
 _SLIGHT = 0.01  # share of missing points for which one probe is enough
@@ -235,6 +239,48 @@ def _probes(observed: Array) -> int:
     if observed.size <= _FEW_POINTS:
         return PROBES
     return 1 if missing < _SLIGHT else 2 if missing < _MODERATE else 4
+
+
+def without_form(heights: Array, power: Array) -> tuple[Array, Array, str]:
+    """Return heights and modes without a product x y, as an oblique cylinder or a saddle has, and a note.
+
+    What depends on x or on y alone is in no mode. `heights` are complete.
+    """
+    y, x = (np.linspace(-1.0, 1.0, n) for n in heights.shape)
+    norm = float((y @ y) * (x @ x))
+    level = float(np.einsum("i,ij,j", y, heights, x)) / norm
+    share = level**2 * norm / max(float(power.sum()), 1e-300)
+    if share < _FORM:
+        return heights, power, ""
+    flat = heights - level * y[:, None] * x
+    note = (
+        f"a form with the product x y holds {100.0 * share:.0f} % of the mean square and is removed, as by "
+        "`surfaces.level` of order 2"
+    )
+    return flat, mode_power(flat), note
+
+
+def without_levelling(power: Array, spacing: tuple[float, float], hurst: float) -> tuple[Array, str]:
+    """Return the modes of a surface whose rows, or columns, were levelled one by one, and a note.
+
+    A line or parabola subtracted from each row takes the longest waves along the rows, and no others. The
+    next ones replace them, times the ratio that they have on a surface of the exponent `hurst`.
+    """
+    for axis, name in ((1, "rows"), (0, "columns")):
+        lines = power if axis == 1 else power.T
+        if lines.shape[0] < _ACROSS + _LEAST_WAVES or lines.shape[1] <= _ALONG:
+            continue
+        sums = lines[_ACROSS:, : _ALONG + 1].sum(axis=0)
+        taken = int(np.argmin(sums[:-1] < _LEVELLED * sums[_ALONG]))
+        if 0 < taken < _ALONG:
+            lattice = Lattice.of((power.shape[0] + 1, power.shape[1] + 1), spacing)
+            expected = expected_power(lattice, hurst)
+            expected = expected if axis == 1 else expected.T
+            lines = lines.copy()
+            next_one = lines[:, taken] / expected[:, taken]
+            lines[:, :taken] = next_one[:, None] * expected[:, :taken]
+            return (lines if axis == 1 else lines.T), f"the {name} were levelled one by one"
+    return power, ""
 
 
 def is_separable(power: Array, heights: Array) -> bool:

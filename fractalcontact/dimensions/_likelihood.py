@@ -42,6 +42,8 @@ from fractalcontact.dimensions._free_edges import (
     cropped,
     first_exponent,
     is_separable,
+    without_form,
+    without_levelling,
     without_offsets,
     without_small_gaps,
 )
@@ -164,11 +166,18 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     power = _cosine_modes.mode_power(heights) if np.isfinite(heights).all() else None
     if power is not None and is_separable(power, heights):
         return undefined(_SEPARABLE)
+    form_note = levelling_note = ""
+    if power is not None and not surface.finest_scale:
+        heights, power, form_note = without_form(heights, power)
     levelled, spacing = without_offsets(heights), surface.plane_spacing
     moments = cache(lambda stride: increment_moments([(levelled, len(levelled))], levelled.shape, stride))
     compared_parts = cache(lambda hurst, stride: heterogeneity(moments(stride), spacing, hurst))
-    free = FreeEdges(surface, heights, power, scales, noise, spread, first_exponent(moments(1), spacing))
-    return _explained(free if free.is_large else free.restored(), compared_parts)
+    pilot = first_exponent(moments(1), spacing)
+    if power is not None:
+        power, levelling_note = without_levelling(power, spacing, pilot)
+    free = FreeEdges(surface, heights, power, scales, noise, spread, pilot)
+    estimate = _explained(free if free.is_large else free.restored(), compared_parts)
+    return replace(estimate, note=joined(form_note, levelling_note, estimate.note))
 
 
 def _explained(
