@@ -23,6 +23,7 @@ from fractalcontact.dimensions._wave_peaks import (
     LINE,
     NEIGHBOURS,
     ROUNDING,
+    Peak,
     least_beside,
 )
 
@@ -138,24 +139,6 @@ def _rings(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bo
 
 
 @dataclass(frozen=True)
-class Peak:
-    """A mode that may be a wave.
-
-    Attributes
-    ----------
-    ratio : float
-        Power over the expected one.
-    p_value : float
-    cycles : (y, x)
-        Per point.
-    """
-
-    ratio: float
-    p_value: float
-    cycles: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class WhiteSurface:
     """A surface whose modes all have the expected power one.
 
@@ -191,18 +174,17 @@ class WhiteSurface:
         modes = _modes(heights, self.is_periodic) * self.factor
         return _heights(modes, heights.shape, self.is_periodic)
 
-    def wave(self, cycles: tuple[float, float]) -> tuple[float, float]:
-        """Return the amplitudes of the cosine and the sine of a wave, with the phase 0 at the first point.
+    def wave(self, carrier: Array) -> tuple[float, float, float]:
+        """Return the amplitudes of the cosine and the sine of a wave exp(i phase), and its power.
 
         Least squares of the white surface: the shape of the wave there includes what the edges do to it.
         """
-        y, x = (np.exp(2j * np.pi * f * np.arange(n)) for f, n in zip(cycles, self.white.shape, strict=True))
-        wave = y[:, None] * x
         columns = np.stack(
-            [self.whiten(np.ascontiguousarray(part)).ravel() for part in (wave.real, wave.imag)]
+            [self.whiten(np.ascontiguousarray(part)).ravel() for part in (carrier.real, carrier.imag)]
         )
-        cosine, sine = np.linalg.pinv(columns @ columns.T) @ (columns @ self.white.ravel())
-        return float(cosine), float(sine)
+        products = columns @ self.white.ravel()
+        cosine, sine = np.linalg.pinv(columns @ columns.T) @ products
+        return float(cosine), float(sine), 0.5 * float(cosine * products[0] + sine * products[1])
 
     def power(self) -> Array:
         """Return the power of the modes of the padded transform."""
@@ -249,7 +231,7 @@ class WhiteSurface:
             p_value = _probability(number, ratio, self._continuous)
             if p_value >= FALSE_ALARM:
                 continue
-            mean, least = self._around(power, cycles)
+            mean, least = self.around(power, cycles)
             p_value = _probability(number, ratio / max(1.0, mean), self._continuous)
             if p_value < FALSE_ALARM and (count or ratio > least):
                 found.append(Peak(ratio, p_value, (float(cycles[0]), float(cycles[1]))))
@@ -327,7 +309,7 @@ class WhiteSurface:
         modes = np.exp(-2j * np.pi * np.outer(y, np.arange(ny))) @ right
         return np.asarray((modes.real**2 + modes.imag**2) / self.white.size)
 
-    def _around(self, power: Array, cycles: Array) -> tuple[float, float]:
+    def around(self, power: Array, cycles: Array) -> tuple[float, float]:
         """Return the mean power of the modes around one, and the power that a wave needs there."""
         (py, px), (ny, nx) = self._padded, self.white.shape
         modes = power[::py, ::px]

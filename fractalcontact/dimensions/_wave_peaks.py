@@ -8,6 +8,7 @@ that of the modes around, in place of the mean of all modes: the spectrum may ha
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -28,7 +29,8 @@ BESIDE = np.arange(3, 13)  # modes from one, on the lines through it, that are c
 _SIDES = np.arange(-1, 2)  # lines of modes side by side
 _ARC = 1.2  # radians on either side: further on is the mirror image of a mode
 _DIRECTIONS = np.pi * np.arange(24) / 24
-_OUTLYING = 4.0  # times the median: modes on a line count up to here, for there may be other waves
+# modes on a line count up to so many times their third decile: there may be other waves, as its multiples
+_DECILE, _OUTLYING = 0.3, 8.0
 _ABOVE_LINE = 8.0  # least power of a wave, times the mean of the strongest line of a surface without ridges
 _LINE, _RIDGE = 1.75, 3.0  # mean of the strongest line: of any surface, and of a ridge
 _FREEDOM_OF_LINE = 6.0  # of the mean of its modes
@@ -37,13 +39,29 @@ ROUNDING = 1e-22  # of the strongest mode
 _LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
 _FREEDOM = {1: 9.0, 2: 30.0}  # independent neighbours, by the number of axes; fewer than modes, for the taper
 _PASSES = 3
-_MULTIPLE_WIDTH, _LEAST_RAY = 2.0, 5  # modes beside a multiple that it changes, and modes that must be left
+_MULTIPLE_WIDTH, _LEAST_RAY = 1.6, 2  # modes beside a multiple that it changes, and modes that must be left
 
 
-def tapered_peaks(
-    tapered: Array, spacing: tuple[float, float], axes: int, multiples: Array
-) -> list[tuple[tuple[float, float], float]]:
-    """Return the cycles per point (y, x) and the p value of the modes that stand out.
+@dataclass(frozen=True)
+class Peak:
+    """A mode that may be a wave.
+
+    Attributes
+    ----------
+    ratio : float
+        Power over the expected one, or that of the modes around.
+    p_value : float
+    cycles : (y, x)
+        Per point.
+    """
+
+    ratio: float
+    p_value: float
+    cycles: tuple[float, float]
+
+
+def tapered_peaks(tapered: Array, spacing: tuple[float, float], axes: int, multiples: Array) -> list[Peak]:
+    """Return the modes that stand out.
 
     Those of `multiples` are tested among themselves, and not against the ray through them.
     """
@@ -123,14 +141,15 @@ def tapered_peaks(
 
     places = places[[multiples[row, column] or is_above_lines(row, column) for row, column in places]]
     return [
-        (
-            (float(y[row]), float(x[column])),
+        Peak(
+            float(ratio[row, column]),
             float(
                 min(
                     1.0,
                     counts[int(multiples[row, column])] * (1.0 + ratio[row, column] / freedom) ** -freedom,
                 )
             ),
+            (float(y[row]), float(x[column])),
         )
         for row, column in places
     ]
@@ -198,7 +217,8 @@ def least_beside(
         turned = mode[::-1] * extent / extent[::-1] * (1.0, -1.0)
         angles = both / np.hypot(*turned)
         angles = angles[np.abs(angles) < _ARC, None]
-        lines.append(mode * (np.cos(angles) - 1.0) + turned * np.sin(angles))
+        if len(angles) > len(BESIDE):  # a shorter arc is that of a long wave
+            lines.append(mode * (np.cos(angles) - 1.0) + turned * np.sin(angles))
         if anywhere:
             lines += [both[:, None] * (np.sin(angle), np.cos(angle)) for angle in _DIRECTIONS]
     mean = max(_mean_on_line(modes_at, mode, line, is_surface) for line in lines)
@@ -215,7 +235,7 @@ def _mean_on_line(
     sides = _SIDES if is_surface else _SIDES[1:2]
     places = np.rint(mode + steps + sides[:, None, None] * across).astype(np.int64)
     power = modes_at(places[..., 0], places[..., 1])
-    middle = np.median(power, axis=1, keepdims=True)
-    power = np.minimum(power, np.where(middle > 0.0, _OUTLYING * middle, np.inf))
+    low = np.quantile(power, _DECILE, axis=1, keepdims=True)
+    power = np.minimum(power, np.where(low > 0.0, _OUTLYING * low, np.inf))
     weights = (power > 0.0) / distance[:, 0]
     return float(((power * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)).max())

@@ -17,10 +17,10 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._faint_waves import WhiteSurface, distances
+from fractalcontact.dimensions._faint_waves import WhiteSurface
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._wave_peaks import LONGEST, tapered_peaks
+from fractalcontact.dimensions._wave_peaks import LONGEST, Peak, tapered_peaks
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -36,6 +36,10 @@ _MULTIPLES = 12  # of a wave that are looked for at their own places
 _DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
 _FEW = 3
 _ALMOST_SINGULAR = 1e-3  # of the larger singular value
+_BESIDE = 1.5  # modes from a wave that was subtracted
+_SAME = 0.5  # modes between a wave and the multiple that it is
+_MOST_MULTIPLES, _MISSED = 96, 6  # that are looked for where two are known, up to so many that are not there
+_ON_COMB = 4.0  # power of such a multiple over the expected one: 2 % of the modes have it
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
@@ -76,8 +80,8 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
     seventh of a profile). Among N points a wave is found from an amplitude of about 8 sqrt(S / N) on, S being
     the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is 0.1 rms
-    increments at 6 spacings, 0.3 at 12 and 0.8 at 24 (H = 0.5); at 256 x 256 half of it. `estimate` removes
-    what is found.
+    increments at 6 spacings, 0.3 at 12 and 0.8 at 24 (H = 0.5); at 256 x 256 half of it. Multiples of a
+    wave that are shorter than two spacings are listed at their aliases. `estimate` removes what is found.
     Detection, false alarms and accuracy: page `estimator_accuracy`.
 
     References
@@ -97,7 +101,7 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     return _dataset(surface, found)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Wave:
     """One wave of a surface.
 
@@ -134,16 +138,25 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
         return surface, ""
     heights = _subtracted(surface.heights, found)
     left = _mean_square_increment(heights) / _mean_square_increment(surface.heights)
-    if left < (_LEFT if len(found) > _FEW else _NONE_LEFT) or _is_progression(found):
+    combs = [members for _, members in _combs(found, heights.shape)]
+    if left < (_LEFT if len(combs) > _FEW else _NONE_LEFT) or _is_progression(found):
         return surface, ""
-    named = ", ".join(
-        f"{wave.wavelength:.3g} m at {wave.azimuth:.0f} degrees with the amplitude {wave.amplitude:.2g} m"
-        for wave in found[:_NAMED]
-    )
-    more = f" and {len(found) - _NAMED} weaker ones" if len(found) > _NAMED else ""
-    count = f"{len(found)} single waves" if len(found) > 1 else "a single wave"
+    named = ", ".join(map(_name, combs[:_NAMED]))
+    more = f" and {len(combs) - _NAMED} weaker ones" if len(combs) > _NAMED else ""
+    count = f"{len(combs)} single waves" if len(combs) > 1 else "a single wave"
     without = Surface(surface.stack, surface.grid, surface.index, surface.unit, heights)
     return without, f"{count} removed: {named}{more}"
+
+
+def _name(comb: dict[int, Wave]) -> str:
+    first, wave = min(comb.items())
+    others = f" and {len(comb) - 1} of its multiples" if len(comb) > 1 else ""
+    if first > 1:
+        others = f" and {len(comb) - 1} more multiples of {wave.wavelength * first:.3g} m"
+    return (
+        f"{wave.wavelength:.3g} m at {wave.azimuth:.0f} degrees with the amplitude "
+        f"{wave.amplitude:.2g} m{others}"
+    )
 
 
 def _is_progression(found: Sequence[Wave]) -> bool:
@@ -167,6 +180,7 @@ def find_waves(surface: Surface) -> list[Wave]:
         for n, size in ((n, min(n, LARGEST_CROP)) for n in heights.shape)
     )
     is_periodic = all(surface.grid.periodic) and max(heights.shape) <= LARGEST_CROP
+    is_whole = max(heights.shape) <= LARGEST_CROP
     found: list[Wave] = []
     part = without_trend(heights[window], plane=not is_periodic)
     for _ in range(_ROUNDS):
@@ -174,49 +188,134 @@ def find_waves(surface: Surface) -> list[Wave]:
         multiples = _multiples(found, part.shape, surface.axes)
         tapered = part * tapers[0][:, None] * tapers[1]
         peaks = tapered_peaks(tapered, surface.plane_spacing, surface.axes, multiples)
-        if len(found) + len(peaks) > MOST:
+        if len(peaks) > _MOST_MULTIPLES:
             return []
-        new = [
-            _measured(heights, cycles, p_value, surface, is_periodic=is_periodic) for cycles, p_value in peaks
-        ]
+        new = [_measured(heights, peak, surface, is_periodic=is_periodic) for peak in peaks]
         if not new:
             break
         found += new
+        if len(found) > MOST and len(_combs(found, part.shape)) > MOST:
+            return []
         heights = _subtracted(heights, new)
         part = without_trend(heights[window], plane=not is_periodic)
     for _ in range(0 if _is_progression(found) else _ROUNDS):
         white = WhiteSurface.of(part, surface.plane_spacing, is_periodic=is_periodic)
-        faint = white.peaks(LONGEST[surface.axes], _related(found, part.shape))
-        if len(found) + len(faint) > MOST:
+        new = _of_combs(surface, found, white) if is_whole else []
+        faint = [] if new else white.peaks(LONGEST[surface.axes], _related(found, part.shape))
+        if faint and len(_combs(found, part.shape)) + len(faint) > MOST:
             return []
-        if not faint:
-            break
-        new = []
         for peak in faint:
-            if part.shape == heights.shape:
-                new.append(_named(surface, peak.cycles, white.wave(peak.cycles), peak.p_value))
+            if is_whole:
+                cosine, sine, _ = white.wave(_carrier(part.shape, peak.cycles))
+                new.append(_named(surface, peak.cycles, (cosine, sine), peak.p_value))
             else:
-                new.append(_measured(heights, peak.cycles, peak.p_value, surface, is_periodic=is_periodic))
+                new.append(_measured(heights, peak, surface, is_periodic=is_periodic))
+        if not new:
+            break
         found += new
         heights = _subtracted(heights, new)
         part = without_trend(heights[window], plane=not is_periodic)
     return sorted(found, key=lambda wave: -wave.amplitude)
 
 
+def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, dict[int, Wave]]]:
+    """Sort waves by the one whose multiples they are: its cycles per point, and the waves by their multiple.
+
+    The multiples of marks, as those of a sawtooth, may be found where the first of them is not.
+    """
+    left, result = sorted(found, key=lambda wave: -wave.amplitude), []
+    while left:
+        best: dict[int, Wave] = {}
+        cycles = np.array([wave.cycles for wave in left])
+        for divisor in range(1, _MULTIPLES + 1):
+            members = _members(left, cycles[0] / divisor, 2 * _MULTIPLES, shape)
+            if len(members) > max(len(best), 1 + (divisor > _DIVISORS)):
+                best = members
+        best = best or {1: left[0]}
+        if len(best) > _FEW:
+            best |= _members(left, _base(best, shape), _MOST_MULTIPLES, shape)
+        left = [wave for wave in left if wave not in best.values()]
+        result.append((_base(best, shape), best))
+    return result
+
+
+def _members(waves: Sequence[Wave], base: Array, most: int, shape: tuple[int, ...]) -> dict[int, Wave]:
+    """Return the waves that are multiples of given cycles per point, up to some number, by their multiple."""
+    cycles = np.array([wave.cycles for wave in waves])
+    apart = _unfolded(cycles, np.arange(1, most)[:, None, None] * base, shape)[1]
+    members: dict[int, Wave] = {}
+    for row, column in np.argwhere(apart < _SAME):
+        if waves[column] not in members.values():
+            members.setdefault(int(row) + 1, waves[column])
+    return members
+
+
+def _base(members: dict[int, Wave], shape: tuple[int, ...]) -> Array:
+    """Return the cycles per point of a wave from those of its multiples, the most certain of them first."""
+    multiple, strongest = max(members.items(), key=lambda member: member[1].amplitude)
+    base = np.array(strongest.cycles) / multiple
+    # the power of a wave over that of the surface, whose exponent is taken as 0.5
+    weights = {k: (wave.amplitude * wave.wavelength**-1.5) ** 2 for k, wave in members.items()}
+    total = sum(weight * k * k for k, weight in weights.items())
+    return np.asarray(
+        sum(
+            weights[k] * k * _unfolded(np.array(wave.cycles), base * k, shape)[0]
+            for k, wave in members.items()
+        )
+        / total
+    )
+
+
+def _unfolded(waves: Array, cycles: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return the cycles of waves before sampling, the nearest to some, and how many modes they are apart."""
+    both = [waves + np.rint(cycles - waves), np.rint(cycles + waves) - waves]
+    apart = [np.abs((each - cycles) * shape).max(axis=-1) for each in both]
+    return np.where((apart[0] <= apart[1])[..., None], *both), np.minimum(*apart)
+
+
+def _of_combs(surface: Surface, found: Sequence[Wave], white: WhiteSurface) -> list[Wave]:
+    """Return further multiples of waves of which two are known: as their places are, little is enough."""
+    shape, power = white.white.shape, None
+    new: list[Wave] = []
+    for base, members in _combs(found, shape):
+        if len(members) < 2:
+            continue
+        power = white.power() if power is None else power
+        missed = 0
+        for multiple in range(1, _MOST_MULTIPLES):
+            cycles = (base * multiple + 0.5) % 1.0 - 0.5
+            is_long = float(np.hypot(*(cycles * shape))) < LONGEST[surface.axes]
+            if multiple in members or missed > _MISSED or is_long:
+                continue
+            if (
+                _unfolded(np.array([wave.cycles for wave in [*found, *new]]), cycles, shape)[1].min()
+                < _BESIDE
+            ):
+                continue
+            cosine, sine, ratio = white.wave(_carrier(shape, cycles))
+            ratio /= max(1.0, white.around(power, cycles)[0])
+            missed += 1
+            if ratio > _ON_COMB:
+                missed = 0
+                at = float(cycles[0]), float(cycles[1])
+                new.append(_named(surface, at, (cosine, sine), float(np.exp(-ratio))))
+    return new
+
+
 def _related(found: Sequence[Wave], shape: tuple[int, ...]) -> list[Array]:
-    """Return the cycles per point of the multiples of waves, and of those whose multiples they may be.
+    """Return the cycles per point of the multiples of single waves, and of those whose multiples they may be.
 
     Multiples shorter than two spacings are seen at their aliases. Each place is listed once.
     """
     done, related = [np.array(wave.cycles) for wave in found], []
-    for wave in found:
+    for wave in (next(iter(members.values())) for _, members in _combs(found, shape) if len(members) == 1):
         for divisor in range(1, _DIVISORS + 1):
             for multiple in range(1, _MULTIPLES + 1):
                 at = np.array(wave.cycles) * multiple / divisor
                 if divisor > 1 and float(np.abs(at).max()) > 0.5:
                     break
                 at = (at + 0.5) % 1.0 - 0.5
-                if all(apart.max() > 1.0 for other in done for apart in distances(at, other, shape)):
+                if _unfolded(np.array(done), at, shape)[1].min() > 1.0:
                     done.append(at)
                     related.append(at)
     return related
@@ -238,14 +337,12 @@ def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Arra
     return marked
 
 
-def _measured(
-    heights: Array, cycles: tuple[float, float], p_value: float, surface: Surface, *, is_periodic: bool
-) -> Wave:
+def _measured(heights: Array, peak: Peak, surface: Surface, *, is_periodic: bool) -> Wave:
     """Return the wave near a frequency: the largest tapered mode between those of the transform."""
     shape = heights.shape
     tapers = [window_weights(n, None if is_periodic or n == 1 else "hann") for n in shape]
     centred = heights - heights.mean()
-    best = np.array(cycles)
+    best = np.array(peak.cycles)
 
     def mode(at: Array) -> complex:
         row, column = (
@@ -275,11 +372,14 @@ def _measured(
     )
     products = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]])
     cosine, sine = np.linalg.pinv(products, rcond=_ALMOST_SINGULAR) @ (value.real, -value.imag)
-    return _named(surface, (float(best[0]), float(best[1])), (float(cosine), float(sine)), p_value)
+    return _named(surface, (float(best[0]), float(best[1])), (float(cosine), float(sine)), peak.p_value)
 
 
 def _named(
-    surface: Surface, cycles: tuple[float, float], amplitudes: tuple[float, float], p_value: float
+    surface: Surface,
+    cycles: tuple[float, float],
+    amplitudes: tuple[float, float],
+    p_value: float,
 ) -> Wave:
     """Return a wave of given cycles per point and amplitudes of its cosine and sine, in SI units."""
     waves_per_metre = np.array(cycles) / np.array(surface.spacing)
@@ -296,16 +396,18 @@ def _named(
 
 def _subtracted(heights: Array, found: Sequence[Wave]) -> Array:
     """Return heights without some waves."""
-    y, x = (np.arange(n) for n in heights.shape)
     result = heights.copy()
     for wave in found:
-        row, column = (
-            np.exp(2j * np.pi * frequency * place)
-            for frequency, place in zip(wave.cycles, (y, x), strict=True)
-        )
-        row = row * complex(wave.cosine, -wave.sine)
-        result -= np.outer(row.real, column.real) - np.outer(row.imag, column.imag)
+        carrier = _carrier(heights.shape, wave.cycles)
+        carrier *= complex(wave.cosine, -wave.sine)
+        result -= carrier.real
     return result
+
+
+def _carrier(shape: tuple[int, ...], cycles: Sequence[float] | Array) -> Array:
+    """Return exp(i phase) of a wave."""
+    row, column = (np.exp(2j * np.pi * f * np.arange(n)) for f, n in zip(cycles, shape, strict=True))
+    return np.asarray(row[:, None] * column)
 
 
 def _mean_square_increment(heights: Array) -> float:
