@@ -6,6 +6,7 @@ have it. Palasantzas (1993), Phys. Rev. B 48, 14472.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,38 +17,68 @@ from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, best_
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LARGEST, LOWEST, Frame, lattice_power
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface
+from fractalcontact.dimensions._transfer_functions import NONE, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_PARAMETERS = 3  # exponent, corner and amplitude
 _LEAST_LENGTH = 2.5  # spacings: a shorter corner leaves no waves beyond it
+_STARTS = 0.3, 0.8  # first guesses of H
+_LARGEST_SQUARE = 200.0  # spread of a blur
 _WINDOW = "the waves shorter than the corner of the roll-off"
 
 
 @dataclass(frozen=True)
 class RollOff:
-    """The exponent of the short waves, the wavelength of the corner in spacings, the penalised deviance."""
+    """A slow roll-off, perhaps with blur and noise.
+
+    Attributes
+    ----------
+    law : PowerLaw
+        Exponent of the short waves.
+    length, spread : float
+        Wavelength of the corner, and spread of the blur, in spacings.
+    penalised : float
+        Deviance with Akaike's penalty.
+    noise : bool
+    """
 
     law: PowerLaw
     length: float
     penalised: float
+    spread: float = 0.0
+    noise: bool = False
 
 
-def fit_rolloff(blocks: Blocks, inside: Array) -> RollOff | None:
+def fit_rolloff(
+    blocks: Blocks,
+    inside: Array,
+    *,
+    blur: tuple[str, float] = (NONE, 0.0),
+    noise: bool = False,
+    starts: Sequence[float] = _STARTS,
+) -> RollOff | None:
     """Fit exponent and corner to some blocks; None where the corner is not among their waves.
 
-    The power over the spectral density, which is that of fractional Brownian heights at first, is in a second
-    fit that of the covariance that the first one found: a plateau of long waves has less effect of the edges.
+    A blur of some form, with a first guess of its spread, and `noise` are fitted as well; `starts` are first
+    guesses of H. A blur changes the power as that of fractional Brownian heights. The power over the spectral
+    density, which is that of such heights at first, is in a second fit that of the covariance that the first
+    one found: a plateau of long waves has less effect of the edges.
     """
     count, wavelength, frame = blocks.count[inside], blocks.wavelength[inside], blocks.frame
     if frame is None or not wavelength.max() > _LEAST_LENGTH:
         return None
-    low, high = np.array([LOWEST, -np.log(wavelength.max())]), np.array([HIGHEST, -np.log(_LEAST_LENGTH)])
+    form, spread = blur
+    free = np.array([True, True, form != NONE, noise])
+    window = Window(frame, inside, blocks.power)
+    first, last = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
+    low, high = np.array([LOWEST, first, 0.0, -80.0]), np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0])
     edges: Array | None = None
 
     def model(values: Array) -> tuple[Array, Array]:
-        """Return the logarithm of the power, and its derivatives by H and the logarithm of the corner."""
-        hurst, square = float(values[0]), float((2.0 * np.pi * np.exp(values[1])) ** 2)
+        """Return the logarithm of the power, and its derivatives."""
+        every = np.zeros(4)
+        every[free] = values
+        hurst, square = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2)
         logs, slope, by_square = frame.rolled_densities(hurst, square)
         if edges is None:
             plain, plain_slope = blocks.logs(hurst)
@@ -55,21 +86,42 @@ def fit_rolloff(blocks: Blocks, inside: Array) -> RollOff | None:
             logs, slope = logs + plain - bare, slope + plain_slope - bare_slope
         else:
             logs = logs + edges
-        return logs[inside], np.stack([slope, 2.0 * by_square])[:, inside]
+        logs, columns = logs[inside], np.stack([slope, 2.0 * by_square, 0.0 * slope, 0.0 * slope])[:, inside]
+        if form != NONE:
+            blurred, blurred_slope, by_blur = window.signal(form, hurst, float(every[2]))
+            plain, plain_slope, _ = window.signal(NONE, hurst, 0.0)
+            logs = logs + np.log(blurred / plain)
+            columns[0] += blurred_slope - plain_slope
+            columns[2] = by_blur
+        if noise:
+            total = np.logaddexp(logs, every[3])
+            columns *= np.exp(logs - total)
+            columns[3] = np.exp(every[3] - total)
+            logs = total
+        return logs, columns[free]
 
-    places = [share * low[1] + (1.0 - share) * high[1] for share in (0.3, 0.6)]
-    starts = [np.array([hurst, place]) for hurst in (0.3, 0.8) for place in places]
+    def start(hurst: float, place: float) -> Array:
+        """Return first values, with noise below the weakest waves."""
+        values = np.array([hurst, place * first + (1.0 - place) * last, spread**2, -80.0])
+        values[3] = model(values[free])[0].min() - 2.0
+        return np.asarray(values[free])
+
+    guesses = [start(hurst, place) for hurst in starts for place in (0.3, 0.6)]
+    steps = np.array([0.2, 0.7, 0.5, 2.0])[free]
     for _ in range(2):
-        best = best_scored(model, blocks.power[inside], count, starts, (low, high), np.array([0.2, 0.7]))
-        hurst, corner = (float(value) for value in best.values)
-        if not (low[1] < corner < high[1] and best.is_regular):
+        bounds = low[free], high[free]
+        best = best_scored(model, blocks.power[inside], count, guesses, bounds, steps)
+        hurst, corner = (float(value) for value in best.values[:2])
+        if not (first < corner < last and best.is_regular):
             return None
-        edges, starts = _edges(frame, hurst, float(np.exp(-corner))), [best.values]
+        edges, guesses = _edges(frame, hurst, float(np.exp(-corner))), [best.values]
         if edges is None:
             break
     error = float(best.half_widths[0])
     law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
-    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * _PARAMETERS)
+    parameters = 1 + np.count_nonzero(free)
+    spread = float(np.sqrt(best.values[2])) if form != NONE else 0.0
+    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * parameters, spread, noise)
 
 
 def _edges(frame: Frame, hurst: float, length: float) -> Array | None:
@@ -99,5 +151,12 @@ def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Esti
         scale_max=rolloff.length * dx,
         window=_WINDOW,
         note=f"a slow roll-off: the spectrum falls as (q^2 + q_0^2)^(-1 - H) with a corner at waves of "
-        f"{rolloff.length * dx:.3g} m",
+        f"{rolloff.length * dx:.3g} m{_beside(rolloff)}",
     )
+
+
+def _beside(rolloff: RollOff) -> str:
+    """Return what is fitted beside a roll-off."""
+    parts = [f"a blur with a spread of {rolloff.spread:.2g} spacings"] if rolloff.spread > 0.0 else []
+    parts += ["white noise"] if rolloff.noise else []
+    return f", with {' and '.join(parts)}" if parts else ""

@@ -33,6 +33,7 @@ from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_
 from fractalcontact.dimensions._records import NORMAL, Estimate, joined
 from fractalcontact.dimensions._rolloff import RollOff, fit_rolloff, rolloff_estimate
 from fractalcontact.dimensions._surface_input import Surface
+from fractalcontact.dimensions._transfer_functions import NONE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -50,6 +51,7 @@ _ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
+_AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
 _TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
 NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
@@ -184,16 +186,48 @@ class Explanations:
         return self.excess(penalised_deviance(self.record, self.run, self.inside))
 
     @cached_property
-    def rolloff(self) -> RollOff | None:
-        """A slow roll-off of a fractal exponent; all waves belong to it."""
-        fit = fit_rolloff(self.blocks, self.everywhere)
-        is_fractal = fit is not None and fit.law.hurst > _LEAST_EXPONENT and fit.law.low < 1.0
-        return fit if is_fractal else None
+    def _rolloffs(self) -> list[tuple[float, RollOff]]:
+        """Slow roll-offs of a fractal exponent with their `excess`, the likeliest first.
 
-    @cached_property
+        Noise is fitted where a roll-off alone explains the waves. Elsewhere, where blur and noise leave the
+        longest waves out, or show noise, the roll-off has their blur, on their waves and longer ones.
+        """
+        fit, squares, inside = self.fit, self.blocks.wavelength**-2.0, self.everywhere
+        plain, reference = fit_rolloff(self.blocks, inside), self._reference(inside)
+        fits, most = [plain], np.inf
+        if plain is not None and plain.penalised < reference + _ALIKE:
+            fits.append(fit_rolloff(self.blocks, inside, noise=True, starts=(plain.law.hurst + 0.05,)))
+        elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
+            inside = fit.inside | (squares < squares[fit.inside].min())
+            reference, blur = self._reference(inside), (fit.form, fit.spread)
+            fits = [fit_rolloff(self.blocks, inside, blur=blur)]
+            if self.is_shortened:
+                fits.append(fit_rolloff(self.blocks, inside, blur=blur, noise=True))
+            else:
+                most = 0.0  # what looks like noise may be the plateau
+        found = [(each.penalised - reference, each) for each in fits if each]
+        found = [each for each in found if each[0] < most]
+        found = [each for each in found if each[1].law.hurst > _LEAST_EXPONENT and each[1].law.low < 1.0]
+        return sorted(
+            found, key=lambda each: each[0] + _AGAINST_NOISE * (each[1].noise and not each[1].spread)
+        )
+
+    @property
+    def rolloff(self) -> RollOff | None:
+        """The likeliest slow roll-off; with a blur it holds others that are nearly as likely."""
+        if not self._rolloffs:
+            return None
+        excess, best = self._rolloffs[0]
+        laws = [best.law]
+        if best.spread:
+            laws = [each.law for other, each in self._rolloffs if other < excess + _ALIKE]
+        low, high = min(law.low for law in laws), max(law.high for law in laws)
+        return replace(best, law=replace(best.law, low=low, high=high))
+
+    @property
     def rolloff_excess(self) -> float:
         """`excess` of the slow roll-off; infinite without one."""
-        return np.inf if self.rolloff is None else self.rolloff.penalised - self._reference(self.everywhere)
+        return self._rolloffs[0][0] if self._rolloffs else np.inf
 
     @property
     def is_rolloff(self) -> bool:
@@ -302,7 +336,8 @@ def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, floa
         ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
     if knee is not None and explained.excess(knee.penalised) < _ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
-    if explained.rolloff is not None and explained.rolloff_excess < _ALIKE:
+    limit = _SHORTENED if explained.is_shortened else _ALIKE
+    if explained.rolloff is not None and explained.rolloff_excess < limit:
         ranges.append((explained.rolloff.law.low, explained.rolloff.law.high))
     if explained.rival is not None:
         ranges += explained.rival.possible
