@@ -25,6 +25,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _LEAST = 12  # modes of an octave
 _FIRST_GUESS = 0.5  # exponent of the modes beside gaps
 _STEPS, _LONGEST_STEP = 60, 0.5
+_STARTS = 2  # likeliest first guesses from which parameters are fitted
 _SCORING_STEPS = 40  # of a fit of two or three parameters
 _FLAT = 1.2  # times their standard errors: the likelihood is flatter than a parabola
 _LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
@@ -361,24 +362,11 @@ def best_scored(
     bounds: tuple[Array, Array],
     largest_step: Array,
 ) -> Scored:
-    """Fit the parameters of a model to blocks by damped scoring from some starts; return the best fit.
+    """Fit the parameters of a model to blocks by damped scoring from the two best starts.
 
     `model` returns the logarithm of the expected power but for its level, and the derivatives.
     """
-    logs = np.log(np.maximum(power, 1e-300))
-    fits = [_scored(model, logs, count, start, bounds, largest_step) for start in starts]
-    return min(fits, key=lambda fit: fit.deviance)
-
-
-def _scored(
-    model: Callable[[Array], tuple[Array, Array]],
-    logs: Array,
-    count: Array,
-    values: Array,
-    bounds: tuple[Array, Array],
-    largest_step: Array,
-) -> Scored:
-    modes, damping = float(count.sum()), 1e-2
+    logs, modes = np.log(np.maximum(power, 1e-300)), float(count.sum())
 
     def evaluate(values: Array) -> tuple[float, Array, Array]:
         """Return the deviance, the derivatives less their means, and the relative residuals."""
@@ -389,6 +377,19 @@ def _scored(
         deviance = float(np.sum(count * expected) + modes * np.log(level))
         return deviance, columns, ratio / level - 1.0
 
+    likely = sorted(starts, key=lambda start: evaluate(start)[0])[:_STARTS]
+    fits = [_scored(evaluate, count, start, bounds, largest_step) for start in likely]
+    return min(fits, key=lambda fit: fit.deviance)
+
+
+def _scored(
+    evaluate: Callable[[Array], tuple[float, Array, Array]],
+    count: Array,
+    values: Array,
+    bounds: tuple[Array, Array],
+    largest_step: Array,
+) -> Scored:
+    damping = 1e-2
     current = evaluate(values)
     for _ in range(_SCORING_STEPS):
         deviance, columns, residual = current

@@ -164,23 +164,28 @@ class Frame:
         power, slope, fall = (float(np.mean(np.trapezoid(w, x, axis=1))) for w in weights)
         return power, slope, fall
 
-    def rolled_densities(self, hurst: float, square: float) -> tuple[Array, Array, Array]:
+    def rolled_densities(
+        self, hurst: float, square: float, *, is_sharp: bool = False
+    ) -> tuple[Array, Array, Array]:
         """Return the logarithm of the density (q^2 + square)^(-H - axes / 2), and two derivatives.
 
-        Aliases are included. The derivatives are those by H and by the logarithm of `square`.
+        Aliases are included. The derivatives are those by H and by the logarithm of `square`. With `is_sharp`
+        the density is that of the larger of q^2 and `square`.
         """
-        squares, power = self.aliases + square, hurst + 0.5 * self.axes
+        squares = np.maximum(self.aliases, square) if is_sharp else self.aliases + square
+        share = np.where(self.aliases < square, 1.0, 0.0) if is_sharp else square / squares
+        power = hurst + 0.5 * self.axes
         logs = np.log(squares)
         terms = np.exp(-power * logs)
         total, by_hurst = terms.sum(0), -(terms * logs).sum(0)
-        by_square = -power * square * (terms / squares).sum(0)
+        by_square = -power * (terms * share).sum(0)
         if self.images:
-            start = self.tail_start**2 + square
+            start = self.tail_start**2 + (0.0 if is_sharp else square)
             measure = self.spacing[0] / (2.0 * np.pi) if self.axes == 2 else 1.0 / np.pi
             tails = 0.5 * measure / hurst * start**-hurst
             total = total + tails.mean()
             by_hurst = by_hurst - np.mean(tails * (np.log(start) + 1.0 / hurst))
-            by_square = by_square - hurst * square * np.mean(tails / start)
+            by_square = by_square - (0.0 if is_sharp else hurst * square * np.mean(tails / start))
         return np.log(total), by_hurst / total, by_square / total
 
     def mean(self, values: Array) -> Array:

@@ -9,20 +9,25 @@ variogram, whatever the gaps. A tilt of the profile is a mean proportional to th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.dimensions import _mode_blocks
 from fractalcontact.dimensions._blur import (
+    CLEAR,
+    BlurredFit,
     blurred_estimate,
     chosen_blocks,
     fit_blurred,
     is_seen,
 )
 from fractalcontact.dimensions._exponent_by_scale import (
+    Blocks,
+    fit_power_law,
     frame_blocks,
+    interval_of_run,
     longest_run,
     octaves,
     run_estimate,
@@ -33,7 +38,19 @@ from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
-from fractalcontact.dimensions._second_exponent import Explanations, several_exponents
+from fractalcontact.dimensions._rolloff import fit_rolloff, rolloff_estimate
+from fractalcontact.dimensions._second_exponent import (
+    ALIKE,
+    DECISIVE,
+    LEAST_EXPONENT,
+    NO_ALIASES,
+    Explanations,
+    fit_knee,
+    fit_two_exponents,
+    knee_estimate,
+    penalised_deviance,
+    two_estimate,
+)
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
 
@@ -48,17 +65,36 @@ _TILT = 20.0  # variance of a random tilt that is eliminated, in units of the la
 _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
 _LEAST_POINTS = 64  # of a profile whose blur is looked for
 _LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
+_LEAST_CROSSOVER = 4.0  # spacings: two exponents must share an octave
+_OR_ONE = (
+    "one exponent at all scales is not excluded: it is averaged with the other, and the interval holds both"
+)
+_OTHERS = "other explanations are nearly as likely: the interval holds their exponents"
+_FLAT = -0.5  # exponent of white noise: longer waves are no weaker
+_EVEN, _SURE = 13.0, 17.4  # decrease of the penalised deviance with half the weight, and with all of it
 _SINGLE = 0.9  # share of the power beyond the longest that these may hold
 
 
 def profile_likelihood(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
-    """Fit a profile with its exact likelihood, or with that of its modes where it is blurred."""
-    heights, dx = surface.heights[0], surface.spacing[1]
-    weak = np.nan, np.nan
+    """Fit a profile with its exact likelihood, or by its modes where it is no fractional Brownian one.
+
+    Where that is not certain, the exponent is the mean of both.
+    """
+    heights, other, held, gain = surface.heights[0], None, (np.nan, np.nan), np.inf
     if np.isfinite(heights).all() and heights.size >= _LEAST_POINTS and not surface.finest_scale:
-        estimate, weak = _profile_modes(surface, scales, noise, spread)
-        if estimate is not None:
-            return estimate
+        other, held, gain = _profile_modes(surface, scales, noise, spread)
+    if other is not None and gain > _SURE:
+        return other
+    exact = _by_increments(surface, scales, noise, held)
+    if other is None or not exact.hurst < 1.0:
+        return exact if other is None else other
+    share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _EVEN))))
+    return other.averaged(exact, share, _OR_ONE)
+
+
+def _by_increments(surface: Surface, scales: Scales, noise: bool, held: tuple[float, float]) -> Estimate:
+    """Return the estimate of the exact likelihood; its interval also holds `held`, unless that is NaN."""
+    heights, dx = surface.heights[0], surface.spacing[1]
     stride = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
     heights = heights[::stride]
     longest = CHUNK if scales is None else int(scales[1] / (dx * stride) * (1 + 1e-9)) + 1
@@ -76,7 +112,7 @@ def profile_likelihood(surface: Surface, scales: Scales, noise: bool, spread: fl
     moments = increment_moments([(heights[None], 1)], (heights.size,))
     blocks = heterogeneity(moments, (1.0,), fit.hurst)
     low, high = blocks.widened(fit.hurst, fit.low, fit.high)
-    low, high = float(np.fmin(low, weak[0])), float(np.fmax(high, weak[1]))
+    low, high = float(np.fmin(low, held[0])), float(np.fmax(high, held[1]))
     noise_note = ""
     if not noise:
         low, high, noise_note = closed_form(moments, (1.0,)).widened_for_noise(low, high)
@@ -98,34 +134,84 @@ def profile_likelihood(surface: Surface, scales: Scales, noise: bool, spread: fl
 
 def _profile_modes(
     surface: Surface, scales: Scales, noise: bool, spread: float | None
-) -> tuple[Estimate | None, tuple[float, float]]:
+) -> tuple[Estimate | None, tuple[float, float], float]:
     """Return the estimate of a profile that is no fractional Brownian one, by its modes; None if it is one.
 
-    The second result is an interval that allows for weak blur or noise; NaN where the modes show none.
+    The second result is an interval that the modes do not exclude of a fractional Brownian profile, NaN where
+    there is none; the third the decrease of the penalised deviance by the estimate, infinite if it was asked
+    for.
     """
     heights, dx, none = surface.heights[0], surface.spacing[1], (np.nan, np.nan)
     frame = _mode_blocks.frame((heights.size,), (1.0,))
     modes = _mode_blocks.profile_modes(heights) ** 2
     if (share := _largest_share(modes)) > _SINGLE:
         reason = f"a single wave holds {100.0 * share:.0f} % of the shorter waves: no fractal"
-        return undefined(reason), none
-    blocks = frame_blocks(frame.mean(modes), frame)
+        return undefined(reason), none, np.inf
     fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=chosen_blocks(frame, surface, scales))
-    if fit is not None and is_seen(fit, surface.axes, spread):
-        if scales is None and spread is None and not noise:
-            several = several_exponents(Explanations(fit, blocks), surface)
-            if several is not None:
-                return several, none
+    blurred, is_blurred = None, fit is not None and is_seen(fit, surface.axes, spread)
+    if fit is not None and (fit.is_good or is_blurred):
         amplitude = fit.amplitude * heights.size ** (-2.0 * fit.hurst)
         longest = heights.size * dx if scales is None else scales[1]
-        return blurred_estimate(fit, surface, scales, amplitude, longest), none
-    record = octaves(blocks)
-    run = longest_run(record)
-    if scales is None and 0 < run.last - run.first < len(record) and LOWEST < run.fit.hurst < 1.0:
-        return run_estimate(run, surface), none
-    if fit is None or noise or not (fit.is_good and fit.hurst < 1.0):
-        return None, none
-    return None, (max(fit.low, 0.0), min(fit.high, 1.0))
+        blurred = blurred_estimate(fit, surface, scales, amplitude, longest)
+    if scales is None and spread is None and not noise:
+        return _likeliest(frame_blocks(frame.mean(modes), frame), surface, fit, blurred)
+    if is_blurred:
+        return blurred, none, np.inf
+    if blurred is None or noise or blurred.hurst > 1.0:
+        return None, none, 0.0
+    return None, (max(blurred.ci_low, 0.0), min(blurred.ci_high, 1.0)), 0.0
+
+
+def _likeliest(
+    blocks: Blocks, surface: Surface, fit: BlurredFit | None, blurred: Estimate | None
+) -> tuple[Estimate | None, tuple[float, float], float]:
+    """Compare one exponent, blur and noise, and several exponents; return the same as `_profile_modes`.
+
+    The interval holds those of all explanations that are nearly as likely as the likeliest: the modes of a
+    profile are few.
+    """
+    everywhere = np.ones(blocks.count.size, dtype=bool)
+    plain = fit_power_law(blocks, everywhere).deviance + 4.0
+    ranked = _several(blocks, everywhere, surface)
+    if fit is not None and blurred is not None:
+        ranked.append((Explanations(fit, blocks, has_aliases=False).reference, blurred))
+    ranked.sort(key=lambda pair: pair[0])
+    least = min([plain, *(penalised for penalised, _ in ranked)])
+    near = [estimate for penalised, estimate in ranked if penalised <= least + ALIKE]
+    low = min((each.ci_low for each in near), default=np.nan)
+    high = max((each.ci_high for each in near), default=np.nan)
+    if plain - least < CLEAR[1]:
+        return None, (max(low, 0.0), min(high, 1.0)), 0.0
+    return near[0].holding(low, high, _OTHERS if len(near) > 1 else ""), (np.nan, np.nan), plain - least
+
+
+def _several(blocks: Blocks, everywhere: Array, surface: Surface) -> list[tuple[float, Estimate]]:
+    """Return the estimates of roll-offs and second exponents, with their penalised deviances."""
+    result = []
+    assert blocks.frame is not None
+    for part in (blocks, frame_blocks(blocks.power, blocks.frame.unaliased)):
+        found, record = [], octaves(part)
+        for is_sharp in (False, True):
+            rolloff = fit_rolloff(part, everywhere, is_sharp=is_sharp)
+            if rolloff is not None and rolloff.law.hurst > LEAST_EXPONENT and rolloff.law.low < 1.0:
+                found.append((rolloff.penalised, rolloff_estimate(rolloff, part, surface)))
+            two = fit_two_exponents(part, everywhere, is_sharp=is_sharp)
+            if two is not None and two.rough.hurst > LEAST_EXPONENT and two.crossover > _LEAST_CROSSOVER:
+                low, high = two.held
+                estimate = two_estimate(two, record[0], part, surface)
+                found.append((two.penalised, replace(estimate, ci_low=low, ci_high=high)))
+        knee = fit_knee(record, everywhere)
+        if knee is not None and LOWEST < knee.run.fit.hurst < 1.0 and knee.longer.high > _FLAT:
+            found.append((knee.penalised, knee_estimate(knee, record, surface)))
+        run = longest_run(record)
+        if run.last - run.first > 1 and LOWEST < run.fit.hurst < 1.0:
+            low, high = interval_of_run(run, record)
+            estimate = replace(run_estimate(run, surface), ci_low=low, ci_high=high)
+            found.append((penalised_deviance(record, run, everywhere), estimate))
+        if part is not blocks:
+            found = [(cost, replace(each, note=joined(each.note, NO_ALIASES))) for cost, each in found]
+        result += [(cost + DECISIVE, each) for cost, each in found]
+    return result
 
 
 def _largest_share(power: Array) -> float:
@@ -181,8 +267,12 @@ def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> P
         if best(smoother)[0] < best(_HIGHEST)[0] - QUANTILE:
             return _smooth_fit(lambda h: best(h)[0], smoother)
     least, amplitude, level = best(hurst)
-    low = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _LOWEST, 0.0)
-    high = crossing(lambda h: best(h)[0] - least - QUANTILE, hurst, _HIGHEST, 1.0)
+
+    def beyond(h: float) -> float:
+        """Return the root of the rise of the deviance, which is nearly straight, less that of its limit."""
+        return float(np.sqrt(max(best(h)[0] - least, 0.0)) - np.sqrt(QUANTILE))
+
+    low, high = crossing(beyond, hurst, _LOWEST, 0.0), crossing(beyond, hurst, _HIGHEST, 1.0)
     return ProfileFit(
         hurst, _standard_error(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
     )

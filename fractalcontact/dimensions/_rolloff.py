@@ -29,7 +29,7 @@ _WINDOW = "the waves shorter than the corner of the roll-off"
 
 @dataclass(frozen=True)
 class RollOff:
-    """A slow roll-off, perhaps with blur and noise.
+    """A roll-off, perhaps with blur and noise.
 
     Attributes
     ----------
@@ -40,6 +40,8 @@ class RollOff:
     penalised : float
         Deviance with Akaike's penalty.
     noise : bool
+    is_sharp : bool
+        Whether the spectrum is flat up to the corner, instead of bending slowly.
     """
 
     law: PowerLaw
@@ -47,6 +49,7 @@ class RollOff:
     penalised: float
     spread: float = 0.0
     noise: bool = False
+    is_sharp: bool = False
 
 
 def fit_rolloff(
@@ -56,9 +59,11 @@ def fit_rolloff(
     blur: tuple[str, float] = (NONE, 0.0),
     noise: bool = False,
     starts: Sequence[float] = _STARTS,
+    is_sharp: bool = False,
 ) -> RollOff | None:
     """Fit exponent and corner to some blocks; None where the corner is not among their waves.
 
+    With `is_sharp` the spectrum is flat up to the corner, instead of bending slowly.
     A blur of some form, with a first guess of its spread, and `noise` are fitted as well; `starts` are first
     guesses of H. A blur changes the power as that of fractional Brownian heights. The power over the spectral
     density, which is that of such heights at first, is in a second fit that of the covariance that the first
@@ -79,7 +84,7 @@ def fit_rolloff(
         every = np.zeros(4)
         every[free] = values
         hurst, square = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2)
-        logs, slope, by_square = frame.rolled_densities(hurst, square)
+        logs, slope, by_square = frame.rolled_densities(hurst, square, is_sharp=is_sharp)
         if edges is None:
             plain, plain_slope = blocks.logs(hurst)
             bare, bare_slope, _ = frame.rolled_densities(hurst, 0.0)
@@ -106,7 +111,7 @@ def fit_rolloff(
         values[3] = model(values[free])[0].min() - 2.0
         return np.asarray(values[free])
 
-    guesses = [start(hurst, place) for hurst in starts for place in (0.3, 0.6)]
+    guesses = [start(hurst, place) for hurst in starts for place in (0.3, 0.6, 0.8)]
     steps = np.array([0.2, 0.7, 0.5, 2.0])[free]
     for _ in range(2):
         bounds = low[free], high[free]
@@ -115,13 +120,13 @@ def fit_rolloff(
         if not (first < corner < last and best.is_regular):
             return None
         edges, guesses = _edges(frame, hurst, float(np.exp(-corner))), [best.values]
-        if edges is None:
+        if edges is None or is_sharp:
             break
     error = float(best.half_widths[0])
     law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
     parameters = 1 + np.count_nonzero(free)
     spread = float(np.sqrt(best.values[2])) if form != NONE else 0.0
-    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * parameters, spread, noise)
+    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * parameters, spread, noise, is_sharp)
 
 
 def _edges(frame: Frame, hurst: float, length: float) -> Array | None:
@@ -140,8 +145,10 @@ def _edges(frame: Frame, hurst: float, length: float) -> Array | None:
 
 
 def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Estimate:
-    """Return the estimate of a surface with a slow roll-off."""
+    """Return the estimate of a surface with a roll-off."""
     law, dx = rolloff.law, surface.spacing[1]
+    power = "-1 - H" if blocks.axes == 2 else "-1/2 - H"
+    form = f"{'max(q^2, q_0^2)' if rolloff.is_sharp else '(q^2 + q_0^2)'}^({power})"
     return Estimate(
         law.hurst,
         0.5 * (law.high - law.low) / NORMAL,
@@ -150,8 +157,8 @@ def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Esti
         scale_min=float(blocks.wavelength.min()) * dx,
         scale_max=rolloff.length * dx,
         window=_WINDOW,
-        note=f"a slow roll-off: the spectrum falls as (q^2 + q_0^2)^(-1 - H) with a corner at waves of "
-        f"{rolloff.length * dx:.3g} m{_beside(rolloff)}",
+        note=f"a {'sudden' if rolloff.is_sharp else 'slow'} roll-off: the spectrum falls as {form} with a "
+        f"corner at waves of {rolloff.length * dx:.3g} m{_beside(rolloff)}",
     )
 
 

@@ -37,17 +37,17 @@ from fractalcontact.dimensions._transfer_functions import NONE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
+LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
 _LEAST_CROSSOVER = 2.0  # spacings: shorter waves run along the diagonals only
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
-_DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
+DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
 _SHORTENED = 12.0  # its increase up to which they do so where blur leaves the longest waves out
 _TWO_ALONE = 6.0  # decrease from which blur and noise are excluded beside two exponents
 _UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
 _AGAINST_SINGLE = 6.0  # decrease by which several exponents without aliases replace a single one
 _FAR = 30.0  # penalised deviance of a run beyond which aliases are not missing
-_ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
+ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
@@ -80,6 +80,12 @@ class TwoExponents:
     crossover: float
     penalised: float
     is_sharp: bool
+
+    @property
+    def held(self) -> tuple[float, float]:
+        """The interval of the rougher one where it may be there."""
+        half_width = min(self.rough.high - self.rough.hurst, _WIDEST)
+        return self.rough.hurst - half_width, self.rough.hurst + half_width
 
 
 @dataclass(frozen=True)
@@ -118,7 +124,7 @@ class Explanations:
             return aliased
         if unaliased.run_excess > _FAR and unaliased.rolloff_excess > _FAR:
             return aliased
-        excess = np.inf if aliased.choice is None else aliased.choice[1] - _DECISIVE
+        excess = np.inf if aliased.choice is None else aliased.choice[1] - DECISIVE
         if unaliased.choice is not None and unaliased.choice[1] < excess:
             return unaliased
         return replace(aliased, rival=unaliased)
@@ -162,7 +168,7 @@ class Explanations:
             return None if self.is_shortened else fit_two_exponents(self.blocks, self.inside)
         fits = [fit_two_exponents(self.blocks, self.inside, is_sharp=sharp) for sharp in (False, True)]
         seen = [fit for fit in fits if fit is not None and fit.crossover > _LEAST_CROSSOVER]
-        rough = [fit for fit in seen if fit.rough.hurst > _LEAST_EXPONENT]
+        rough = [fit for fit in seen if fit.rough.hurst > LEAST_EXPONENT]
         return min(rough, key=lambda fit: fit.penalised, default=None)
 
     @cached_property
@@ -195,7 +201,7 @@ class Explanations:
         fit, squares, inside = self.fit, self.blocks.wavelength**-2.0, self.everywhere
         plain, reference = fit_rolloff(self.blocks, inside), self._reference(inside)
         fits, most = [plain], np.inf
-        if plain is not None and plain.penalised < reference + _ALIKE:
+        if plain is not None and plain.penalised < reference + ALIKE:
             fits.append(fit_rolloff(self.blocks, inside, noise=True, starts=(plain.law.hurst + 0.05,)))
         elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
             inside = fit.inside | (squares < squares[fit.inside].min())
@@ -207,7 +213,7 @@ class Explanations:
                 most = 0.0  # what looks like noise may be the plateau
         found = [(each.penalised - reference, each) for each in fits if each]
         found = [each for each in found if each[0] < most]
-        found = [each for each in found if each[1].law.hurst > _LEAST_EXPONENT and each[1].law.low < 1.0]
+        found = [each for each in found if each[1].law.hurst > LEAST_EXPONENT and each[1].law.low < 1.0]
         return sorted(
             found, key=lambda each: each[0] + _AGAINST_NOISE * (each[1].noise and not each[1].spread)
         )
@@ -220,7 +226,7 @@ class Explanations:
         excess, best = self._rolloffs[0]
         laws = [best.law]
         if best.spread:
-            laws = [each.law for other, each in self._rolloffs if other < excess + _ALIKE]
+            laws = [each.law for other, each in self._rolloffs if other < excess + ALIKE]
         low, high = min(law.low for law in laws), max(law.high for law in laws)
         return replace(best, law=replace(best.law, low=low, high=high))
 
@@ -236,7 +242,7 @@ class Explanations:
 
     def beside_rolloff(self, estimate: Estimate, excess: float) -> Estimate:
         """Return an estimate with an `excess` that holds a slow roll-off that is nearly as likely."""
-        if self.rolloff is None or self.is_rolloff or self.rolloff_excess > excess + _ALIKE:
+        if self.rolloff is None or self.is_rolloff or self.rolloff_excess > excess + ALIKE:
             return estimate
         return estimate.holding(self.rolloff.law.low, self.rolloff.law.high, _OR_ROLLOFF)
 
@@ -253,18 +259,17 @@ class Explanations:
 
         Without aliases they may be a little less likely where blur and noise leave the longest waves out.
         """
-        limit = -_DECISIVE if self.has_aliases or not self.is_shortened else _ALIKE
+        limit = -DECISIVE if self.has_aliases or not self.is_shortened else ALIKE
         return self._choice(min(limit, self.single - _AGAINST_SINGLE))
 
     @property
     def possible(self) -> list[tuple[float, float]]:
         """The interval of several exponents without aliases that are nearly as likely as blur and noise."""
-        choice = self._choice(min(_ALIKE, self.single - _ALIKE))
+        choice = self._choice(min(ALIKE, self.single - ALIKE))
         if choice is None:
             return []
         if choice[0] == "two" and self.two is not None:
-            half_width = min(self.two.rough.high - self.two.rough.hurst, _WIDEST)
-            return [(self.two.rough.hurst - half_width, self.two.rough.hurst + half_width)]
+            return [self.two.held]
         if choice[0] == "rolloff" and self.rolloff is not None:
             return [(self.rolloff.law.low, self.rolloff.law.high)]
         run = self.knee.run if choice[0] == "knee" and self.knee is not None else self.run
@@ -276,7 +281,7 @@ class Explanations:
         rivals = [excess, self.run_excess] if run.last > run.first else [excess]
         if self.rolloff_excess < min(limit, *rivals):
             return "rolloff", self.rolloff_excess
-        if two is not None and two.rough.hurst > _LEAST_EXPONENT and excess < limit:
+        if two is not None and two.rough.hurst > LEAST_EXPONENT and excess < limit:
             return "two", excess
         excess = np.inf if knee is None else self.excess(knee.penalised)
         if knee is not None and LOWEST < knee.run.fit.hurst < 1.0 and excess < limit:
@@ -305,11 +310,11 @@ def several_exponents(explained: Explanations, surface: Surface) -> Estimate | N
     kind, excess = explained.choice
     fit, two, knee = explained.fit, explained.two, explained.knee
     if kind == "two" and two is not None:
-        estimate = _two_estimate(two, explained.record[0], explained.blocks, surface)
+        estimate = two_estimate(two, explained.record[0], explained.blocks, surface)
     elif kind == "rolloff" and explained.rolloff is not None:
         estimate = rolloff_estimate(explained.rolloff, explained.blocks, surface)
     elif kind == "knee" and knee is not None:
-        estimate = _knee_estimate(knee, explained.record, surface)
+        estimate = knee_estimate(knee, explained.record, surface)
     else:
         estimate = run_estimate(explained.run, surface)
     if not explained.has_aliases:
@@ -330,13 +335,12 @@ def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, floa
     ranges: list[tuple[float, float]] = []
     if fit.is_good and fit.gain > _POSSIBLE:
         ranges.append((fit.low, fit.high))
-    has_second = two is not None and explained.excess(two.penalised) < _ALIKE
+    has_second = two is not None and explained.excess(two.penalised) < ALIKE
     if two is not None and has_second:
-        half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
-        ranges.append((two.rough.hurst - half_width, two.rough.hurst + half_width))
-    if knee is not None and explained.excess(knee.penalised) < _ALIKE:
+        ranges.append(two.held)
+    if knee is not None and explained.excess(knee.penalised) < ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
-    limit = _SHORTENED if explained.is_shortened else _ALIKE
+    limit = _SHORTENED if explained.is_shortened else ALIKE
     if explained.rolloff is not None and explained.rolloff_excess < limit:
         ranges.append((explained.rolloff.law.low, explained.rolloff.law.high))
     if explained.rival is not None:
@@ -374,7 +378,7 @@ class Knee:
         return (self.run.fit.low, self.run.fit.high) if self.gain > _KNEE_SEEN else (np.inf, -np.inf)
 
 
-def _knee_estimate(knee: Knee, record: Sequence[Octave], surface: Surface) -> Estimate:
+def knee_estimate(knee: Knee, record: Sequence[Octave], surface: Surface) -> Estimate:
     """Return the estimate of the shorter of the waves on either side of a knee."""
     law, end = knee.longer, knee.run.high * surface.spacing[1]
     note = (
@@ -409,7 +413,7 @@ def fit_knee(record: Sequence[Octave], inside: Array) -> Knee | None:
     return Knee(run, longer, deviance + 2.0 * _KNEE_PARAMETERS, single - deviance)
 
 
-def _two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: Surface) -> Estimate:
+def two_estimate(two: TwoExponents, shortest: Octave, blocks: Blocks, surface: Surface) -> Estimate:
     """Return the estimate of the rougher of two surfaces, which holds the shorter waves.
 
     The interval also holds that of the shortest octave alone, for the exponent may change suddenly.
