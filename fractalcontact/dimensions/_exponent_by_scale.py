@@ -17,7 +17,14 @@ from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._restored_power import MOST_MISSING, restored_power
-from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
+from fractalcontact.dimensions._surface_input import (
+    Scales,
+    Surface,
+    between,
+    check_surface,
+    is_lazy,
+    read_surfaces,
+)
 from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, TRANSFER, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -262,14 +269,44 @@ def with_or_without_aliases(blocks: Blocks) -> Blocks:
 
 def window_of(blocks: Blocks, inside: Array) -> Run | None:
     """Return the exponent of some blocks, of one or several octaves; None if no one fits them."""
-    parts = [replace(octave, inside=octave.inside & inside) for octave in octaves(blocks)]
-    parts = [part for part in parts if blocks.count[part.inside].sum() >= _LEAST]
-    run = [replace(part, fit=fit_power_law(blocks, part.inside)) for part in parts]
-    fit = fit_power_law(blocks, inside)
+    run, fit = _octaves_within(blocks, inside), fit_power_law(blocks, inside)
     if not run or not has_one_exponent(run, fit):
         return None
     wavelength = blocks.wavelength[inside]
     return Run(0, len(run), float(wavelength.min()), float(wavelength.max()), fit)
+
+
+def exponents_within(surface: Surface, scales: Scales) -> tuple[float, float]:
+    """Return the range of the exponents of short and long waves of a window; (inf, -inf) if it has one.
+
+    They change at an edge of an octave.
+    """
+    from scipy.special import chdtrc
+
+    blocks = with_or_without_aliases(blocks_of(surface))
+    inside = between(blocks.wavelength * surface.spacing[1], scales)
+    edges = [octave.high for octave in _octaves_within(blocks, inside)[:-1]]
+    if not edges:
+        return np.inf, -np.inf
+    splits = [
+        [
+            fit_power_law(blocks, inside & part)
+            for part in (blocks.wavelength < edge, blocks.wavelength >= edge)
+        ]
+        for edge in edges
+    ]
+    best = min(splits, key=lambda pair: pair[0].deviance + pair[1].deviance)
+    gain = fit_power_law(blocks, inside).deviance - sum(fit.deviance for fit in best)
+    if len(splits) * chdtrc(2, max(gain / CORRELATION, 0.0)) > _FALSE_ALARM:
+        return np.inf, -np.inf
+    return min(fit.low for fit in best), max(fit.high for fit in best)
+
+
+def _octaves_within(blocks: Blocks, inside: Array) -> list[Octave]:
+    """Return the parts of the octaves in a window that have enough modes, each fitted alone."""
+    parts = [replace(octave, inside=octave.inside & inside) for octave in octaves(blocks)]
+    parts = [part for part in parts if blocks.count[part.inside].sum() >= _LEAST]
+    return [replace(part, fit=fit_power_law(blocks, part.inside)) for part in parts]
 
 
 def _periodic(surface: Surface) -> tuple[Array, Array, Array]:
@@ -396,7 +433,7 @@ def _scored(
         information = 0.5 * (count * columns) @ columns.T
         score = 0.5 * (count * columns) @ residual
         ridge = np.diag(damping * np.diag(information) + 1e-12)
-        step = np.linalg.lstsq(information + ridge, score, rcond=None)[0]
+        step = np.linalg.solve(information + ridge, score)
         moved = np.clip(values + np.clip(step, -largest_step, largest_step), *bounds)
         trial = evaluate(moved)
         if trial[0] > deviance + 1e-9:

@@ -26,6 +26,7 @@ from fractalcontact.dimensions._blur import (
 )
 from fractalcontact.dimensions._blur_fit import Comparison, agreement, compare
 from fractalcontact.dimensions._exponent_by_scale import (
+    exponents_within,
     frame_blocks,
     interval_of_run,
     longest_run,
@@ -137,10 +138,26 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
     surface, wave_note = without_waves(surface)
     surface, gap_note = with_gaps(surface, filled)
     estimate = _fitted(surface, scales, noise, psf)
+    if scales is not None and not noise and psf is None:
+        estimate = _within_scales(estimate, surface, scales)
     estimate = replace(estimate, note=joined(wave_note, gap_note, estimate.note))
     if made and not estimate.reason:
         return replace(estimate.without_interval(made), note=joined(made, estimate.note))
     return estimate
+
+
+def _within_scales(estimate: Estimate, surface: Surface, scales: Scales) -> Estimate:
+    """Return an estimate whose interval holds both exponents of a given window that has more than one."""
+    if not surface.is_complete or surface.finest_scale or np.isfinite(estimate.blur_spread):
+        return estimate
+    low, high = exponents_within(surface, scales)
+    if low > high:
+        return estimate
+    note = (
+        "the exponent changes within the scales asked for (see `scaling`): the interval holds those of the "
+        "shorter and of the longer waves"
+    )
+    return estimate.holding(low, high, note)
 
 
 def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) -> Estimate:

@@ -61,6 +61,7 @@ SMALLEST = 8  # observed points
 _LOWEST, _HIGHEST = 1e-3, 0.999
 _AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smoother than fractal ones
 _SMOOTHEST = 1.9
+_TOLERANCE = 1e-4  # of the exponent
 _TILT = 20.0  # variance of a random tilt that is eliminated, in units of the largest covariance of increments
 _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
 _LEAST_POINTS = 64  # of a profile whose blur is looked for
@@ -70,6 +71,7 @@ _OR_ONE = (
     "one exponent at all scales is not excluded: it is averaged with the other, and the interval holds both"
 )
 _OTHERS = "other explanations are nearly as likely: the interval holds their exponents"
+_WIDEST = 0.25  # half-width of the exponent of the rougher of two profiles
 _FLAT = -0.5  # exponent of white noise: longer waves are no weaker
 _EVEN, _SURE = 13.0, 17.4  # decrease of the penalised deviance with half the weight, and with all of it
 _SINGLE = 0.9  # share of the power beyond the longest that these may hold
@@ -195,10 +197,13 @@ def _several(blocks: Blocks, everywhere: Array, surface: Surface) -> list[tuple[
             rolloff = fit_rolloff(part, everywhere, is_sharp=is_sharp)
             if rolloff is not None and rolloff.law.hurst > LEAST_EXPONENT and rolloff.law.low < 1.0:
                 found.append((rolloff.penalised, rolloff_estimate(rolloff, part, surface)))
-            two = fit_two_exponents(part, everywhere, is_sharp=is_sharp)
+            # without aliases a sum is like a corner
+            has_two = is_sharp or part is blocks
+            two = fit_two_exponents(part, everywhere, is_sharp=is_sharp) if has_two else None
             if two is not None and two.rough.hurst > LEAST_EXPONENT and two.crossover > _LEAST_CROSSOVER:
-                low, high = two.held
+                half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
                 estimate = two_estimate(two, record[0], part, surface)
+                low, high = two.rough.hurst - half_width, two.rough.hurst + half_width
                 found.append((two.penalised, replace(estimate, ci_low=low, ci_high=high)))
         knee = fit_knee(record, everywhere)
         if knee is not None and LOWEST < knee.run.fit.hurst < 1.0 and knee.longer.high > _FLAT:
@@ -261,7 +266,7 @@ def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> P
             cache[hurst] = _best_noise(increments, hurst) if noise else (*increments.solve(hurst, 0.0), 0.0)
         return cache[hurst]
 
-    hurst = minimum(lambda h: best(h)[0], _LOWEST, _HIGHEST)
+    hurst = minimum(lambda h: best(h)[0], _LOWEST, _HIGHEST, _TOLERANCE, points=9 if noise else 5)
     if hurst > _AT_LIMIT:
         smoother = minimum(lambda h: best(h)[0], 1.0 / _HIGHEST, _SMOOTHEST, 1e-3, points=5)
         if best(smoother)[0] < best(_HIGHEST)[0] - QUANTILE:

@@ -14,7 +14,14 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, best_scored
-from fractalcontact.dimensions._mode_blocks import HIGHEST, LARGEST, LOWEST, Frame, lattice_power
+from fractalcontact.dimensions._mode_blocks import (
+    HIGHEST,
+    LARGEST,
+    LOWEST,
+    Frame,
+    lattice_power,
+    node_weights,
+)
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface
 from fractalcontact.dimensions._transfer_functions import NONE, Window
@@ -77,7 +84,7 @@ def fit_rolloff(
     window = Window(frame, inside, blocks.power)
     first, last = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
     low, high = np.array([LOWEST, first, 0.0, -80.0]), np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0])
-    edges: Array | None = None
+    excess, edges = frame.logs - frame.densities, None
 
     def model(values: Array) -> tuple[Array, Array]:
         """Return the logarithm of the power, and its derivatives."""
@@ -86,9 +93,8 @@ def fit_rolloff(
         hurst, square = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2)
         logs, slope, by_square = frame.rolled_densities(hurst, square, is_sharp=is_sharp)
         if edges is None:
-            plain, plain_slope = blocks.logs(hurst)
-            bare, bare_slope, _ = frame.rolled_densities(hurst, 0.0)
-            logs, slope = logs + plain - bare, slope + plain_slope - bare_slope
+            weights, slopes = node_weights(hurst)
+            logs, slope = logs + weights @ excess, slope + slopes @ excess
         else:
             logs = logs + edges
         logs, columns = logs[inside], np.stack([slope, 2.0 * by_square, 0.0 * slope, 0.0 * slope])[:, inside]

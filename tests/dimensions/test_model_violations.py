@@ -454,3 +454,28 @@ def test_lines_levelled_one_by_one_are_seen(order, axis):
         assert "levelled" not in alone.hurst.attrs["comment"]
         differences.append(float(result.hurst - alone.hurst))
     assert np.mean(differences) == pytest.approx(0.0, abs=0.004)
+
+
+def test_profile_with_slow_roll_off_holds_its_exponent():
+    """A Markov profile, sampled exactly: its covariance exp(-q_0 r) is Matern's of H = 1/2."""
+    rng, decay = np.random.default_rng(3), float(np.exp(-2.0 * np.pi / 16.0))
+    heights = [rng.standard_normal()]
+    for jump in rng.standard_normal(255):
+        heights.append(decay * heights[-1] + np.sqrt(1.0 - decay**2) * jump)
+    profile = fc.surfaces.from_array(1e-6 * np.array(heights), 1e-4)
+    result = fc.dimensions.estimate(profile).isel(method=0)
+    assert result.ci_low < 0.5 < result.ci_high
+
+
+def test_window_across_a_corner_names_both_exponents():
+    """Exponent 0.3 below waves of 32 spacings, 0.9 beyond."""
+    wave = np.abs(np.fft.fftfreq(32768)) * 8 * 32.0
+    wave[0] = np.inf
+    amplitude = np.where(wave > 1.0, wave**-0.8, wave**-1.4)
+    white = np.fft.fft(np.random.default_rng(2).standard_normal(32768))
+    heights = np.fft.ifft(white * amplitude).real[:16384:8]
+    profile = fc.surfaces.from_array(1e-6 * heights, 1e-4)
+    result = fc.dimensions.estimate(profile, scales=(4e-4, 5e-2)).isel(method=0)
+    assert "within the scales" in json.loads(result.hurst.attrs["comment"])["default"]
+    assert result.ci_low < 0.3
+    assert result.ci_high > 0.9
