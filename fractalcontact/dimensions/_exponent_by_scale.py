@@ -398,10 +398,12 @@ def best_scored(
     starts: Sequence[Array],
     bounds: tuple[Array, Array],
     largest_step: Array,
+    most: float = np.inf,
 ) -> Scored:
     """Fit the parameters of a model to blocks by damped scoring from the two best starts.
 
     `model` returns the logarithm of the expected power but for its level, and the derivatives.
+    Beyond the deviance `most` the second start is not tried.
     """
     logs, modes = np.log(np.maximum(power, 1e-300)), float(count.sum())
 
@@ -414,9 +416,11 @@ def best_scored(
         deviance = float(np.sum(count * expected) + modes * np.log(level))
         return deviance, columns, ratio / level - 1.0
 
-    likely = sorted(starts, key=lambda start: evaluate(start)[0])[:_STARTS]
-    fits = [_scored(evaluate, count, start, bounds, largest_step) for start in likely]
-    return min(fits, key=lambda fit: fit.deviance)
+    first, *others = sorted(starts, key=lambda start: evaluate(start)[0])[:_STARTS]
+    best = _scored(evaluate, count, first, bounds, largest_step)
+    for start in others if best.deviance < most else []:
+        best = min(best, _scored(evaluate, count, start, bounds, largest_step), key=lambda fit: fit.deviance)
+    return best
 
 
 def _scored(

@@ -31,6 +31,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _LEAST_LENGTH = 2.5  # spacings: a shorter corner leaves no waves beyond it
 _STARTS = 0.3, 0.8  # first guesses of H
 _LARGEST_SQUARE = 200.0  # spread of a blur
+_FAR = 60.0  # deviance that the edges do not change
+_HOPELESS = 200.0  # deviance that another start does not change
 _WINDOW = "the waves shorter than the corner of the roll-off"
 
 
@@ -67,10 +69,13 @@ def fit_rolloff(
     noise: bool = False,
     starts: Sequence[float] = _STARTS,
     is_sharp: bool = False,
+    most: float = np.inf,
 ) -> RollOff | None:
     """Fit exponent and corner to some blocks; None where the corner is not among their waves.
 
-    With `is_sharp` the spectrum is flat up to the corner, instead of bending slowly.
+    None as well where the penalised deviance is far above `most`. With `is_sharp` the spectrum is flat up to
+    the corner, instead of bending slowly.
+
     A blur of some form, with a first guess of its spread, and `noise` are fitted as well; `starts` are first
     guesses of H. A blur changes the power as that of fractional Brownian heights. The power over the spectral
     density, which is that of such heights at first, is in a second fit that of the covariance that the first
@@ -81,6 +86,7 @@ def fit_rolloff(
         return None
     form, spread = blur
     free = np.array([True, True, form != NONE, noise])
+    parameters = 1 + int(np.count_nonzero(free))
     window = Window(frame, inside, blocks.power)
     first, last = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
     low, high = np.array([LOWEST, first, 0.0, -80.0]), np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0])
@@ -121,16 +127,16 @@ def fit_rolloff(
     steps = np.array([0.2, 0.7, 0.5, 2.0])[free]
     for _ in range(2):
         bounds = low[free], high[free]
-        best = best_scored(model, blocks.power[inside], count, guesses, bounds, steps)
+        best = best_scored(model, blocks.power[inside], count, guesses, bounds, steps, most + _HOPELESS)
         hurst, corner = (float(value) for value in best.values[:2])
-        if not (first < corner < last and best.is_regular):
+        is_far = best.deviance + 2.0 * parameters > most + _FAR
+        if is_far or not (first < corner < last and best.is_regular):
             return None
         edges, guesses = _edges(frame, hurst, float(np.exp(-corner))), [best.values]
         if edges is None or is_sharp:
             break
     error = float(best.half_widths[0])
     law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
-    parameters = 1 + np.count_nonzero(free)
     spread = float(np.sqrt(best.values[2])) if form != NONE else 0.0
     return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * parameters, spread, noise, is_sharp)
 

@@ -120,7 +120,8 @@ class Explanations:
             return aliased
         unaliased = cls(fit, frame_blocks(means, frame.unaliased), has_aliases=False)
         shortest = unaliased.record[0].fit
-        if (shortest.low > 1.0 or shortest.high < 0.0) and not unaliased.is_rolloff:
+        is_smooth = shortest.low > 1.0 or shortest.high < 0.0
+        if is_smooth and (unaliased.rolloff_excess > ALIKE or not unaliased.is_rolloff):
             return aliased
         if unaliased.run_excess > _FAR and unaliased.rolloff_excess > _FAR:
             return aliased
@@ -199,16 +200,17 @@ class Explanations:
         longest waves out, or show noise, the roll-off has their blur, on their waves and longer ones.
         """
         fit, squares, inside = self.fit, self.blocks.wavelength**-2.0, self.everywhere
-        plain, reference = fit_rolloff(self.blocks, inside), self._reference(inside)
+        reference = self._reference(inside)
+        plain = fit_rolloff(self.blocks, inside, most=reference)
         fits, most = [plain], np.inf
         if plain is not None and plain.penalised < reference + ALIKE:
             fits.append(fit_rolloff(self.blocks, inside, noise=True, starts=(plain.law.hurst + 0.05,)))
         elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
             inside = fit.inside | (squares < squares[fit.inside].min())
             reference, blur = self._reference(inside), (fit.form, fit.spread)
-            fits = [fit_rolloff(self.blocks, inside, blur=blur)]
+            fits = [fit_rolloff(self.blocks, inside, blur=blur, most=reference)]
             if self.is_shortened:
-                fits.append(fit_rolloff(self.blocks, inside, blur=blur, noise=True))
+                fits.append(fit_rolloff(self.blocks, inside, blur=blur, noise=True, most=reference))
             else:
                 most = 0.0  # what looks like noise may be the plateau
         found = [(each.penalised - reference, each) for each in fits if each]
