@@ -445,7 +445,7 @@ def _asymmetry(power: Array, window: Window) -> float:
     frame, inside = window.frame, window.inside
     if not frame.is_mirrored:
         return 0.0
-    part = frame.mean(np.tril(power, -1))[inside] / window.power
-    pairs = frame.index[0][inside] != frame.index[1][inside]
+    pairs = (frame.index[0][inside] != frame.index[1][inside]) & (window.power > 0.0)
+    part = frame.mean(np.tril(power, -1))[inside][pairs] / window.power[pairs]
     weights = 0.5 * window.count[pairs] + 1.0
-    return float(np.sum(weights * (2.0 * part[pairs] - 1.0)) / np.sqrt(np.sum(weights)))
+    return float(np.sum(weights * (2.0 * part - 1.0)) / np.sqrt(max(np.sum(weights), 1.0)))

@@ -100,3 +100,12 @@ def test_smoothest_fractal_profiles_keep_their_interval():
     result = estimate(profiles)
     assert (result.fitted_hurst < 1.0).all()
     assert int(((result.ci_low <= 0.95) & (result.ci_high >= 0.95)).sum()) >= 8
+
+
+def test_checkerboard_is_no_fractal_of_a_narrow_interval():
+    """Modes without any power once ended in a division by zero."""
+    y, x = np.mgrid[:64, :64]
+    surface = fc.surfaces.from_array(1e-6 * ((x + y) % 2), 1e-5)
+    result = estimate_one(surface)
+    assert "few waves hold more than their share" in result.hurst.attrs["comment"]
+    assert not float(result.ci_high - result.ci_low) < 0.1
