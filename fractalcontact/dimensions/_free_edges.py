@@ -270,8 +270,11 @@ def without_levelling(power: Array, spacing: tuple[float, float], hurst: float) 
         lines = power if axis == 1 else power.T
         if lines.shape[0] < _ACROSS + _LEAST_WAVES or lines.shape[1] <= _ALONG:
             continue
-        sums = lines[_ACROSS:, : _ALONG + 1].sum(axis=0)
-        taken = int(np.argmin(sums[:-1] < _LEVELLED * sums[_ALONG]))
+        rows = lines[_ACROSS:, : 3 * _ALONG]
+        # over the shorter waves of the same row: each row then counts the same in a steep spectrum
+        shorter = rows[:, _ALONG:].mean(axis=1, keepdims=True)
+        shares = np.divide(rows[:, :_ALONG], shorter, out=np.ones((len(rows), _ALONG)), where=shorter > 0.0)
+        taken = int(np.argmin(shares.mean(axis=0) < _LEVELLED))
         if 0 < taken < _ALONG:
             lattice = Lattice.of((power.shape[0] + 1, power.shape[1] + 1), spacing)
             expected = expected_power(lattice, hurst)
