@@ -133,7 +133,7 @@ class BlockGaps:
         return np.asarray(_means(values, self.starts)[self.chosen])
 
     def error(self, fit: WhittleFit) -> float:
-        """Return the standard error of H by the sandwich formula, see `_cosine_modes.FreeModes.error`."""
+        """Return the standard error of H by the sandwich formula, see `_free_edges.FreeModes.error`."""
         hurst = float(np.clip(fit.hurst, LOWEST, SMOOTH))
         gapped = GappedModes(self.lattice, self.filling.observed, hurst, 1, self.filling)
         reference = gapped.reference_power()
@@ -282,7 +282,7 @@ class BlockModes:
         return result
 
     def error(self, fit: WhittleFit) -> float:
-        """Return the standard error of H, see `_cosine_modes.FreeModes.error`."""
+        """Return the standard error of H, see `_free_edges.FreeModes.error`."""
         missing = 0.0 if self.gaps is None else self.gaps.missing
         if self.gaps is not None and missing > _MANY:
             return self.gaps.error(fit)

@@ -201,9 +201,8 @@ def _several(blocks: Blocks, everywhere: Array, surface: Surface) -> list[tuple[
             has_two = is_sharp or part is blocks
             two = fit_two_exponents(part, everywhere, is_sharp=is_sharp) if has_two else None
             if two is not None and two.rough.hurst > LEAST_EXPONENT and two.crossover > _LEAST_CROSSOVER:
-                half_width = min(two.rough.high - two.rough.hurst, _WIDEST)
                 estimate = two_estimate(two, record[0], part, surface)
-                low, high = two.rough.hurst - half_width, two.rough.hurst + half_width
+                low, high = two.held(_WIDEST)
                 found.append((two.penalised, replace(estimate, ci_low=low, ci_high=high)))
         knee = fit_knee(record, everywhere)
         if knee is not None and LOWEST < knee.run.fit.hurst < 1.0 and knee.longer.high > _FLAT:

@@ -81,10 +81,9 @@ class TwoExponents:
     penalised: float
     is_sharp: bool
 
-    @property
-    def held(self) -> tuple[float, float]:
-        """The interval of the rougher one where it may be there."""
-        half_width = min(self.rough.high - self.rough.hurst, _WIDEST)
+    def held(self, widest: float = _WIDEST) -> tuple[float, float]:
+        """Return the interval of the rougher one where it may be there, of at most a given half-width."""
+        half_width = min(self.rough.high - self.rough.hurst, widest)
         return self.rough.hurst - half_width, self.rough.hurst + half_width
 
 
@@ -271,7 +270,7 @@ class Explanations:
         if choice is None:
             return []
         if choice[0] == "two" and self.two is not None:
-            return [self.two.held]
+            return [self.two.held()]
         if choice[0] == "rolloff" and self.rolloff is not None:
             return [(self.rolloff.law.low, self.rolloff.law.high)]
         run = self.knee.run if choice[0] == "knee" and self.knee is not None else self.run
@@ -339,7 +338,7 @@ def alternatives(explained: Explanations, *, is_bent: bool) -> tuple[float, floa
         ranges.append((fit.low, fit.high))
     has_second = two is not None and explained.excess(two.penalised) < ALIKE
     if two is not None and has_second:
-        ranges.append(two.held)
+        ranges.append(two.held())
     if knee is not None and explained.excess(knee.penalised) < ALIKE:
         ranges.append((knee.run.fit.low, knee.run.fit.high))
     limit = _SHORTENED if explained.is_shortened else ALIKE

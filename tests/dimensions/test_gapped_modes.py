@@ -20,15 +20,6 @@ def dense_operator(filling):
     return np.array([_cosine_modes.cosine_modes(filling(unit)).ravel() for unit in units]).T
 
 
-@pytest.fixture(scope="module")
-def holes():
-    rng = np.random.default_rng(5)
-    observed = rng.random((12, 14)) > 0.15
-    observed[4:7, 0:4] = False
-    observed[0, -1] = observed[-1, 0] = observed[0, 0] = observed[-1, -1] = True
-    return observed
-
-
 def test_gapped_modes_equal_dense_algebra(holes):
     hurst = 0.6
     lattice = _cosine_modes.Lattice.of(holes.shape, (1.0, 1.0))

@@ -6,15 +6,6 @@ import pytest
 from fractalcontact.dimensions._harmonic_interpolation import Filling
 
 
-@pytest.fixture(scope="module")
-def holes():
-    rng = np.random.default_rng(5)
-    observed = rng.random((12, 14)) > 0.15
-    observed[4:7, 0:4] = False
-    observed[0, -1] = observed[-1, 0] = observed[0, 0] = observed[-1, -1] = True
-    return observed
-
-
 def test_filling_of_plane_and_transpose(holes):
     filling = Filling(holes, (2.0, 1.0))
     y, x = np.indices(holes.shape)
