@@ -26,6 +26,7 @@ from fractalcontact.dimensions._anisotropy import (
 from fractalcontact.dimensions._blur import CLEAR, fit_blurred
 from fractalcontact.dimensions._filled_points import filled_points, with_gaps
 from fractalcontact.dimensions._free_edges import LARGE
+from fractalcontact.dimensions._height_gaps import without_height_gaps
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
@@ -247,8 +248,10 @@ def _free_surface(
         record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
         return _Directional([record] * len(directions), None, record.note)
     filled = filled_points(surface)
-    if filled is not None:
-        surface, note = with_gaps(without_waves(surface)[0], filled)
+    without, note = with_gaps(surface if filled is None else without_waves(surface)[0], filled)
+    without, limited = without_height_gaps(without)
+    if note := joined(note, limited):
+        surface = without
         result = _by_differences(surface, directions, scales)
         return replace(result, estimates=[replace(r, note=joined(note, r.note)) for r in result.estimates])
     if not (is_default and surface.is_complete and surface.heights.size <= LARGE):

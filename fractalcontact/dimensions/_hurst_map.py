@@ -13,6 +13,7 @@ from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._filled_points import filled_points, with_gaps
+from fractalcontact.dimensions._height_gaps import without_height_gaps
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, joined, undefined
@@ -112,7 +113,8 @@ def hurst_map(
             whole = read_surfaces(single)[0]
             without, waves = without_waves(whole)
             without, filled = with_gaps(without, filled_points(whole))
-            if found := joined(waves, filled):
+            without, limited = without_height_gaps(without)
+            if found := joined(waves, filled, limited):
                 single, notes = single.copy(data=without.heights * without.unit), [*notes, found]
         of_plane = []
         for row in rows:

@@ -48,6 +48,7 @@ from fractalcontact.dimensions._free_edges import (
     without_offsets,
     without_small_gaps,
 )
+from fractalcontact.dimensions._height_gaps import without_height_gaps
 from fractalcontact.dimensions._heterogeneity import Heterogeneity, heterogeneity
 from fractalcontact.dimensions._increment_moments import increment_moments
 from fractalcontact.dimensions._increments import without_steps
@@ -137,10 +138,11 @@ def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None 
     filled = None if made else filled_points(surface)
     surface, wave_note = without_waves(surface)
     surface, gap_note = with_gaps(surface, filled)
+    surface, limit_note = without_height_gaps(surface)
     estimate = _fitted(surface, scales, noise, psf)
     if scales is not None and not noise and psf is None:
         estimate = _within_scales(estimate, surface, scales)
-    estimate = replace(estimate, note=joined(wave_note, gap_note, estimate.note))
+    estimate = replace(estimate, note=joined(wave_note, gap_note, limit_note, estimate.note))
     if made and not estimate.reason:
         return replace(estimate.without_interval(made), note=joined(made, estimate.note))
     return estimate
