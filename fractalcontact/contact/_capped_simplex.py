@@ -12,9 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.contact._scaled_problem import sum_by_rows
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_NEWTON_STEPS = 200
+MAX_FORCE_CORRECTIONS = 50
 
 
 def project_onto_capped_simplex(q: Array, force: float, p_max: float) -> Array:
@@ -49,3 +52,24 @@ def uniform_on_lowest(level: Array, force: float, p_max: float) -> Array:
     pressure = np.zeros(level.shape)
     pressure.ravel()[np.argpartition(level.ravel(), count - 1)[:count]] = force / count
     return pressure
+
+
+def scale_to_force(p: Array, level: Array, p_max: Any, force: float, epsilon: float) -> None:
+    """Scale the pressures below p_max, in place, until they add up to `force`.
+
+    Where none can be scaled, the force is put on the nodes of lowest level.
+    """
+    for _ in range(MAX_FORCE_CORRECTIONS):
+        total = sum_by_rows(p)
+        if abs(total - force) <= epsilon * force:
+            return
+        below = p < p_max
+        scalable = sum_by_rows(np.where(below, p, 0)) if p_max < np.inf else total
+        if scalable <= 0 or total - scalable >= force:
+            break
+        factor = p.dtype.type((force - (total - scalable)) / scalable)
+        np.multiply(p, factor, out=p, where=below)
+        np.minimum(p, p_max, out=p)
+        if p_max == np.inf:
+            return
+    p[...] = uniform_on_lowest(level, force, float(p_max))

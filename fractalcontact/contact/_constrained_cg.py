@@ -82,10 +82,14 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
-from fractalcontact.contact._capped_simplex import project_onto_capped_simplex, uniform_on_lowest
-from fractalcontact.contact._operator import Operator, PeriodicOperator
-from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet, Preconditioner
-from fractalcontact.contact._scaled_problem import Control, Problem, Solution, sum_by_rows
+from fractalcontact.contact._capped_simplex import (
+    project_onto_capped_simplex,
+    scale_to_force,
+    uniform_on_lowest,
+)
+from fractalcontact.contact._contact_system import ContactSystem
+from fractalcontact.contact._preconditioner import FreeSet
+from fractalcontact.contact._scaled_problem import Control, Solution, sum_by_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -98,48 +102,10 @@ SMALLER_PLANES = 4.0  # times as many at most on smaller planes: spikes that yie
 PATIENCE = 40  # iterations without progress
 SMALLEST_FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
 MAX_HALVINGS = 20
-MAX_FORCE_CORRECTIONS = 50
 # elements at a time, which stay in the cache; threads that take fewer wait for each other's calls of NumPy
 STRIP = 1 << 17
 ROUNDING_OF_STEPS = 0.01  # share of the tolerance: what rounding may add to a displacement that follows steps
 RELEASED: Array = np.empty((0, 0))  # stands in for an array whose memory is free for the next one
-
-
-@dataclass(frozen=True)
-class ContactSystem:
-    """A contact problem on one set of nodes in one precision: what `ConstrainedCG` solves.
-
-    `h` (ny, nx) is the gap of all or a part of the surface; `local_compliance` is that of `Problem`.
-    """
-
-    h: Array
-    p_max: Any
-    operator: Operator
-    preconditioner: Preconditioner
-    local_compliance: float
-    dtype: Any
-
-    def __post_init__(self) -> None:
-        """Bring the gap and the bound into the precision of the system."""
-        object.__setattr__(self, "h", np.ascontiguousarray(self.h, dtype=self.dtype))
-        object.__setattr__(self, "p_max", self.dtype(self.p_max))
-
-    @classmethod
-    def on_plane(
-        cls,
-        problem: Problem,
-        dtype: Any,
-        local_compliance: float | None = None,
-        operator: Operator | None = None,
-    ) -> ContactSystem:
-        """Return the system of all nodes of a problem; its operator may be given."""
-        body = problem.body
-        operator = operator or body.operator(dtype)
-        # that of a periodic body serves both, with its array of the modes
-        multiplier = operator.multiplier if isinstance(operator, PeriodicOperator) else None
-        preconditioner = ExtensionPreconditioner(body, dtype, multiplier)
-        scale = problem.local_compliance if local_compliance is None else local_compliance
-        return cls(problem.gap, problem.p_max, operator, preconditioner, scale, dtype)
 
 
 @dataclass
@@ -279,7 +245,7 @@ class ConstrainedCG:
     def initialise(self) -> None:
         """Give the first pressure the imposed force, or the best multiple under the imposed closure."""
         if self.force_controlled:
-            self.enforce_force()
+            scale_to_force(self.p, self.h, self.p_max, self.control.value, self.epsilon)
             self.update_displacement()
             return
         self.update_displacement()
@@ -288,24 +254,6 @@ class ConstrainedCG:
         if factor > 0 and float(self.p.max()) * factor < self.p_max:
             self.p *= self.dtype(factor)
             self.u *= self.dtype(factor)
-
-    def enforce_force(self) -> None:
-        """Scale the pressures below p_max until their sum is the imposed force."""
-        imposed = self.control.value
-        for _ in range(MAX_FORCE_CORRECTIONS):
-            force = sum_by_rows(self.p)
-            if abs(force - imposed) <= self.epsilon * imposed:
-                return
-            below = self.p < self.p_max
-            scalable = sum_by_rows(np.where(below, self.p, 0)) if self.p_max < np.inf else force
-            if scalable <= 0 or force - scalable >= imposed:
-                break
-            factor = self.dtype((imposed - (force - scalable)) / scalable)
-            np.multiply(self.p, factor, out=self.p, where=below)
-            np.minimum(self.p, self.p_max, out=self.p)
-            if self.p_max == np.inf:
-                return
-        self.p[...] = uniform_on_lowest(self.h, imposed, float(self.p_max))
 
     def update_displacement(self) -> None:
         """Compute u = K p anew (10)."""

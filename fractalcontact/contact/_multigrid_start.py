@@ -15,7 +15,8 @@ import numpy as np
 
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.contact import _influence
-from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
+from fractalcontact.contact._constrained_cg import ConstrainedCG
+from fractalcontact.contact._contact_system import ContactSystem
 from fractalcontact.contact._scaled_problem import Body, Control, Problem
 
 Array = np.ndarray[Any, np.dtype[Any]]

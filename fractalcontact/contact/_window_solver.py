@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
+from fractalcontact.contact._constrained_cg import ConstrainedCG
+from fractalcontact.contact._contact_system import ContactSystem
 from fractalcontact.contact._multigrid_start import cold_start
 from fractalcontact.contact._operator import FreeOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table

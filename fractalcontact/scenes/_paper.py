@@ -11,7 +11,7 @@ from fractalcontact.base.tables import Note, Part, Table, table, text_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _paper_findings as findings
 from fractalcontact.scenes._caveats import member_count, of_member
-from fractalcontact.scenes._paper_study import NO, NOT_TESTED, YES, Finding
+from fractalcontact.scenes._paper_study import NO, NOT_TESTED, YES, Finding, with_whole_block
 
 
 class Claim(NamedTuple):
@@ -69,7 +69,7 @@ def paper_parts(tree: xr.DataTree) -> list[Part]:
         return []
     members = member_count(tree)
     studies = [of_member(tree, number) for number in range(members)] if members else [tree]
-    studies = [findings.with_whole_block(study) for study in studies]
+    studies = [with_whole_block(study) for study in studies]
     column = f"member 0 of {members}" if members else "this study"
     rows = [("section", "claim of the paper", column, "verdict")]
     for claim in CLAIMS:

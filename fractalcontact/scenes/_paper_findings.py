@@ -34,7 +34,9 @@ from fractalcontact.scenes._paper_study import (
     nearest,
     quantities,
     read_closure,
+    read_greatest_load,
     read_rigid,
+    read_whole_block,
     span,
     towards_west,
     trend,
@@ -58,7 +60,6 @@ STRONG_FLOW = 10.0
 UNCORRELATED = float(np.exp(-1.0))  # the correlation that defines the decorrelation length
 FEW_ROUNDS = 6
 SAME_CLOSURE = 0.1
-WHOLE_BLOCK = "whole_block"  # group of the box counts that several claims share
 MIN_CELLS = 30  # fewer cells in contact give no area to fit
 
 
@@ -205,7 +206,7 @@ def domain_grows(tree: xr.DataTree) -> Finding | None:
 
 
 def domain_grows_whole(tree: xr.DataTree) -> Finding | None:
-    pair = _whole_block(tree)
+    pair = read_whole_block(tree)
     if pair is None or pair[0].shape[1] < 2:
         return None
     return _growth(*pair)
@@ -250,63 +251,15 @@ def domain_falls(tree: xr.DataTree) -> Finding | None:
     return trend(f"{listed(dimension, '.2f')}; null {listed(null, '.2f')}", dimension[:, None], -1)
 
 
-def _states(tree: xr.DataTree) -> xr.DataArray | None:
-    """Return the maps of contact over shear > 0 and step; None where the study did not keep them."""
-    if read_closure(tree, "joints/closure", "contact_fraction") is None:
-        return None
-    data = towards_west(tree["joints/closure"].to_dataset())
-    if "state" not in data:
-        return None
-    states = data["state"].transpose("shear", "step", "y", "x")
-    return states.isel(shear=np.flatnonzero(np.asarray(states["shear"].values) > 0))
-
-
-def with_whole_block(tree: xr.DataTree) -> xr.DataTree:
-    """Return a study with its domains counted in boxes from one cell to the block, where it kept the maps.
-
-    Several claims are about this dimension over (shear > 0, step).
-    """
-    states = _states(tree)
-    if states is None:
-        return tree
-    from fractalcontact import domains
-
-    edge = min(states.sizes["y"], states.sizes["x"])
-    boxes = domains.box_dimension(states, scales=[size for size in range(1, edge + 1) if edge % size == 0])
-    extended = tree.copy(deep=False)
-    extended[WHOLE_BLOCK] = xr.DataTree(boxes[["box_dimension", "null_dimension"]])
-    return extended
-
-
-def _whole_block(tree: xr.DataTree) -> tuple[Array, Array] | None:
-    """Return the dimension counted over the whole block and that of its null, over (shear > 0, step)."""
-    boxes = group_of(tree, WHOLE_BLOCK)
-    if boxes is None:
-        return None
-    values = (boxes[name].transpose("shear", "step").values for name in ("box_dimension", "null_dimension"))
-    dimension, null = map(np.asarray, values)
-    return dimension, null
-
-
-def _greatest_load(tree: xr.DataTree) -> tuple[Array, Array] | None:
-    """Return the same at the greatest pressure of the paper, at the shears up to .80 mm."""
-    closure, pair = read_closure(tree, "joints/closure", "contact_fraction"), _whole_block(tree)
-    steps = None if closure is None else closure.steps()
-    if closure is None or steps is None or pair is None:
-        return None
-    rows = closure.up_to(PLATEAU)
-    return pair[0][rows, steps[-1]], pair[1][rows, steps[-1]]
-
-
 def domain_falls_whole(tree: xr.DataTree) -> Finding | None:
-    pair = _greatest_load(tree)
+    pair = read_greatest_load(tree)
     if pair is None:
         return None
     return trend(f"{listed(pair[0], '.2f')}; null {listed(pair[1], '.2f')}", pair[0][:, None], -1)
 
 
 def domain_falls_beyond_null(tree: xr.DataTree) -> Finding | None:
-    pair = _greatest_load(tree)
+    pair = read_greatest_load(tree)
     if pair is None or pair[0].size < 2:
         return None
     fall, null = (float(values[0] - values[-1]) for values in pair)

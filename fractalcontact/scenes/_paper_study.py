@@ -23,6 +23,8 @@ FLAT_DIRECTIONS, RISING_DIRECTIONS = ("W", "N"), ("E", "S")
 
 SAME_POINT = 0.01  # relative difference of a load or a shear from that of the paper
 
+WHOLE_BLOCK = "whole_block"  # group of the box counts that several claims share
+
 YES, NO, NOT_TESTED, BY_CONSTRUCTION = "yes", "no", "not tested", "by construction"
 
 
@@ -75,6 +77,54 @@ def towards_west(data: xr.Dataset) -> xr.Dataset:
         return data
     names = [str(name) for name in data["direction"].values]
     return data.isel(direction=names.index("W") if "W" in names else 0)
+
+
+def contact_maps(tree: xr.DataTree) -> xr.DataArray | None:
+    """Return the maps of contact over shear > 0 and step; None where the study did not keep them."""
+    if read_closure(tree, "joints/closure", "contact_fraction") is None:
+        return None
+    data = towards_west(tree["joints/closure"].to_dataset())
+    if "state" not in data:
+        return None
+    states = data["state"].transpose("shear", "step", "y", "x")
+    return states.isel(shear=np.flatnonzero(np.asarray(states["shear"].values) > 0))
+
+
+def with_whole_block(tree: xr.DataTree) -> xr.DataTree:
+    """Return a study with its domains counted in boxes from one cell to the block, where it kept the maps.
+
+    Several claims are about this dimension over (shear > 0, step).
+    """
+    states = contact_maps(tree)
+    if states is None:
+        return tree
+    from fractalcontact import domains
+
+    edge = min(states.sizes["y"], states.sizes["x"])
+    boxes = domains.box_dimension(states, scales=[size for size in range(1, edge + 1) if edge % size == 0])
+    extended = tree.copy(deep=False)
+    extended[WHOLE_BLOCK] = xr.DataTree(boxes[["box_dimension", "null_dimension"]])
+    return extended
+
+
+def read_whole_block(tree: xr.DataTree) -> tuple[Array, Array] | None:
+    """Return the dimension counted over the whole block and that of its null, over (shear > 0, step)."""
+    boxes = group_of(tree, WHOLE_BLOCK)
+    if boxes is None:
+        return None
+    values = (boxes[name].transpose("shear", "step").values for name in ("box_dimension", "null_dimension"))
+    dimension, null = map(np.asarray, values)
+    return dimension, null
+
+
+def read_greatest_load(tree: xr.DataTree) -> tuple[Array, Array] | None:
+    """Return both dimensions at the greatest pressure of the paper, at the shears up to .80 mm."""
+    closure, pair = read_closure(tree, "joints/closure", "contact_fraction"), read_whole_block(tree)
+    steps = None if closure is None else closure.steps()
+    if closure is None or steps is None or pair is None:
+        return None
+    rows = closure.up_to(PLATEAU)
+    return pair[0][rows, steps[-1]], pair[1][rows, steps[-1]]
 
 
 class Rigid(NamedTuple):
