@@ -23,7 +23,7 @@ LEAST_LAGS = 14  # a curve of four coefficients, eight harmonics, and two to spa
 LARGEST_LOG_RATIO = 5.0
 UNCORRELATED = "heights without correlation have no anisotropy ratio"
 RIDGES = (
-    "no anisotropy ratio in the range of the fit is large enough: ridges continue along the azimuth, or "
+    "the anisotropy is stronger than any ratio that the fit can find: ridges continue along the azimuth, or "
     "spikes stand out"
 )
 SMOOTH = "a surface smoother than a fractal one: the scatter of its second differences is unknown"

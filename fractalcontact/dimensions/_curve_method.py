@@ -24,7 +24,9 @@ from fractalcontact.dimensions._surface_input import Scales, Surface, between
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _CORRELATED = "the points of the curve are correlated, so the scatter about a straight line gives no interval"
-_INCOMPLETE = "points are missing; the covariance holds for complete heights"
+_INCOMPLETE = (
+    "points are missing: the covariance, from which the interval follows, is known for complete heights only"
+)
 _LOWEST, _HIGHEST = 0.02, 0.98  # H at which the covariance is taken
 
 
@@ -192,8 +194,8 @@ class _Line:
             low, high = min(low, *halves), max(high, *halves)
             note = joined(
                 note,
-                f"the exponent changes with scale ({z:+.1f} standard deviations): the interval holds that of "
-                "both halves of the curve",
+                f"the exponent changes with scale ({z:+.1f} standard deviations): the interval holds the "
+                "exponents of both halves of the curve",
             )
         return replace(
             estimate, hurst=hurst, standard_error=error, ci_low=low, ci_high=high, reason="", note=note

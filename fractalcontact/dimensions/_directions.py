@@ -80,8 +80,10 @@ _BENT = 2.0  # standard deviations of the curvature from which on blur and noise
 _FAR_BENT = 10.0  # the same from which on the lags give no anisotropy ratio
 _LEFT = 0.1  # of a mean square difference, which noise must leave
 _NO_VARIATION = "the heights do not vary along this direction"
-_NO_MODEL = "the surface is not an anisotropic fractional Brownian one, and no model gives the scatter"
-_BLURRED = "the power law of the lags is bent, as by a blur, which changes their ratio: see `scales`"
+_NO_MODEL = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
+_BLURRED = (
+    "over the lags there is no power law, as with blur, and the ratio would be wrong: give longer `scales`"
+)
 _FITTED = ("hurst", "standard_error")
 _FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
 
@@ -411,7 +413,7 @@ def _along(
     note = ""
     if instrument is not None:
         error = float(np.hypot(error, instrument.standard_error))
-        note = "blur and noise of the surface are taken out, as `estimate` finds them"
+        note = "corrected for the blur and noise that `estimate` finds"
     low, high = normal_interval(exponent, error)
     if anisotropy is not None and abs(anisotropy.curvature_z) > SIGNIFICANT:
         for start in range(len(weights) - 1):
@@ -420,7 +422,7 @@ def _along(
             low, high = min(low, part_low), max(high, part_high)
         note = (
             f"the exponent changes with the lag ({anisotropy.curvature_z:+.1f} standard deviations): the "
-            "interval holds those between the shorter and between the longer lags"
+            "interval holds the exponents of the shorter and of the longer lags"
         )
     # a second difference over one lag has 4 - 4^H times the mean square of a first one
     first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan

@@ -323,7 +323,7 @@ def _roughness_covariance(surface: Surface, curve: Curve, hurst: float) -> Array
     if any(surface.grid.periodic):
         return _PERIODIC
     if min(surface.grid.extent) < _LEAST_WINDOWS * max(surface.grid.spacing):
-        return "the windows of so small a surface are too few"
+        return "so small a surface holds too few windows"
     return _roughness_length.roughness_covariance(curve.edges, surface.shape, hurst)
 
 

@@ -254,8 +254,8 @@ def without_form(heights: Array, power: Array) -> tuple[Array, Array, str]:
         return heights, power, ""
     flat = heights - level * y[:, None] * x
     note = (
-        f"a form with the product x y holds {100.0 * share:.0f} % of the mean square and is removed, as by "
-        "`surfaces.level` of order 2"
+        f"a twist, the product x y, holds {100.0 * share:.0f} % of the mean square height and is removed, as "
+        "`surfaces.level` of order 2 does"
     )
     return flat, mode_power(flat), note
 

@@ -111,7 +111,7 @@ def heterogeneity(moments: Moments, spacing: tuple[float, ...], hurst: float) ->
         low, high = (float(q) for q in np.quantile(exponents, (0.25, 0.75)))
         notes.append(
             "the exponent differs from part to part of the surface: the interval holds the middle half of "
-            f"them, {low:.2f} to {high:.2f}"
+            f"their exponents, {low:.2f} to {high:.2f}"
         )
     return Heterogeneity(widening, low, high, "; ".join(notes), levels_differ)
 

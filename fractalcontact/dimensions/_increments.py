@@ -113,8 +113,8 @@ def without_steps(heights: Array, spacing: tuple[float, float], full_hurst: floa
         low - allowance,
         high + allowance,
         rms_increment=fit.rms_increment,
-        window="increments over 1, 2 and 4 spacings beside the steps",
-        note=f"steps, scratches or spikes cross {100.0 * float(cells.mean()):.0f} % of the surface, which "
+        window="increments over 1, 2 and 4 spacings that cross no step",
+        note=f"steps, scratches or spikes cross {100.0 * float(cells.mean()):.0f} % of the surface and "
         f"are left out; with them the exponent is {full_hurst:.2f}",
     )
 
@@ -162,7 +162,7 @@ def _without_quantisation(
     interval = normal_interval(fit.hurst, fit.standard_error * fit.inflation)
     if not np.isfinite(fit.hurst):
         interval = (np.nan, 1.0)
-    return interval, quantisation_note(share, "that of increments without the contribution of rounding")
+    return interval, quantisation_note(share, "the exponent without the contribution of rounding")
 
 
 def _no_interval(surface: Surface, noise: bool) -> str:
@@ -208,8 +208,8 @@ class ClosedForm:
             return low, high, ""
         noise_low, noise_high = normal_interval(*self.with_noise)
         note = (
-            f"the exponent changes with the lag ({self.noise_z:+.1f} standard deviations of white noise): "
-            f"the interval also holds that of increments less such noise, {self.with_noise[0]:.2f}"
+            f"the exponent changes with the lag ({self.noise_z:+.1f} standard deviations): the interval also "
+            f"holds the exponent with white noise fitted, {self.with_noise[0]:.2f}"
         )
         return min(low, noise_low), max(high, noise_high), note
 

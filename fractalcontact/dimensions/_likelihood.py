@@ -101,20 +101,20 @@ _LINEAR = (
 )
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
 _SEPARABLE = (
-    "the heights vary along one axis only, or are a sum f(x) + g(y), which no surface of one "
-    "exponent is: estimate profiles, or see `directions`"
+    "the heights vary along one axis only, or are a sum f(x) + g(y), as no fractal surface is: estimate "
+    "profiles, or see `directions`"
 )
 _REPEATED = (
     "many rows or columns repeat their neighbours: the surface was enlarged, and the short waves are those "
     "of its blocks; remove the repeated ones, or give `scales` from eight blocks on"
 )
 _PERIODIC_GAPS = (
-    "a periodic surface with gaps, or with one periodic axis, is treated as free, and the interval is for "
-    "another family than its own: see fractalcontact.surfaces.fill"
+    "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "
+    "another kind of surface; see fractalcontact.surfaces.fill"
 )
 _OR_PLAIN = (
-    "blur, noise or a second exponent is not certain: the exponent is averaged with that of none, and the "
-    "interval holds both"
+    "blur, noise or a second exponent is uncertain: the exponent is averaged over the fits with and "
+    "without it, and the interval holds both"
 )
 _OR_SECOND = (
     "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
@@ -472,8 +472,8 @@ def _allowing_scales(estimate: Estimate, free: FreeEdges, window: Window, misfit
     explained = Explanations(fit, frame_blocks(window.power, window.frame))
     low, high = alternatives(explained, is_bent=False)
     note = (
-        f"the exponent may change with scale ({misfit:+.1f} standard deviations): the interval holds those "
-        "that blur, noise or a second exponent would give"
+        f"the exponent may change with scale ({misfit:+.1f} standard deviations): the interval holds the "
+        "exponents that blur, noise or a second exponent would give"
     )
     return estimate.holding(low, high, note)
 

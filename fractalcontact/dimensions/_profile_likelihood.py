@@ -68,7 +68,8 @@ _LEAST_POINTS = 64  # of a profile whose blur is looked for
 _LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
 _LEAST_CROSSOVER = 4.0  # spacings: two exponents must share an octave
 _OR_ONE = (
-    "one exponent at all scales is not excluded: it is averaged with the other, and the interval holds both"
+    "a single exponent at all scales is not excluded: the exponent is averaged over both fits, and the "
+    "interval holds both"
 )
 _OTHERS = "other explanations are nearly as likely: the interval holds their exponents"
 _WIDEST = 0.25  # half-width of the exponent of the rougher of two profiles
@@ -147,7 +148,7 @@ def _profile_modes(
     frame = _mode_blocks.frame((heights.size,), (1.0,))
     modes = _mode_blocks.profile_modes(heights) ** 2
     if (share := _largest_share(modes)) > _SINGLE:
-        reason = f"a single wave holds {100.0 * share:.0f} % of the shorter waves: no fractal"
+        reason = f"a single wave holds {100.0 * share:.0f} % of the power of the shorter waves: not a fractal"
         return undefined(reason), none, np.inf
     fit = fit_blurred(modes, frame, noise=noise, spread=spread, chosen=chosen_blocks(frame, surface, scales))
     blurred, is_blurred = None, fit is not None and is_seen(fit, surface.axes, spread)

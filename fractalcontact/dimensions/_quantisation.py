@@ -59,4 +59,4 @@ def quantisation_note(share: float, interval: str) -> str:
 def rounding_note(heights: Array, error: float) -> str:
     """Return a note where the heights were rounded so coarsely that it matters; empty otherwise."""
     share = quantisation(heights)[1]
-    return quantisation_note(share, "that of a fit with white noise") if share > 0.5 * error else ""
+    return quantisation_note(share, "the exponent of a fit with white noise") if share > 0.5 * error else ""

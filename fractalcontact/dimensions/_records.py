@@ -72,15 +72,17 @@ class Estimate:
         if self.note:
             return self.note
         differ = abs(hurst - self.hurst) > _DIFFERENT * float(np.hypot(error, self.standard_error))
-        return f"{self.hurst:.2f}, without offsets of rows and columns" if differ else ""
+        return f"{self.hurst:.2f}, which offsets of rows or columns do not change" if differ else ""
 
     def beside_modes(self, by_modes: Estimate, found: str) -> Estimate:
         """Widen an interval for fractional Brownian heights where the modes show others."""
         if not (found and np.isfinite(self.ci_low)):
             return self
         if not np.isfinite(by_modes.ci_low):
-            return self.without_interval(f"`likelihood` gives none: {found}")
-        note = f"the interval, of fractional Brownian heights, also holds that of `likelihood`: {found}"
+            return self.without_interval(f"`likelihood` gives no interval: {found}")
+        note = (
+            f"the interval assumes fractional Brownian heights, and also holds that of `likelihood`: {found}"
+        )
         return self.holding(by_modes.ci_low, by_modes.ci_high, note)
 
     def averaged(self, other: Estimate, share: float, note: str) -> Estimate:

@@ -52,9 +52,9 @@ _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
 _AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
-_TWO_WINDOW = "the waves in which the rougher of two surfaces is the stronger"
+_TWO_WINDOW = "the short waves, in which the rougher of two added surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
-NO_ALIASES = "there are no waves beyond the sampling, as in a crop of a periodic surface"
+NO_ALIASES = "there are no waves shorter than two spacings, as in a crop of a periodic surface"
 _OR_ROLLOFF = "a slow roll-off explains the waves nearly as well: the interval holds its exponent"
 _OR_NOISE = "blur and noise explain the waves nearly as well: the interval holds their exponent"
 

@@ -86,7 +86,7 @@ def fit_interval(
             noise_note = ", and that of a fit with white noise"
         notes.append(
             f"the exponent changes with scale ({result.misfit:+.1f} standard deviations): "
-            f"the interval holds that of the longer and of the shorter half of the modes{noise_note}"
+            f"the interval holds the exponents of the longer and of the shorter half of the modes{noise_note}"
         )
     scatter = modes.scatter(result)
     if scatter < -UNEVEN:
