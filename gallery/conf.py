@@ -78,6 +78,7 @@ PAGES = (
     "citation",
     "howto",
     "faq",
+    "getting_help",
     "validation",
     "speed",
     "scene_files",

@@ -125,6 +125,10 @@ _NOT_ACHIEVED = ("parameters", "version", "fft", "threads", "random", "file_sha2
 def _single_call(entry: dict[str, Any]) -> str:
     """Return the call of a single result with its run time and its achieved errors."""
     facts = {key: value for key, value in entry.items() if key not in _NOT_ACHIEVED and value is not None}
+    earlier = facts.pop("before", None)  # the calls that made the input, the last one first
+    while isinstance(earlier, dict):
+        facts["after"] = f"{facts.get('after', '')} {earlier.get('call', '')}".strip()
+        earlier = earlier.get("before")
     return ", ".join(f"{key.replace('_', ' ')} {_short(value)}" for key, value in facts.items())
 
 
