@@ -1,10 +1,15 @@
 """A small sound scene, and the command run as a user runs it."""
 
+import contextlib
 import functools
 import importlib
+import io
 import os
 import subprocess
 import sys
+import warnings
+
+from fractalcontact.cli import main
 
 SOUND = """
 title = "a small study"
@@ -37,6 +42,15 @@ def command(*words):
         check=False,
         env=environment,
     )
+
+
+def command_here(*words):
+    """Run the command in this process: most of a short command is the import of the libraries."""
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), warnings.catch_warnings():
+        warnings.simplefilter("default")
+        code = main([str(word) for word in words])
+    return subprocess.CompletedProcess(words, code, out.getvalue(), error.getvalue())
 
 
 # the public functions that the stages of a study call

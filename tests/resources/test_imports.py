@@ -7,7 +7,6 @@ import sys
 import time
 import tracemalloc
 from collections import Counter
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -93,40 +92,27 @@ WANTED = {
 COMPILED = {
     "rigid": {},
     "dimension": {"dimensions": 1},
+    "pressed": {"contact": 8},
     "closure": {"contact": 10},
     "paper": {"dimensions": 1, "domains": 3, "contact": 10},
 }
 
 
-@pytest.fixture(scope="module")
-def reports(tmp_path_factory):
-    """Return what each study imported and compiled; each is run once for all tests."""
-
-    @cache
-    def report(name, number=0):
-        folder = tmp_path_factory.mktemp(f"{name}_{number}")
-        return command_report("run", scene(folder, WANTED[name][0]), "-o", folder / "out", "--quiet")
-
-    return report
-
-
 @pytest.mark.parametrize("name", list(WANTED))
-def test_only_required_subpackages_are_imported(reports, name):
-    report = reports(name)
-    assert set(report["subpackages"]) & set(SUBPACKAGES) == WANTED[name][1]
+def test_only_required_subpackages_and_kernels_are_loaded(tmp_path, name):
+    text, subpackages = WANTED[name]
+    report = command_report("run", scene(tmp_path, text), "-o", tmp_path / "out", "--quiet")
+    assert set(report["subpackages"]) & set(SUBPACKAGES) == subpackages
     assert not {"matplotlib", "skimage", "dask.distributed", "tqdm"} & set(report["modules"])
-
-
-@pytest.mark.parametrize("name", list(COMPILED))
-def test_only_required_kernels_are_compiled_each_for_one_type(reports, name):
-    kernels = reports(name)["kernels"]
+    kernels = report["kernels"]
     assert Counter(kernel.partition(".")[0] for kernel in kernels) == COMPILED[name], list(kernels)
     assert all(forms == 1 for forms, _ in kernels.values())
 
 
-def test_second_run_compiles_nothing(reports):
-    reports("closure")
-    assert compilations(reports("closure", 1)) == 0
+def test_second_run_compiles_nothing(tmp_path):
+    path = scene(tmp_path, SOUND)
+    fc.scenes.run(path, progress=False)  # in this process, which fills the cache of the next one
+    assert compilations(command_report("run", path, "-o", tmp_path / "out", "--quiet")) == 0
 
 
 LONG = """

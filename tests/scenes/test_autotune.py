@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from study import SOUND, command
+from study import SOUND, command_here
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
@@ -161,10 +161,10 @@ def test_invalid_error_or_budget_is_refused(tmp_path, top):
 
 def test_selection_is_in_the_summary_and_in_the_file(tmp_path):
     scene(tmp_path, "error = 0.05\n")
-    done = command("run", tmp_path / "study.toml", "-o", tmp_path / "out")
+    done = command_here("run", tmp_path / "study.toml", "-o", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "selected: joint.tolerance" in done.stdout
-    assert "joint.tolerance" in command("info", tmp_path / "out" / "result.nc").stdout
+    assert "joint.tolerance" in command_here("info", tmp_path / "out" / "result.nc").stdout
 
 
 def test_shipped_curves_cover_the_methods():

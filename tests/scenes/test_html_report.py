@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from PIL import Image
-from study import SOUND, command
+from study import SOUND, command_here
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -178,7 +178,9 @@ def test_large_maps_show_the_highest_flag_of_a_block(tmp_path):
 
 def test_command_writes_report_and_csv(study, tmp_path):
     _, out = study
-    answer = command("report", out / "result.nc", "-o", tmp_path / "again.html", "--csv", tmp_path / "csv")
+    answer = command_here(
+        "report", out / "result.nc", "-o", tmp_path / "again.html", "--csv", tmp_path / "csv"
+    )
     assert answer.returncode == 0, answer.stderr
     assert "maps" in Page((tmp_path / "again.html").read_text(encoding="utf-8")).sections
     assert (tmp_path / "csv" / "joints_closure_by_shear_step.csv").is_file()

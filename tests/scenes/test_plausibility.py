@@ -4,7 +4,7 @@ import inspect
 import warnings
 
 import pytest
-from study import SOUND, command
+from study import SOUND, command_here
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, ScaleWarning
@@ -58,7 +58,7 @@ def test_validation_finds_the_problems_of_a_surface(tmp_path, old, new, word):
 
 
 def test_command_reports_problems_and_prints_no_plan(tmp_path):
-    done = command("run", "--plan", written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0")))
+    done = command_here("run", "--plan", written(tmp_path, SOUND.replace("block = 2.4e-3", "block = 5.0")))
     assert done.returncode == 2
     assert "block" in done.stderr
     assert not done.stdout

@@ -8,7 +8,7 @@ from concurrent.futures import Executor, Future
 import numpy as np
 import pytest
 import xarray as xr
-from study import SOUND, command, watch_calls
+from study import SOUND, command_here, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -204,16 +204,16 @@ def test_summary_and_info_print_the_main_results(study, tmp_path, monkeypatch):
         "joints/closure",
     ):
         assert word in text
-    done = command("info", out / "result.nc")
+    done = command_here("info", out / "result.nc")
     assert done.returncode == 0
     for word in ("/joints/closure", "interface_closure", "[m]", "residual", "run time"):
         assert word in done.stdout
     (tmp_path / "broken.nc").write_text("no")
-    assert command("info", tmp_path / "broken.nc").returncode == 2
+    assert command_here("info", tmp_path / "broken.nc").returncode == 2
 
 
 def test_command_lists_methods():
-    done = command("methods")
+    done = command_here("methods")
     assert done.returncode == 0
     for name in ("spectrum", "variogram", "cube_counts"):
         assert name in done.stdout

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from study import SOUND, command
+from study import SOUND, command, command_here
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
@@ -123,7 +123,7 @@ def test_shipped_scenes_are_found_by_name_and_valid(name, tmp_path, monkeypatch)
 )
 def test_command_refuses_with_code_2_and_writes_nothing(write, tmp_path, old, new, words):
     path = write(SOUND.replace(old, new))
-    done = command("run", path, "-o", tmp_path / "out")
+    done = command_here("run", path, "-o", tmp_path / "out")
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     for word in words:
@@ -218,7 +218,7 @@ def test_scene_of_a_wrong_type_is_refused(function):
 def test_unset_variable_and_missing_file_are_named(write, tmp_path):
     for name in ("${NO_SUCH_VARIABLE}/a.npy", "nothing.npy"):
         text = f"[surface]\nread = '{name}'\nspacing = 1e-4\n[want]\nsurfaces = ['describe']\n"
-        done = command("run", write(text), "-o", tmp_path / "out")
+        done = command_here("run", write(text), "-o", tmp_path / "out")
         assert done.returncode == 2
         assert name.removeprefix("${").partition("}")[0] in done.stderr
         if "$" in name:

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from study import SOUND, command
+from study import SOUND, command_here
 
 import fractalcontact as fc
 
@@ -146,7 +146,7 @@ def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch
 def test_command_fits_the_screen(monkeypatch):
     monkeypatch.setenv("COLUMNS", "72")
     for words in (("run", "--plan", "concrete_crack"), ("methods",)):
-        lines = command(*words).stdout.splitlines()
+        lines = command_here(*words).stdout.splitlines()
         assert 50 < max(map(len, lines)) <= 72
 
 
@@ -154,7 +154,7 @@ def test_last_line_of_a_run_fits_the_screen(monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", "60")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
-    done = command("run", "study.toml", "-o", "out")
+    done = command_here("run", "study.toml", "-o", "out")
     assert done.returncode == 0, done.stderr
     last = done.stdout[done.stdout.index("written to") :].splitlines()
     assert max(map(len, last)) <= 60

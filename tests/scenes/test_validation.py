@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from study import SOUND, command, watch_calls
+from study import SOUND, command, command_here, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -72,7 +72,7 @@ def test_invalid_client_is_refused():
 
 def test_accuracy_refuses_an_unwritable_folder_first(tmp_path):
     (tmp_path / "out").write_text("a file")
-    done = command("accuracy", "-o", tmp_path / "out")
+    done = command_here("accuracy", "-o", tmp_path / "out")
     assert done.returncode == 2
     assert "expected a folder" in done.stderr
 
