@@ -114,6 +114,38 @@ def whiten(start: int, stop: int, covariances: Array, columns: Array, log_determ
 
 
 @kernel
+def innovations(covariance: Array, columns: Array, log_determinant: Array) -> None:
+    """Do what `whiten` does for one chunk of stationary increments (n, k), given their covariance by lag.
+
+    Durbin and Levinson: the errors of the best prediction from all earlier ones, over their deviation.
+    """
+    n, k = columns.shape
+    weights, earlier, heights = np.zeros(n), np.zeros(n), columns.copy()
+    variance, total = covariance[0], 0.0
+    for t in range(n):
+        if t > 0:
+            reflection = covariance[t]
+            for j in range(1, t):
+                reflection -= weights[j] * covariance[t - j]
+            reflection /= variance
+            earlier[:t] = weights[:t]
+            for j in range(1, t):
+                weights[j] -= reflection * earlier[t - j]
+            weights[t] = reflection
+            variance *= 1.0 - reflection * reflection
+        if not variance > 0.0:
+            total = float("nan")
+            break
+        total += log(variance)
+        for j in range(1, t + 1):
+            for m in range(k):
+                columns[t, m] -= weights[j] * heights[t - j, m]
+        for m in range(k):
+            columns[t, m] /= variance**0.5
+    log_determinant[0] = total
+
+
+@kernel
 def pair_sums(
     start: int,
     stop: int,

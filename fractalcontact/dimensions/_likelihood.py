@@ -54,6 +54,7 @@ from fractalcontact.dimensions._increment_moments import increment_moments
 from fractalcontact.dimensions._increments import without_steps
 from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._periodic_modes import periodic_likelihood
+from fractalcontact.dimensions._profile_increments import gapped_profile
 from fractalcontact.dimensions._profile_likelihood import profile_likelihood
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import (
@@ -170,7 +171,8 @@ def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) ->
         resolved = _fitted(surface, surface.resolved(scales), noise, psf)
         return replace(resolved, window=_RESOLVED_WINDOW)
     spread = None if psf is None else psf / surface.spacing[1]
-    family = profile_likelihood if surface.axes == 1 else _free_surface
+    of_profile = profile_likelihood if surface.is_complete else gapped_profile
+    family = of_profile if surface.axes == 1 else _free_surface
     estimate = family(surface, scales, noise, spread)
     if not any(surface.grid.periodic) or estimate.reason:
         return estimate

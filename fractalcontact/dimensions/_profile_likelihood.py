@@ -1,20 +1,18 @@
-"""Exact likelihood of a profile: Gaussian increments with their full covariance.
+"""Likelihood of a profile: exact where it is a fractional Brownian one, otherwise that of its cosine modes.
 
-The increments between successive observed points are Gaussian with a covariance that follows from the
-variogram, whatever the gaps. A tilt of the profile is a mean proportional to the gaps and is eliminated
-(restricted likelihood: Patterson and Thompson 1971, Biometrika 58). Long profiles are cut into chunks of
-`CHUNK` points, which are taken as independent; each has its own tilt.
+Blur and noise, a high-pass filter, a roll-off and several exponents are compared with one exponent. The modes
+of a profile are few: the interval holds the exponents of all explanations that are nearly as likely as the
+likeliest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions import _mode_blocks
+from fractalcontact.dimensions import _blur_fit, _mode_blocks
 from fractalcontact.dimensions._blur import (
     CLEAR,
     BlurredFit,
@@ -32,12 +30,10 @@ from fractalcontact.dimensions._exponent_by_scale import (
     octaves,
     run_estimate,
 )
-from fractalcontact.dimensions._heterogeneity import heterogeneity
-from fractalcontact.dimensions._increment_moments import increment_moments
-from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import LOWEST
-from fractalcontact.dimensions._quantisation import rounding_note
-from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
+from fractalcontact.dimensions._profile_increments import by_increments, without_jumps
+from fractalcontact.dimensions._quantisation import quantisation
+from fractalcontact.dimensions._records import Estimate, joined, undefined
 from fractalcontact.dimensions._rolloff import fit_rolloff, rolloff_estimate
 from fractalcontact.dimensions._second_exponent import (
     ALIKE,
@@ -52,18 +48,11 @@ from fractalcontact.dimensions._second_exponent import (
     two_estimate,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
-from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
+from fractalcontact.dimensions._transfer_functions import NONE, TRANSFER, Window, edge_power
+from fractalcontact.dimensions._whittle import QUANTILE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-CHUNK = 256
-SMALLEST = 8  # observed points
-_LOWEST, _HIGHEST = 1e-3, 0.999
-_AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smoother than fractal ones
-_SMOOTHEST = 1.9
-_TOLERANCE = 1e-4  # of the exponent
-_TILT = 20.0  # variance of a random tilt that is eliminated, in units of the largest covariance of increments
-_LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noise over the squared increment
 _LEAST_POINTS = 64  # of a profile whose blur is looked for
 _LONGEST_MODES, _NEIGHBOURS = 16, 8  # longest waves of a profile, and neighbours of a single shorter one
 _LEAST_CROSSOVER = 4.0  # spacings: two exponents must share an octave
@@ -75,6 +64,23 @@ _OTHERS = "other explanations are nearly as likely: the interval holds their exp
 _WIDEST = 0.25  # half-width of the exponent of the rougher of two profiles
 _FLAT = -0.5  # exponent of white noise: longer waves are no weaker
 _EVEN, _SURE = 13.0, 17.4  # decrease of the penalised deviance with half the weight, and with all of it
+_EXCESS = 4.0  # z of the power of waves shorter than those of a blur
+_LEAST_RATIO, _MOST_RATIO = 2.0, 1e3  # of their power over that of the model
+_ALIKE_FALL = 1.0  # logarithm of the squared transfer function up to which filters are alike
+_SHORTEST_ALIKE = 2.0  # wavenumber of such waves, rad per spacing
+_LITTLE_NOISE, _LEAST_ALIKE = 0.1, 14.0  # of the power of a wave; modes of such waves
+_DIFFERENT = (
+    0.5,
+    2.5,
+)  # standard errors from which the interval holds their exponent, and from which it does alone
+_OR_LONGER = "the longer waves have another exponent, which the interval holds: it may be no Gaussian filter"
+_NOT_GAUSSIAN = "a filter of another form than the Gaussian: the exponent is that of the longer waves"
+_NO_WAVES = "a filter of another form than the Gaussian leaves too few waves for an exponent"
+_MOST_ROUNDED = 0.5  # share of the mean square second difference that steps of rounding make
+_COARSE = (
+    "heights are rounded to steps larger than their increments, which is not white noise: store them with "
+    "more digits, or give `scales` of waves higher than many steps"
+)
 _SINGLE = 0.9  # share of the power beyond the longest that these may hold
 
 
@@ -83,56 +89,23 @@ def profile_likelihood(surface: Surface, scales: Scales, noise: bool, spread: fl
 
     Where that is not certain, the exponent is the mean of both.
     """
+    if scales is None and not surface.finest_scale:
+        if quantisation(surface.heights)[1] > _MOST_ROUNDED:
+            return undefined(_COARSE)
+        surface, jump_note = without_jumps(surface)
+        if jump_note:
+            estimate = profile_likelihood(surface, scales, noise, spread)
+            return replace(estimate, note=joined(jump_note, estimate.note))
     heights, other, held, gain = surface.heights[0], None, (np.nan, np.nan), np.inf
     if np.isfinite(heights).all() and heights.size >= _LEAST_POINTS and not surface.finest_scale:
         other, held, gain = _profile_modes(surface, scales, noise, spread)
     if other is not None and gain > _SURE:
         return other
-    exact = _by_increments(surface, scales, noise, held)
+    exact = by_increments(surface, scales, noise, held)
     if other is None or not exact.hurst < 1.0:
         return exact if other is None else other
     share = 1.0 / (1.0 + float(np.exp(0.5 * (gain - _EVEN))))
     return other.averaged(exact, share, _OR_ONE)
-
-
-def _by_increments(surface: Surface, scales: Scales, noise: bool, held: tuple[float, float]) -> Estimate:
-    """Return the estimate of the exact likelihood; its interval also holds `held`, unless that is NaN."""
-    heights, dx = surface.heights[0], surface.spacing[1]
-    stride = 1 if scales is None else max(1, int(np.ceil(scales[0] / dx * (1 - 1e-9))))
-    heights = heights[::stride]
-    longest = CHUNK if scales is None else int(scales[1] / (dx * stride) * (1 + 1e-9)) + 1
-    chunk = min(longest, CHUNK, int(np.isfinite(heights).sum()))
-    if chunk < SMALLEST:
-        return undefined(f"{chunk} points, at least {SMALLEST} are needed")
-    fit = fit_profile(heights, noise=noise, chunk=chunk)
-    window: dict[str, Any] = {
-        "scale_min": stride * dx,
-        "scale_max": (chunk - 1) * stride * dx,
-        "window": "exact likelihood of all increments" if scales is None else ASKED,
-    }
-    if fit.low > 1.0:
-        return Estimate(fit.hurst, ci_low=fit.low, ci_high=fit.high, **window)
-    moments = increment_moments([(heights[None], 1)], (heights.size,))
-    blocks = heterogeneity(moments, (1.0,), fit.hurst)
-    low, high = blocks.widened(fit.hurst, fit.low, fit.high)
-    low, high = float(np.fmin(low, held[0])), float(np.fmax(high, held[1]))
-    noise_note = ""
-    if not noise:
-        low, high, noise_note = closed_form(moments, (1.0,)).widened_for_noise(low, high)
-    rounding = "" if noise else rounding_note(heights[None], fit.standard_error)
-    if rounding:
-        with_noise = fit_profile(heights, noise=True, chunk=chunk)
-        low, high = min(low, with_noise.low), max(high, with_noise.high)
-    return Estimate(
-        fit.hurst,
-        fit.standard_error * blocks.widening,
-        low,
-        high,
-        rms_increment=fit.rms_increment * float(stride) ** -fit.hurst * surface.unit,
-        noise_height=float(np.sqrt(fit.noise)) * surface.unit if noise else np.nan,
-        note=joined(noise_note, blocks.note, rounding),
-        **window,
-    )
 
 
 def _profile_modes(
@@ -157,12 +130,56 @@ def _profile_modes(
         longest = heights.size * dx if scales is None else scales[1]
         blurred = blurred_estimate(fit, surface, scales, amplitude, longest)
     if scales is None and spread is None and not noise:
-        return _likeliest(frame_blocks(frame.mean(modes), frame), surface, fit, blurred)
+        means = frame.mean(modes)
+        if fit is not None and blurred is not None:
+            blurred = _beyond_filter(blurred, fit, Window(frame, np.ones(means.size, dtype=bool), means), dx)
+        return _likeliest(frame_blocks(means, frame), surface, fit, blurred)
     if is_blurred:
         return blurred, none, np.inf
     if blurred is None or noise or blurred.hurst > 1.0:
         return None, none, 0.0
     return None, (max(blurred.ci_low, 0.0), min(blurred.ci_high, 1.0)), 0.0
+
+
+def _beyond_filter(blurred: Estimate, fit: BlurredFit, every: Window, dx: float) -> Estimate:
+    """Return the estimate of a Gaussian blur, compared with the waves that all filters change alike.
+
+    To the second order in the wavenumber all filters are Gaussian. Those of another form have another
+    exponent in these longer waves, or more power in the shorter ones than a Gaussian leaves to them, with the
+    jump of the slope at the ends and noise: then the exponent is that of the longer waves.
+    """
+    square, squares, noise = fit.spread**2, every.squares, float(np.nan_to_num(fit.noise))
+    if fit.form == NONE or square == 0.0:
+        return blurred
+    signal = fit.amplitude * every.signal(fit.form, fit.hurst, square)[0]
+    most = signal * (1.0 + edge_power(every.frame, fit.hurst, square)) + noise
+    beyond = squares > squares[fit.inside].max()
+    count, ratio = every.count[beyond], np.minimum(every.power / most, _MOST_RATIO)[beyond]
+    excess = float(count @ (ratio - 1.0)) / float(np.sqrt(2.0 * max(count.sum(), 1.0)))
+    is_gaussian = fit.is_good and (excess < _EXCESS or float(count @ ratio) < _LEAST_RATIO * count.sum())
+    alike = fit.inside & (squares < min(_ALIKE_FALL / square, _SHORTEST_ALIKE**2))
+    alike &= noise < _LITTLE_NOISE * signal
+    if every.count[alike].sum() < _LEAST_ALIKE:
+        return blurred if is_gaussian else blurred.holding(0.0, 1.0, _NO_WAVES)
+    quiet = np.maximum(every.power - noise, 0.5 * every.power)
+    window = Window(every.frame, alike, quiet)
+    longer = _blur_fit.fit(window, _blur_fit.Fit(TRANSFER, fit.hurst, square))
+    error = _blur_fit.error(window, longer)
+    difference = abs(longer.hurst - fit.hurst) / np.sqrt(max(error**2 - fit.standard_error**2, 1e-9))
+    if is_gaussian and difference < _DIFFERENT[0]:
+        return blurred
+    low, high = _blur_fit.interval(window, longer, QUANTILE * longer.correlation)
+    if is_gaussian and (noise > 0.0 or difference < _DIFFERENT[1]):
+        return blurred.holding(low, high, _OR_LONGER)
+    return replace(
+        blurred,
+        hurst=longer.hurst,
+        standard_error=error,
+        ci_low=low,
+        ci_high=high,
+        scale_min=2.0 * np.pi / float(np.sqrt(squares[alike].max())) * dx,
+        note=joined(blurred.note, _NOT_GAUSSIAN),
+    )
 
 
 def _likeliest(
@@ -227,150 +244,3 @@ def _largest_share(power: Array) -> float:
         return 0.0
     inside = slice(strongest - _NEIGHBOURS, strongest + _NEIGHBOURS + 1)
     return float(shorter[inside].sum() / shorter.sum())
-
-
-@dataclass(frozen=True)
-class ProfileFit:
-    """Estimate of H; the interval is that of the profile likelihood.
-
-    It lies inside (0, 1), unless the whole interval lies beyond 1: the profile is smoother than a fractal.
-    """
-
-    hurst: float
-    standard_error: float
-    low: float
-    high: float
-    rms_increment: float
-    noise: float
-
-
-def fit_profile(heights: Array, *, noise: bool = False, chunk: int = CHUNK) -> ProfileFit:
-    """Fit H, the amplitude and, with `noise`, white noise on the heights.
-
-    Parameters
-    ----------
-    heights : ndarray, shape (n,)
-        At least `SMALLEST` finite values that do not lie on a straight line.
-    noise : bool
-        Fit white noise too, with a variance up to 100 times the mean square increment.
-    chunk : int
-        Largest number of points taken together.
-    """
-    increments = ProfileIncrements(heights, chunk)
-    cache: dict[float, tuple[float, float, float]] = {}
-
-    def best(hurst: float) -> tuple[float, float, float]:
-        """Return deviance, amplitude and noise for one exponent."""
-        hurst = float(hurst)
-        if hurst not in cache:
-            cache[hurst] = _best_noise(increments, hurst) if noise else (*increments.solve(hurst, 0.0), 0.0)
-        return cache[hurst]
-
-    hurst = minimum(lambda h: best(h)[0], _LOWEST, _HIGHEST, _TOLERANCE, points=9 if noise else 5)
-    if hurst > _AT_LIMIT:
-        smoother = minimum(lambda h: best(h)[0], 1.0 / _HIGHEST, _SMOOTHEST, 1e-3, points=5)
-        if best(smoother)[0] < best(_HIGHEST)[0] - QUANTILE:
-            return _smooth_fit(lambda h: best(h)[0], smoother)
-    least, amplitude, level = best(hurst)
-
-    def beyond(h: float) -> float:
-        """Return the root of the rise of the deviance, which is nearly straight, less that of its limit."""
-        return float(np.sqrt(max(best(h)[0] - least, 0.0)) - np.sqrt(QUANTILE))
-
-    low, high = crossing(beyond, hurst, _LOWEST, 0.0), crossing(beyond, hurst, _HIGHEST, 1.0)
-    return ProfileFit(
-        hurst, _standard_error(best, hurst), low, high, float(np.sqrt(amplitude)), float(amplitude * level)
-    )
-
-
-def _smooth_fit(deviance: Callable[[float], float], hurst: float) -> ProfileFit:
-    """Return the fit of a profile smoother than a fractal one; its increments do not scale with H."""
-    least = deviance(hurst)
-    low = crossing(lambda h: deviance(h) - least - QUANTILE, hurst, 1.0 / _HIGHEST, 1.0 / _HIGHEST)
-    high = crossing(lambda h: deviance(h) - least - QUANTILE, hurst, _SMOOTHEST, _SMOOTHEST)
-    return ProfileFit(hurst, np.nan, low, high, np.nan, np.nan)
-
-
-def _best_noise(increments: ProfileIncrements, hurst: float) -> tuple[float, float, float]:
-    """Return deviance, amplitude and noise at the best noise for one exponent."""
-    level = float(
-        np.exp(minimum(lambda t: increments.solve(hurst, np.exp(t))[0], _LEAST_NOISE, _MOST_NOISE, 1e-3))
-    )
-    with_noise, without = increments.solve(hurst, level), increments.solve(hurst, 0.0)
-    return (*with_noise, level) if with_noise[0] < without[0] else (*without, 0.0)
-
-
-def _standard_error(best: Callable[[float], tuple[float, float, float]], hurst: float) -> float:
-    """Return the standard error from the second difference of the deviance."""
-    step = min(0.02, 0.5 * (hurst - 0.5 * _LOWEST), 0.5 * (1.0 - hurst))
-    middle, left, right = (best(h)[0] for h in (hurst, hurst - step, hurst + step))
-    curvature = (left - 2.0 * middle + right) / step**2
-    return float(np.sqrt(2.0 / curvature)) if curvature > 0 else float("nan")
-
-
-class ProfileIncrements:
-    """Increments of one profile in chunks of equal length.
-
-    Parameters
-    ----------
-    heights : ndarray, shape (n,)
-        NaN where nothing was observed.
-    chunk : int
-        Largest number of points of a chunk; chunks are equally long.
-    """
-
-    def __init__(self, heights: Array, chunk: int = CHUNK) -> None:
-        observed = np.flatnonzero(np.isfinite(heights))
-        size = observed.size // -(-observed.size // chunk)
-        starts = np.arange(0, observed.size - size + 1, size)
-        self.positions = observed[starts[:, None] + np.arange(size)]
-        self.jumps = np.diff(heights[self.positions], axis=1)
-        self.gaps = np.diff(self.positions, axis=1)
-        self.is_regular = bool((self.gaps == 1).all())
-        self.freedom = self.jumps.size - len(self.jumps)
-
-    def solve(self, hurst: float, noise: float) -> tuple[float, float]:
-        """Return the deviance and the mean square of the whitened increments.
-
-        The covariance is that of unit increments over one spacing, plus `noise` on the heights.
-        """
-        from fractalcontact.base.threads import in_bands
-        from fractalcontact.dimensions._kernels import whiten
-
-        columns = np.stack([self.jumps, self.gaps], axis=-1)
-        positions = self.positions
-        if self.is_regular:
-            # one factorisation for all chunks: the jumps of each are a column of its own
-            columns = np.concatenate([self.jumps.T, np.ones((self.jumps.shape[1], 1))], axis=1)[None]
-            positions = positions[:1]
-        covariances = _covariance(positions, hurst, noise)
-        log_determinants = np.empty(len(positions))
-        work = covariances.size * columns.shape[1]
-        in_bands(whiten, len(positions), work, covariances, columns, log_determinants)
-        if self.is_regular:
-            jumps, gaps = columns[0, :, :-1].T, np.broadcast_to(columns[0, :, -1], self.jumps.shape)
-            log_determinants = np.repeat(log_determinants, len(self.jumps))
-        else:
-            jumps, gaps = columns[..., 0], columns[..., 1]
-        tilt = np.sum(gaps * gaps, axis=1)
-        squares = np.sum(jumps * jumps, axis=1) - np.sum(jumps * gaps, axis=1) ** 2 / tilt
-        amplitude = float(np.sum(squares)) / self.freedom
-        deviance = float(np.sum(log_determinants + np.log(tilt)) + self.freedom * np.log(amplitude))
-        return deviance, amplitude
-
-
-def _covariance(positions: Array, hurst: float, noise: float) -> Array:
-    """Return the covariance of the increments of each chunk: (chunks, size - 1, size - 1)."""
-    distance = np.abs(positions[:, :, None] - positions[:, None, :]).astype(float)
-    if hurst < 1.0:
-        heights = -0.5 * distance ** (2.0 * hurst)
-    else:
-        # beyond H = 1 only contrasts without a tilt have a variance: a random tilt, eliminated later,
-        # keeps the matrix positive
-        tilt = _TILT * distance.max() ** (2.0 * hurst - 2.0)
-        heights = 0.5 * (distance ** (2.0 * hurst) - tilt * distance**2) / (hurst - 1.0)
-    if noise:
-        heights += noise * np.eye(positions.shape[1])
-    return np.ascontiguousarray(
-        heights[:, 1:, 1:] - heights[:, 1:, :-1] - heights[:, :-1, 1:] + heights[:, :-1, :-1]
-    )

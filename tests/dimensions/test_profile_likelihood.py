@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fractalcontact.base import threads
-from fractalcontact.dimensions import _profile_likelihood
+from fractalcontact.dimensions import _profile_increments
 
 
 def test_deviance_equals_dense_algebra():
@@ -23,14 +23,14 @@ def test_deviance_equals_dense_algebra():
         freedom = jumps.size - 1
         return np.linalg.slogdet(covariance)[1] + np.log(own) + freedom * np.log(square / freedom)
 
-    increments = _profile_likelihood.ProfileIncrements(heights)
+    increments = _profile_increments.ProfileIncrements(heights)
     for hurst, noise in ((0.2, 0.0), (0.7, 0.3), (0.95, 0.0)):
         assert increments.solve(hurst, noise)[0] == pytest.approx(dense(hurst, noise), rel=1e-10)
 
 
 def test_regular_chunks_share_factorisation():
     heights = np.cumsum(np.random.default_rng(10).standard_normal(600))
-    complete = _profile_likelihood.ProfileIncrements(heights)
+    complete = _profile_increments.ProfileIncrements(heights)
     assert complete.positions.shape == (3, 200)
     assert complete.is_regular
     deviance, amplitude = complete.solve(0.6, 0.1)
@@ -45,7 +45,7 @@ def test_threads_change_no_bit():
     result = []
     for count in (1, 2):
         with threads.limit(count):
-            result.append(_profile_likelihood.fit_profile(heights))
+            result.append(_profile_increments.fit_profile(heights))
     assert result[0] == result[1]
 
 
@@ -54,7 +54,7 @@ def test_deviance_of_smooth_profile_equals_dense_contrasts():
     heights = np.cumsum(np.cumsum(np.random.default_rng(12).standard_normal(50)))
     places = np.arange(50.0)
     contrasts = np.diff(np.eye(50), 2, axis=0)
-    increments = _profile_likelihood.ProfileIncrements(heights)
+    increments = _profile_increments.ProfileIncrements(heights)
 
     def dense(hurst):
         covariance = contrasts @ np.abs(places[:, None] - places) ** (2 * hurst) @ contrasts.T
@@ -66,3 +66,29 @@ def test_deviance_of_smooth_profile_equals_dense_contrasts():
     known = dense(1.2) - increments.solve(1.2, 0.0)[0]  # a constant: another choice of contrasts
     for hurst in (1.05, 1.5, 1.85):
         assert dense(hurst) - increments.solve(hurst, 0.0)[0] == pytest.approx(known, abs=1e-5)
+
+
+@pytest.mark.parametrize(("hurst", "square"), [(0.3, 0.3), (0.7, 2.0)])
+def test_deviance_of_blurred_profile_equals_dense_algebra(hurst, square):
+    """The variogram of blurred heights, by quadrature; that of filtered ones by the filter as a matrix."""
+    heights = np.cumsum(np.random.default_rng(13).standard_normal(30))
+    increments = _profile_increments.ProfileIncrements(heights)
+    jumps, lags = np.diff(heights), np.arange(30.0)
+    u = np.linspace(-9.0, 9.0, 180001) * np.sqrt(2.0 * square)
+    weights = np.exp(-(u**2) / (4.0 * square)) / np.exp(-(u**2) / (4.0 * square)).sum()
+    blurred = [np.sum(weights * (np.abs(lag + u) ** (2 * hurst) - np.abs(u) ** (2 * hurst))) for lag in lags]
+    k = np.arange(-12, 13)
+    taps = np.exp(-(k**2) / (2.0 * square)) / np.exp(-(k**2) / (2.0 * square)).sum()
+    both = np.add.outer(k, k)
+    filtered = [
+        taps @ (np.abs(lag + both) ** (2 * hurst) - np.abs(both) ** (2 * hurst)) @ taps for lag in lags
+    ]
+    for of_samples, variogram in ((False, blurred), (True, filtered)):
+        rise = -0.5 * np.array(variogram)[np.abs(np.subtract.outer(np.arange(30), np.arange(30)))]
+        covariance = np.diff(np.diff(rise + 0.05 * np.eye(30), axis=0), axis=1)
+        inverse, gaps = np.linalg.inv(covariance), np.ones(29)
+        own = gaps @ inverse @ gaps
+        mean_square = (jumps @ inverse @ jumps - (jumps @ inverse @ gaps) ** 2 / own) / 28
+        dense = np.linalg.slogdet(covariance)[1] + np.log(own) + 28 * np.log(mean_square)
+        result = increments.solve(hurst, 0.05, square, of_samples=of_samples)[0]
+        assert result == pytest.approx(dense, abs=1e-3)
