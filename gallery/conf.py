@@ -80,6 +80,7 @@ PAGES = (
     "faq",
     "getting_help",
     "validation",
+    "estimator_accuracy",
     "speed",
     "scene_files",
     "data_model",
