@@ -36,7 +36,7 @@ from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._methods import DEFAULT, METHODS
 from fractalcontact.dimensions._periodic_modes import PeriodicModes, band
-from fractalcontact.dimensions._records import Estimate
+from fractalcontact.dimensions._records import UNSEEN, Estimate
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -183,6 +183,7 @@ def estimate(
                 record = _ESTIMATORS[name](single, window, bool(noise))
                 if name in CHECKED and window is None and np.isfinite(record.ci_low) and not single.is_lazy:
                     found = by_modes().found_beside(record.hurst, record.standard_error)
+                    found = found or (UNSEEN if single.axes == 1 else "")
                     record = record.beside_modes(by_modes(), found)
             if single.finest_scale:
                 record = record.gridded(single.finest_scale)

@@ -68,11 +68,12 @@ _EXCESS = 4.0  # z of the power of waves shorter than those of a blur
 _LEAST_RATIO, _MOST_RATIO = 2.0, 1e3  # of their power over that of the model
 _ALIKE_FALL = 1.0  # logarithm of the squared transfer function up to which filters are alike
 _SHORTEST_ALIKE = 2.0  # wavenumber of such waves, rad per spacing
+_HOPELESS = (
+    2.0  # deviance of octaves without aliases over that of one exponent, beyond which none are missing
+)
 _LITTLE_NOISE, _LEAST_ALIKE = 0.1, 14.0  # of the power of a wave; modes of such waves
-_DIFFERENT = (
-    0.5,
-    2.5,
-)  # standard errors from which the interval holds their exponent, and from which it does alone
+# standard errors from which the interval holds their exponent, and from which it holds that alone
+_DIFFERENT = 0.5, 2.5
 _OR_LONGER = "the longer waves have another exponent, which the interval holds: it may be no Gaussian filter"
 _NOT_GAUSSIAN = "a filter of another form than the Gaussian: the exponent is that of the longer waves"
 _NO_WAVES = "a filter of another form than the Gaussian leaves too few waves for an exponent"
@@ -192,7 +193,7 @@ def _likeliest(
     """
     everywhere = np.ones(blocks.count.size, dtype=bool)
     plain = fit_power_law(blocks, everywhere).deviance + 4.0
-    ranked = _several(blocks, everywhere, surface)
+    ranked = _several(blocks, everywhere, surface, plain)
     if fit is not None and blurred is not None:
         ranked.append((Explanations(fit, blocks, has_aliases=False).reference, blurred))
     ranked.sort(key=lambda pair: pair[0])
@@ -205,12 +206,19 @@ def _likeliest(
     return near[0].holding(low, high, _OTHERS if len(near) > 1 else ""), (np.nan, np.nan), plain - least
 
 
-def _several(blocks: Blocks, everywhere: Array, surface: Surface) -> list[tuple[float, Estimate]]:
-    """Return the estimates of roll-offs and second exponents, with their penalised deviances."""
+def _several(
+    blocks: Blocks, everywhere: Array, surface: Surface, plain: float
+) -> list[tuple[float, Estimate]]:
+    """Return the estimates of roll-offs and second exponents, with their penalised deviances.
+
+    `plain` is that of one exponent.
+    """
     result = []
     assert blocks.frame is not None
     for part in (blocks, frame_blocks(blocks.power, blocks.frame.unaliased)):
         found, record = [], octaves(part)
+        if part is not blocks and sum(octave.fit.deviance for octave in record) > plain + _HOPELESS:
+            break
         for is_sharp in (False, True):
             rolloff = fit_rolloff(part, everywhere, is_sharp=is_sharp)
             if rolloff is not None and rolloff.law.hurst > LEAST_EXPONENT and rolloff.law.low < 1.0:

@@ -11,6 +11,7 @@ from fractalcontact.base.units import quantity_text
 SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
 ASKED = "asked for"  # the window of scales
 CONSTANT = "a constant height has no Hurst exponent"
+UNSEEN = "a profile has too few waves to show every blur and noise, which it allows for"
 NORMAL = 1.959963984540054  # 97.5 % quantile of the normal distribution
 GRIDDING = 0.035  # largest error of H from the finest scale of a gridded surface on, as measured
 _DIFFERENT = 2.5  # standard errors between two methods beyond which an interval holds both

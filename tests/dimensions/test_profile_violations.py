@@ -55,3 +55,14 @@ def test_coarsely_rounded_profile_has_no_interval():
     low, high, note = interval(heights)
     assert np.isnan([low, high]).all()
     assert "rounded to steps larger" in note
+
+
+@pytest.mark.parametrize("method", ["higuchi", "detrended_fluctuation"])
+def test_other_methods_allow_for_what_a_profile_does_not_show(method):
+    """Noise of 0.3 increments is not seen in this profile, and lowers its exponent."""
+    noisy = profile(512, 0.7, 8) + 0.3 * np.random.default_rng(8).standard_normal(512)
+    surface = fc.surfaces.from_array(STEP * noisy, SPACING)
+    result = fc.dimensions.estimate(surface, ["likelihood", method])
+    low, high = result.ci_low.values, result.ci_high.values
+    assert low[1] <= low[0]
+    assert high[1] >= high[0] > 0.7
