@@ -121,6 +121,13 @@ def test_map_read_only_by_other_stages_is_not_stored(tmp_path):
     assert "surfaces" not in tree.children
 
 
+def test_info_names_the_calls_that_made_a_surface(tmp_path):
+    path = fc.save(fc.surfaces.sample("concrete_crack")[:8, :8], tmp_path / "face.nc")
+    last = fc.scenes.contents(path).splitlines()[-1]
+    assert last.startswith("call fractalcontact.surfaces.sample")
+    assert last.endswith(", after fractalcontact.surfaces.from_array")
+
+
 def test_rigid_sliding_imports_no_solver_and_no_compiler(tmp_path):
     heavy = ("numba", "matplotlib", "skimage", "fractalcontact.contact", "fractalcontact.plotting")
     code = (
