@@ -311,6 +311,7 @@ def dimensions(
     ax.set_yticks(rows, [name.replace("_", " ") for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.grid(False, axis="y")
+    ax.locator_params(axis="x", nbins=6)  # more labels, of three decimals, would touch
     label_axis(ax.xaxis, name_of(data["fractal_dimension"]), PLAIN)
     _style.side_legend(ax, entries)
     return ax
