@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,7 @@ _WHITE = 0.5  # share of the waves below the noise that the edges must not distu
 _AGAINST_NOISE = 6.0
 _WEAK_NOISE, _LEAST_NOISE = 0.06, 0.005
 _LEAST_DISTANCE = 0.06  # of an exponent to 1, where the rms increment of the model has no limit
+_SIDE_LOBES = 2.0  # excess of power just beyond a blur that a Gaussian does not leave
 _FALL = 5.0  # logarithm of the squared transfer function at the end of a window without noise
 CLEAR = {1: 9.0, 2: 4.0}  # decrease of the penalised deviance from which blur or noise is seen, by axes
 _VAGUE = 1.0  # width of an interval that says nothing
@@ -98,6 +100,9 @@ class BlurredFit:
         Deviance with the penalty of the parameters.
     inside : ndarray of bool, shape (blocks,)
         Blocks of modes used.
+    other_form : float
+        Chi square, of three parameters, of a transfer function of another form, from all modes that the edges
+        do not disturb.
     """
 
     hurst: float
@@ -115,6 +120,7 @@ class BlurredFit:
     gain: float
     penalised: float
     inside: Array
+    other_form: float = 0.0
 
     @property
     def is_good(self) -> bool:
@@ -209,6 +215,7 @@ def fit_blurred(
         gain=plain[0] - best.penalised if plain else np.inf,
         penalised=best.penalised,
         inside=window.inside,
+        other_form=search.other_form(window, best) if spread is None and frame.axes == 2 else 0.0,
     )
 
 
@@ -301,12 +308,9 @@ class _Search:
         if first is not None and (around := self._around(first)) is not None:
             return around
         quiet_window, quiet, quiet_scatter = self._growing()
-        limits = [_CORNER * np.pi / d for d in self.frame.spacing]
-        corner = np.logical_and.reduce([w > limit for w, limit in zip(self.frame.waves, limits, strict=True)])
-        corner &= self.allowed
-        if not corner.any():
+        level = self._corner_level
+        if level is None:
             return quiet_window, quiet
-        level = float(np.average(self.power[corner], weights=self.frame.count[corner]))
         noisy = replace(quiet, noise=max(level / quiet.amplitude, 1e-280), has_noise=True)
         for _ in range(3):
             window = self._window(noisy, np.inf)
@@ -318,6 +322,16 @@ class _Search:
         if self._is_white(window, noisy) and _blur_fit.scatter(window, noisy) < most:
             return window, noisy
         return quiet_window, quiet
+
+    @cached_property
+    def _corner_level(self) -> float | None:
+        """Mean power of the waves that are shortest along every axis; None if they may not be used."""
+        limits = [_CORNER * np.pi / d for d in self.frame.spacing]
+        corner = np.logical_and.reduce([w > limit for w, limit in zip(self.frame.waves, limits, strict=True)])
+        corner &= self.allowed
+        if not corner.any():
+            return None
+        return float(np.average(self.power[corner], weights=self.frame.count[corner]))
 
     def _around(self, first: Fit) -> tuple[Window, Fit] | None:
         """Return the window of a fit to all modes, and the best model there; None if it does not fit."""
@@ -373,16 +387,9 @@ class _Search:
 
     def _window(self, fit: Fit, reach: float) -> Window:
         """Return the window of a fit: waves that edges disturb little, not fallen too far without noise."""
-        squares = self.frame.squares
-        inside = self.allowed & (squares <= reach**2)
         if fit.square < NARROW:
-            return Window(self.frame, inside, self.power)
-        edges = edge_power(self.frame, fit.hurst, fit.square)
-        signal = plain_power(self.frame, fit.hurst) * np.exp(-np.minimum(fit.square * squares, 600.0))
-        noise = fit.noise if fit.has_noise else 0.0
-        inside &= edges * signal < _EDGE * (signal + noise)
-        if not fit.has_noise:
-            inside &= fit.square * squares < _FALL
+            return Window(self.frame, self.allowed & (self.frame.squares <= reach**2), self.power)
+        inside, edges = self._undisturbed(fit, reach)
         # the edges fall less than the surface; without noise the window ends where they matter
         jump = Edges.of(self.frame, fit.hurst, fit.square) if fit.has_noise else edges
         # the blur may have been reflected at the edges, as by most filters, or go on beyond them
@@ -394,6 +401,44 @@ class _Search:
             return plain
         reflected, free = (_blur_fit.fit(window, fit) for window in (plain, with_edges))
         return plain if reflected.deviance <= free.deviance else with_edges
+
+    def _undisturbed(self, fit: Fit, reach: float) -> tuple[Array, Array]:
+        """Return the blocks that edges disturb little, and the power of the edges over that of the signal."""
+        squares = self.frame.squares
+        inside = self.allowed & (squares <= reach**2)
+        edges = edge_power(self.frame, fit.hurst, fit.square)
+        signal = plain_power(self.frame, fit.hurst) * np.exp(-np.minimum(fit.square * squares, 600.0))
+        noise = fit.noise if fit.has_noise else 0.0
+        inside &= edges * signal < _EDGE * (signal + noise)
+        if not fit.has_noise:
+            inside &= fit.square * squares < _FALL
+        return inside, edges
+
+    def other_form(self, window: Window, fit: Fit) -> float:
+        """Return `_blur_fit.other_form` of a fit to the modes of a window, and to others where it may hold.
+
+        Infinite where shorter waves, which a Gaussian has removed, have more power than the edges and noise.
+        """
+        if fit.square >= NARROW and not (fit.has_noise and not self._is_white(window, fit)):
+            inside, edges = self._undisturbed(fit, np.inf)
+            if not fit.has_noise and self._excess(fit, edges) > _SIDE_LOBES:
+                return np.inf
+            if np.count_nonzero(inside & ~window.inside) > 0.02 * np.count_nonzero(inside):
+                ratio = None if window.edges is None and window.ratio is None else edges
+                window = Window(self.frame, inside, self.power, ratio)
+                fit = _blur_fit.fit(window, fit)
+        return _blur_fit.other_form(window, fit)
+
+    def _excess(self, fit: Fit, edges: Array) -> float:
+        """Return the power of waves just beyond a blur over that expected with the edges and white noise."""
+        falls = fit.square * self.frame.squares
+        beyond = self.allowed & (falls > _FALL) & (falls < 2.0 * _FALL)
+        count = self.frame.count[beyond]
+        if count.sum() < _LEAST or self._corner_level is None:
+            return 0.0
+        signal = plain_power(self.frame, fit.hurst) * np.exp(-np.minimum(falls, 600.0)) * (1.0 + edges)
+        expected = fit.amplitude * signal[beyond] + self._corner_level
+        return float(np.average(self.power[beyond] / expected, weights=count))
 
     def weak_waves(self, window: Window, fit: Fit) -> float:
         """Return the largest squared wavenumber of long waves that are too weak for a fit; 0 if none are."""

@@ -178,8 +178,13 @@ def spread_in_blocks(window: Window, result: Fit) -> Array:
 
 def scatter(window: Window, result: Fit) -> float:
     """Return z of the squared residuals of the blocks about a fit."""
-    square = 0.5 * window.count * residuals(window, result)[1] ** 2
-    deviation = np.sqrt((2.0 + 12.0 * np.mean(1.0 / window.count)) / square.size)
+    return scatter_of(residuals(window, result)[1], window.count)
+
+
+def scatter_of(residual: Array, count: Array) -> float:
+    """Return z of the squared relative residuals of blocks of so many modes."""
+    square = 0.5 * count * residual**2
+    deviation = np.sqrt((2.0 + 12.0 * np.mean(1.0 / count)) / square.size)
     return float((square.mean() - 1.0) / deviation)
 
 
@@ -199,12 +204,40 @@ def agreement(window: Window, result: Fit) -> float:
     last = modes.size - 1 - int(np.argmax(np.cumsum(modes[::-1]) >= _LEAST_OCTAVE))
     octave = np.clip(octave, first, max(first, last))
     levels = (octave == np.unique(octave)[:, None]).astype(float)
-    half = 0.5 * window.count
-    levels -= (half * levels) @ fitted.T @ inverse((half * fitted) @ fitted.T) @ fitted
-    values, vectors = np.linalg.eigh((half * levels) @ levels.T)
+    statistic, number = score_statistic(fitted, levels, 0.5 * window.count, residual)
+    return float(chdtrc(number, statistic / result.correlation))
+
+
+def score_statistic(
+    fitted: Array, others: Array, half: Array, residual: Array, prior: Array | None = None
+) -> tuple[float, int]:
+    """Return chi square of a score test of other columns beside those that are fitted, and its number.
+
+    `half` is half the number of modes of each block, `prior` what is known beforehand of the fitted
+    parameters.
+    """
+    information = (half * fitted) @ fitted.T
+    if prior is not None:
+        information = information + prior
+    others = others - (half * others) @ fitted.T @ inverse(information) @ fitted
+    values, vectors = np.linalg.eigh((half * others) @ others.T)
     seen = values > _LEAST_LEVEL * values.max()
-    score = vectors[:, seen].T @ (levels @ (half * residual))
-    return float(chdtrc(np.count_nonzero(seen), np.sum(score**2 / values[seen]) / result.correlation))
+    score = vectors[:, seen].T @ (others @ (half * residual))
+    return float(np.sum(score**2 / values[seen])), int(np.count_nonzero(seen))
+
+
+def other_form(window: Window, result: Fit) -> float:
+    """Return chi square, of three parameters, of a transfer function of another form than that of a fit.
+
+    Score test of terms of the fourth and sixth degree in the wavenumber of its logarithm.
+    """
+    columns, residual = residuals(window, result)
+    fitted = np.stack([np.ones(residual.size), *columns[_is_free(result)]])
+    squares = window.squares / window.squares.max()
+    across = np.prod([w[window.inside] for w in window.frame.waves], axis=0) ** 2 / window.squares.max() ** 2
+    terms = np.stack([squares**2, across, squares**3])
+    statistic, _ = score_statistic(fitted, terms, 0.5 * window.count, residual)
+    return statistic / result.correlation
 
 
 def _is_free(result: Fit) -> Array:

@@ -399,11 +399,13 @@ def best_scored(
     bounds: tuple[Array, Array],
     largest_step: Array,
     most: float = np.inf,
+    precision: Array | float = 0.0,
 ) -> Scored:
     """Fit the parameters of a model to blocks by damped scoring from the two best starts.
 
     `model` returns the logarithm of the expected power but for its level, and the derivatives.
-    Beyond the deviance `most` the second start is not tried.
+    Beyond the deviance `most` the second start is not tried. `precision` is one over the squared deviation
+    of each parameter from 0 that is known beforehand; 0 where nothing is known.
     """
     logs, modes = np.log(np.maximum(power, 1e-300)), float(count.sum())
 
@@ -413,13 +415,14 @@ def best_scored(
         ratio = np.exp(logs - expected)
         level = float(np.sum(count * ratio) / modes)
         columns -= np.average(columns, axis=1, weights=count)[:, None]
-        deviance = float(np.sum(count * expected) + modes * np.log(level))
+        deviance = float(np.sum(count * expected) + modes * np.log(level) + np.sum(precision * values**2))
         return deviance, columns, ratio / level - 1.0
 
     first, *others = sorted(starts, key=lambda start: evaluate(start)[0])[:_STARTS]
-    best = _scored(evaluate, count, first, bounds, largest_step)
+    best = _scored(evaluate, count, first, bounds, largest_step, precision)
     for start in others if best.deviance < most else []:
-        best = min(best, _scored(evaluate, count, start, bounds, largest_step), key=lambda fit: fit.deviance)
+        other = _scored(evaluate, count, start, bounds, largest_step, precision)
+        best = min(best, other, key=lambda fit: fit.deviance)
     return best
 
 
@@ -429,13 +432,14 @@ def _scored(
     values: Array,
     bounds: tuple[Array, Array],
     largest_step: Array,
+    precision: Array | float,
 ) -> Scored:
-    damping = 1e-2
+    damping, prior = 1e-2, np.diag(np.broadcast_to(precision, values.shape))
     current = evaluate(values)
     for _ in range(_SCORING_STEPS):
         deviance, columns, residual = current
-        information = 0.5 * (count * columns) @ columns.T
-        score = 0.5 * (count * columns) @ residual
+        information = 0.5 * (count * columns) @ columns.T + prior
+        score = 0.5 * (count * columns) @ residual - prior @ values
         ridge = np.diag(damping * np.diag(information) + 1e-12)
         step = np.linalg.solve(information + ridge, score)
         moved = np.clip(values + np.clip(step, -largest_step, largest_step), *bounds)
@@ -448,7 +452,7 @@ def _scored(
         values, current, damping = moved, trial, max(damping / 10.0, 1e-7)
         if deviance - trial[0] < 1e-3:
             break
-    return Scored(current[0], values, 0.5 * (count * current[1]) @ current[1].T)
+    return Scored(current[0], values, 0.5 * (count * current[1]) @ current[1].T + prior)
 
 
 def longest_run(record: Sequence[Octave]) -> Run:
@@ -476,6 +480,11 @@ def has_one_exponent(run: Sequence[Octave], fit: PowerLaw) -> bool:
 
     ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
     return len(run) == 1 or bool(chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM)
+
+
+def is_smooth(record: Sequence[Octave]) -> bool:
+    """Return whether the shortest waves are weaker than those of any fractal."""
+    return record[0].fit.low > 1.0
 
 
 def interval_of_run(run: Run, record: Sequence[Octave]) -> tuple[float, float]:

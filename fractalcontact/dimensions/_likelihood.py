@@ -29,6 +29,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     exponents_within,
     frame_blocks,
     interval_of_run,
+    is_smooth,
     longest_run,
     octaves,
     run_estimate,
@@ -75,6 +76,7 @@ from fractalcontact.dimensions._second_exponent import (
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._transfer_functions import Window
+from fractalcontact.dimensions._unknown_filter import is_filtered_locally, unfiltered_estimate
 from fractalcontact.dimensions._waves import MOST_REPEATED, without_waves
 from fractalcontact.dimensions._whittle import (
     LEAST_MODES,
@@ -92,6 +94,10 @@ _BEYOND = 4.0  # spreads: increments over so many are little changed by a blur
 # and a rougher second surface make it positive, and are harder to see than a blur
 _SLIGHT = -2.5, 1.5
 _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface allows for
+# chi square of a transfer function of another form, of three parameters, from which it may be there, and is
+_MAYBE_OTHER, _OTHER_FORM = 9.0, 14.0
+_REACHES = 0.95  # of the shortest wave of a run of octaves, from which a filter of unknown form changes it
+_EQUAL = 0.01  # share of heights that equal a neighbour: the nearest of other points, or a median
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
 _FREE_WINDOW = "all modes that vary along both axes"
 _INTERPOLATED = 0.01  # share of heights on a line with their neighbours
@@ -116,6 +122,9 @@ _PERIODIC_GAPS = (
 _OR_PLAIN = (
     "blur, noise or a second exponent is uncertain: the exponent is averaged over the fits with and "
     "without it, and the interval holds both"
+)
+_OR_FILTER = (
+    "a filter that is no Gaussian blur may have changed the surface: the interval holds its exponent then"
 )
 _OR_SECOND = (
     "a second, smaller exponent of the shorter waves explains them nearly as well: the interval holds it; "
@@ -224,7 +233,9 @@ def _explained(
             return ground
         if spread is not None or _shows_blur(free, comparison, parts):
             blurred = _blurred_fit(free, comparison)
-    if comparison is not None and blurred is not None and is_seen(blurred, surface.axes, spread):
+    if comparison is not None and free.is_default and surface.equal_share > _EQUAL:
+        estimate, lag = _unfiltered(free, comparison.window)
+    elif comparison is not None and blurred is not None and is_seen(blurred, surface.axes, spread):
         estimate, lag = _with_blur(free, comparison, blurred)
         estimate = _allowing_rounding(estimate, comparison, free)
         estimate = _or_neither(estimate, free, comparison, parts)
@@ -320,11 +331,18 @@ def _with_blur(free: FreeEdges, comparison: Comparison, fit: BlurredFit) -> tupl
     if free.is_default:
         explained = Explanations.likelier(fit, window.power, window.frame)
         several = several_exponents(explained, surface)
-        if several is not None:
+        is_filter = fit.other_form > _OTHER_FORM and is_smooth(explained.record)
+        is_filter = is_filtered_locally(free.heights) or is_filter
+        if several is not None and not is_filter:
             return several, _lag(several, surface)
         # blur and noise do not explain all octaves, or what they leave is no fractal
         if not (fit.is_good and fit.low < 1.0) and (run := _longest_run(free, window)):
             return run
+        if is_filter or fit.other_form > _OTHER_FORM:
+            return _unfiltered(free, window)
+        if fit.other_form > _MAYBE_OTHER:
+            unfiltered, _ = _unfiltered(free, window)
+            estimate = estimate.holding(unfiltered.ci_low, unfiltered.ci_high, _OR_FILTER)
         low, high = alternatives(explained, is_bent=True)
         if low < estimate.ci_low or high > estimate.ci_high:
             estimate = estimate.holding(low, high, _OR_SECOND)
@@ -420,7 +438,9 @@ def _without_blur(
     is_bent = abs(fit.misfit) > SIGNIFICANT * parts.widening
     run = None
     is_default = free.scales is None and free.spread is None
-    if is_bent and is_default and comparison is not None and (is_even or fit.hurst >= 1.0):
+    if is_bent and is_default and comparison is not None and fit.misfit < 0.0:
+        run = _unfiltered(free, comparison.window) if is_filtered_locally(free.heights) else None
+    if run is None and is_bent and is_default and comparison is not None and (is_even or fit.hurst >= 1.0):
         run = _longest_run(free, comparison.window, is_even=is_even)
     if run is not None:
         estimate, lag = run
@@ -480,6 +500,12 @@ def _allowing_scales(estimate: Estimate, free: FreeEdges, window: Window, misfit
     return estimate.holding(low, high, note)
 
 
+def _unfiltered(free: FreeEdges, window: Window) -> tuple[Estimate, int]:
+    """Return the estimate of waves that an unknown filter leaves nearly alone, and a lag among them."""
+    estimate = unfiltered_estimate(window.power, window.frame, window.inside, free.surface.spacing[1])
+    return estimate, _lag(estimate, free.surface) if estimate.scale_min > 0.0 else 1
+
+
 def _longest_run(free: FreeEdges, window: Window, *, is_even: bool = True) -> tuple[Estimate, int] | None:
     """Return the estimate of the longest run of octaves with one exponent, and a lag inside it.
 
@@ -488,11 +514,17 @@ def _longest_run(free: FreeEdges, window: Window, *, is_even: bool = True) -> tu
     """
     record = octaves(frame_blocks(window.power, window.frame))
     run = longest_run(record)
+    if run.first > 0 and is_filtered_locally(free.heights):
+        return _unfiltered(free, window)
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None
     dx = free.surface.spacing[1]
     part = replace(free, scales=(run.low * dx, run.high * dx), pilot=run.fit.hurst).modes()
     estimate = run_estimate(run, free.surface).holding(*interval_of_run(run, record))
+    if run.first > 0 and is_smooth(record):
+        unfiltered, _ = _unfiltered(free, window)
+        if unfiltered.scale_min > _REACHES * estimate.scale_min:
+            estimate = estimate.holding(unfiltered.ci_low, unfiltered.ci_high, _OR_FILTER)
     if part.is_uneven(np.ones(part.order.shape, dtype=bool), run.fit.hurst):
         if is_even:
             return None
