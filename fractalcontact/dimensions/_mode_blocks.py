@@ -29,6 +29,8 @@ SMOOTH = 1.3  # exponent up to which the sums over the covariance are exact enou
 _PER = 12  # inverse relative width of a block
 LARGEST = 1024  # points along an axis up to which the table is summed over the lattice
 _ALIASES = 2  # aliases along each axis that are summed one by one
+_LEAST_SQUARE = 1e-30  # of wavenumbers
+SLOW, SUDDEN, HIGH_PASS, LEAKY = "slow", "sudden", "high-pass", "leaky high-pass"  # forms of a roll-off
 _INVERSE = np.linalg.inv(np.polynomial.chebyshev.chebvander(-np.cos(_ANGLES), _DEGREE))
 
 
@@ -165,14 +167,21 @@ class Frame:
         return power, slope, fall
 
     def rolled_densities(
-        self, hurst: float, square: float, *, is_sharp: bool = False
+        self, hurst: float, square: float, form: str = SLOW, leak: float = 0.0
     ) -> tuple[Array, Array, Array]:
         """Return the logarithm of the density (q^2 + square)^(-H - axes / 2), and two derivatives.
 
-        Aliases are included. The derivatives are those by H and by the logarithm of `square`. With `is_sharp`
-        the density is that of the larger of q^2 and `square`.
+        Aliases are included. The derivatives are those by H and by the logarithm of `square`. A `SUDDEN`
+        density is that of the larger of q^2 and `square`; a `HIGH_PASS` one is that of sampled heights less
+        their Gaussian filter, see `passed`.
         """
+        if form in (HIGH_PASS, LEAKY):
+            logs, by_hurst, _ = self.rolled_densities(hurst, 0.0)
+            passed, by_square, _ = self.passed(square, leak)
+            return logs + passed, by_hurst, by_square
+        is_sharp = form == SUDDEN
         squares = np.maximum(self.aliases, square) if is_sharp else self.aliases + square
+        squares = np.maximum(squares, _LEAST_SQUARE)
         share = np.where(self.aliases < square, 1.0, 0.0) if is_sharp else square / squares
         power = hurst + 0.5 * self.axes
         logs = np.log(squares)
@@ -187,6 +196,21 @@ class Frame:
             by_hurst = by_hurst - np.mean(tails * (np.log(start) + 1.0 / hurst))
             by_square = by_square - (0.0 if is_sharp else hurst * square * np.mean(tails / start))
         return np.log(total), by_hurst / total, by_square / total
+
+    def passed(self, square: float, leak: float = 0.0) -> tuple[Array, Array, Array]:
+        """Return the logarithm of the squared transfer function (1 - (1 - leak) 2^(-q^2 / square))^2.
+
+        Without a leak it is the Gaussian high-pass filter of ISO 16610-61, its cut-off 2 pi / sqrt(square).
+        Also the derivatives by the logarithms of `square` and of `leak`.
+        """
+        ratio = np.log(2.0) * np.maximum(self.squares, _LEAST_SQUARE) / square
+        low = np.exp(-ratio)
+        amplitude = -np.expm1(-ratio) + leak * low
+        return (
+            2.0 * np.log(amplitude),
+            2.0 * (leak - 1.0) * low * ratio / amplitude,
+            2.0 * leak * low / amplitude,
+        )
 
     def mean(self, values: Array) -> Array:
         """Average the modes of each block: shape (modes along each axis from 1) to (blocks,)."""

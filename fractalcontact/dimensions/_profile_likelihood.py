@@ -30,7 +30,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     octaves,
     run_estimate,
 )
-from fractalcontact.dimensions._mode_blocks import LOWEST
+from fractalcontact.dimensions._mode_blocks import LOWEST, SLOW, SUDDEN
 from fractalcontact.dimensions._profile_increments import by_increments, without_jumps
 from fractalcontact.dimensions._quantisation import quantisation
 from fractalcontact.dimensions._records import Estimate, joined, undefined
@@ -220,7 +220,7 @@ def _several(
         if part is not blocks and sum(octave.fit.deviance for octave in record) > plain + _HOPELESS:
             break
         for is_sharp in (False, True):
-            rolloff = fit_rolloff(part, everywhere, is_sharp=is_sharp)
+            rolloff = fit_rolloff(part, everywhere, shape=SUDDEN if is_sharp else SLOW)
             if rolloff is not None and rolloff.law.hurst > LEAST_EXPONENT and rolloff.law.low < 1.0:
                 found.append((rolloff.penalised, rolloff_estimate(rolloff, part, surface)))
             # without aliases a sum is like a corner

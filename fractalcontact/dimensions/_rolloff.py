@@ -8,16 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, best_scored
+from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, Scored, best_scored
 from fractalcontact.dimensions._mode_blocks import (
+    HIGH_PASS,
     HIGHEST,
     LARGEST,
+    LEAKY,
     LOWEST,
+    SLOW,
+    SUDDEN,
     Frame,
     lattice_power,
     node_weights,
@@ -32,6 +37,9 @@ _LEAST_LENGTH = 2.5  # spacings: a shorter corner leaves no waves beyond it
 _STARTS = 0.3, 0.8  # first guesses of H
 _LARGEST_SQUARE = 200.0  # spread of a blur
 _FAR = 60.0  # deviance that the edges do not change
+_LEAST_JUMP = 1e-20  # power of the jump of the slope over that of the heights
+_CORRELATED = 1.15  # times the error beside a blur: the jump at the edges correlates modes
+_SHORTER = 1.2  # cut-offs of a high-pass filter: longer waves are in its fit, but not in its exponent
 _HOPELESS = 200.0  # deviance that another start does not change
 _WINDOW = "the waves shorter than the corner of the roll-off"
 
@@ -49,8 +57,11 @@ class RollOff:
     penalised : float
         Deviance with Akaike's penalty.
     noise : bool
-    is_sharp : bool
-        Whether the spectrum is flat up to the corner, instead of bending slowly.
+    shape : str
+        `SLOW`, `SUDDEN` (flat up to the corner), `HIGH_PASS`, or `LEAKY`, a filter that leaves some of the
+        longest waves.
+    form : str
+        Form of the blur.
     """
 
     law: PowerLaw
@@ -58,7 +69,18 @@ class RollOff:
     penalised: float
     spread: float = 0.0
     noise: bool = False
-    is_sharp: bool = False
+    shape: str = SLOW
+    form: str = NONE
+
+    @property
+    def is_filtered(self) -> bool:
+        """Whether the long waves were filtered."""
+        return self.shape in (HIGH_PASS, LEAKY)
+
+    @property
+    def has_noise_alone(self) -> bool:
+        """Whether noise is there, and no blur."""
+        return self.noise and not self.spread
 
 
 def fit_rolloff(
@@ -67,100 +89,186 @@ def fit_rolloff(
     *,
     blur: tuple[str, float] = (NONE, 0.0),
     noise: bool = False,
+    weak_noise: float = 0.0,
     starts: Sequence[float] = _STARTS,
-    is_sharp: bool = False,
+    shape: str = SLOW,
     most: float = np.inf,
 ) -> RollOff | None:
     """Fit exponent and corner to some blocks; None where the corner is not among their waves.
 
-    None as well where the penalised deviance is far above `most`. With `is_sharp` the spectrum is flat up to
-    the corner, instead of bending slowly.
+    None as well where the penalised deviance is far above `most`. `shape` is that of the spectrum at long
+    waves, see `Frame.rolled_densities`.
 
     A blur of some form, with a first guess of its spread, and `noise` are fitted as well; `starts` are first
-    guesses of H. A blur changes the power as that of fractional Brownian heights. The power over the spectral
+    guesses of H. `weak_noise` is the rms height of noise that is not fitted, over the rms increment along x.
+    A blur changes the power as that of fractional Brownian heights. The power over the spectral
     density, which is that of such heights at first, is in a second fit that of the covariance that the first
     one found: a plateau of long waves has less effect of the edges.
     """
+    fitted = partial(_fitted, blocks, blur=blur, noise=noise, weak_noise=weak_noise, shape=shape)
+    found = fitted(inside, starts=starts, most=most)
+    if found is None or shape not in (HIGH_PASS, LEAKY):
+        return found
+    # longer waves show how the filter ended at the edges, and little of the exponent
+    shorter = inside & (blocks.wavelength < _SHORTER * found.length)
+    narrow = fitted(shorter, starts=(found.law.hurst,))
+    return found if narrow is None else replace(found, law=narrow.law)
+
+
+def _fitted(
+    blocks: Blocks,
+    inside: Array,
+    *,
+    blur: tuple[str, float],
+    noise: bool,
+    weak_noise: float,
+    starts: Sequence[float],
+    shape: str,
+    most: float = np.inf,
+) -> RollOff | None:
+    """Fit exponent and corner to some blocks, as `fit_rolloff` does."""
     count, wavelength, frame = blocks.count[inside], blocks.wavelength[inside], blocks.frame
     if frame is None or not wavelength.max() > _LEAST_LENGTH:
         return None
     form, spread = blur
-    free = np.array([True, True, form != NONE, noise])
+    is_filtered = shape in (HIGH_PASS, LEAKY)
+    free = np.array([True, True, form != NONE, noise, shape == LEAKY])
     parameters = 1 + int(np.count_nonzero(free))
     window = Window(frame, inside, blocks.power)
     first, last = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
-    low, high = np.array([LOWEST, first, 0.0, -80.0]), np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0])
-    excess, edges = frame.logs - frame.densities, None
+    low = np.array([LOWEST, first, 0.0, -80.0, -12.0])
+    high = np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0, -0.5])
+    excess, edges, jump = frame.logs - frame.densities, None, None
 
     def model(values: Array) -> tuple[Array, Array]:
         """Return the logarithm of the power, and its derivatives."""
-        every = np.zeros(4)
+        every = np.array([0.0, 0.0, 0.0, -np.inf, -np.inf])
         every[free] = values
-        hurst, square = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2)
-        logs, slope, by_square = frame.rolled_densities(hurst, square, is_sharp=is_sharp)
+        hurst, square, leak = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2), np.exp(every[4])
+        logs, slope, by_square = frame.rolled_densities(hurst, square, shape, leak)
         if edges is None:
             weights, slopes = node_weights(hurst)
             logs, slope = logs + weights @ excess, slope + slopes @ excess
         else:
             logs = logs + edges
-        logs, columns = logs[inside], np.stack([slope, 2.0 * by_square, 0.0 * slope, 0.0 * slope])[:, inside]
+        columns = np.zeros((5, count.size))
+        logs, columns[0], columns[1] = logs[inside], slope[inside], 2.0 * by_square[inside]
         if form != NONE:
             blurred, blurred_slope, by_blur = window.signal(form, hurst, float(every[2]))
             plain, plain_slope, _ = window.signal(NONE, hurst, 0.0)
             logs = logs + np.log(blurred / plain)
             columns[0] += blurred_slope - plain_slope
             columns[2] = by_blur
-        if noise:
-            total = np.logaddexp(logs, every[3])
-            columns *= np.exp(logs - total)
-            columns[3] = np.exp(every[3] - total)
+            if jump is not None:
+                edge = logs - np.log(blurred / plain) + jump[inside]
+                share = 1.0 / (1.0 + np.exp(np.minimum(edge - logs, 600.0)))
+                columns[0] -= (1.0 - share) * (blurred_slope - plain_slope)
+                columns[2] *= share
+                logs = np.logaddexp(logs, edge)
+        if noise or weak_noise:
+            white: Any = every[3] if noise else _white(frame, inside, logs, weak_noise)
+            if is_filtered:
+                white = white + frame.passed(square, leak)[0][inside]
+            total = np.logaddexp(logs, white)
+            share = np.exp(logs - total)
+            columns[[0, 2]] *= share
+            columns[1] *= 1.0 if is_filtered else share
+            columns[3] = 1.0 - share
             logs = total
+        if shape == LEAKY:
+            columns[4] = frame.passed(square, leak)[2][inside]
         return logs, columns[free]
 
     def start(hurst: float, place: float) -> Array:
         """Return first values, with noise below the weakest waves."""
-        values = np.array([hurst, place * first + (1.0 - place) * last, spread**2, -80.0])
+        values = np.array([hurst, place * first + (1.0 - place) * last, spread**2, -80.0, -3.0])
         values[3] = model(values[free])[0].min() - 2.0
         return np.asarray(values[free])
 
     guesses = [start(hurst, place) for hurst in starts for place in (0.3, 0.6, 0.8)]
-    steps = np.array([0.2, 0.7, 0.5, 2.0])[free]
-    for _ in range(2):
-        bounds = low[free], high[free]
+    steps = np.array([0.2, 0.7, 0.5, 2.0, 2.0])[free]
+    bounds = low[free], high[free]
+    fits: list[Scored] = []
+    for _ in range(2 if form == NONE else 3):
         best = best_scored(model, blocks.power[inside], count, guesses, bounds, steps, most + _HOPELESS)
         hurst, corner = (float(value) for value in best.values[:2])
         is_far = best.deviance + 2.0 * parameters > most + _FAR
         if is_far or not (first < corner < last and best.is_regular):
-            return None
-        edges, guesses = _edges(frame, hurst, float(np.exp(-corner))), [best.values]
-        if edges is None or is_sharp:
+            fits = fits if is_filtered or form != NONE else []
             break
-    error = float(best.half_widths[0])
+        fits.append(best)
+        if shape in (SUDDEN, LEAKY):
+            break
+        square = float(best.values[2]) if form != NONE else 0.0
+        edges, jump = _edges(frame, hurst, float(np.exp(-corner)), shape, square)
+        guesses = [best.values]
+        if edges is None:
+            break
+    if not fits:
+        return None
+    # a filter may have reflected the heights at the edges, as those of the first fit, or gone on beyond them
+    fits = fits if shape == HIGH_PASS else [fits[0], fits[-1]] if form != NONE else fits[-1:]
+    best = min(fits, key=lambda fit: fit.deviance)
+    hurst, corner = (float(value) for value in best.values[:2])
+    error = float(best.half_widths[0]) * (_CORRELATED if form != NONE else 1.0)
     law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
     spread = float(np.sqrt(best.values[2])) if form != NONE else 0.0
-    return RollOff(law, float(np.exp(-corner)), best.deviance + 2.0 * parameters, spread, noise, is_sharp)
+    return RollOff(
+        law,
+        float(np.exp(-corner)),
+        best.deviance + 2.0 * parameters,
+        spread,
+        noise or weak_noise > 0.0,
+        shape,
+        form,
+    )
 
 
-def _edges(frame: Frame, hurst: float, length: float) -> Array | None:
-    """Return the logarithm of the expected power of a surface with a roll-off over its spectral density.
+def _white(frame: Frame, inside: Array, logs: Array, share: float) -> float:
+    """Return the logarithm of the power of noise, given as a share of the rms increment along x."""
+    steps = 2.0 - 2.0 * np.cos(frame.waves[-1][inside] * frame.spacing[-1])
+    return float(2.0 * np.log(share) + np.log(np.average(steps * np.exp(logs), weights=frame.count[inside])))
 
-    Its covariance is that of a torus of twice the size. None for a profile, and for a large surface.
+
+def _edges(
+    frame: Frame, hurst: float, length: float, shape: str, blur: float
+) -> tuple[Array | None, Array | None]:
+    """Return what the edges add to a surface with a roll-off, as logarithms by blocks.
+
+    The expected power over the spectral density; and that of the jump of the slope of heights with a squared
+    spread `blur` over that of the heights without it, None without blur. The covariance is that of a torus of
+    twice the size. None for a profile, and for a large surface.
     """
     if frame.axes == 1 or min(frame.shape) > LARGEST:
-        return None
+        return None, None
     y, x = (np.pi * np.arange(n + 1) / (n * d) for n, d in zip(frame.shape, frame.spacing, strict=True))
     square = (2.0 * np.pi / length) ** 2
-    logs = [replace(frame, waves=(np.full(x.size, line), x)).rolled_densities(hurst, square)[0] for line in y]
-    covariance = fft.dct(np.exp(np.array(logs)), 1, (0, 1))[:-1, :-1] / (4.0 * np.prod(frame.shape))
-    power = lattice_power(frame, covariance)
-    return np.asarray(np.log(power) - frame.rolled_densities(hurst, square)[0])
+    lines = (replace(frame, waves=(np.full(x.size, line), x)) for line in y)
+    logs = np.array([line.rolled_densities(hurst, square, shape)[0] for line in lines])
+
+    def power(density: Array) -> Array:
+        covariance = fft.dct(density, 1, (0, 1))[:-1, :-1] / (4.0 * np.prod(frame.shape))
+        return lattice_power(frame, covariance)
+
+    plain = power(np.exp(logs))
+    edges = np.asarray(np.log(plain) - frame.rolled_densities(hurst, square, shape)[0])
+    if not blur:
+        return edges, None
+    blurred = power(np.exp(logs - blur * (y[:, None] ** 2 + x**2)))
+    jump = np.maximum(blurred - plain * np.exp(-blur * frame.squares), _LEAST_JUMP * plain)
+    return edges, np.log(jump / plain)
 
 
 def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Estimate:
     """Return the estimate of a surface with a roll-off."""
     law, dx = rolloff.law, surface.spacing[1]
     power = "-1 - H" if blocks.axes == 2 else "-1/2 - H"
-    form = f"{'max(q^2, q_0^2)' if rolloff.is_sharp else '(q^2 + q_0^2)'}^({power})"
+    length = f"{rolloff.length * dx:.3g} m{_beside(rolloff)}"
+    if rolloff.is_filtered:
+        note = f"a Gaussian high-pass filter with a cut-off of {length}: waves longer than it are not there"
+    else:
+        form = f"{'max(q^2, q_0^2)' if rolloff.shape == SUDDEN else '(q^2 + q_0^2)'}^({power})"
+        note = f"a {rolloff.shape} roll-off: the spectrum falls as {form} with a corner at waves of {length}"
     return Estimate(
         law.hurst,
         0.5 * (law.high - law.low) / NORMAL,
@@ -169,8 +277,7 @@ def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Esti
         scale_min=float(blocks.wavelength.min()) * dx,
         scale_max=rolloff.length * dx,
         window=_WINDOW,
-        note=f"a {'sudden' if rolloff.is_sharp else 'slow'} roll-off: the spectrum falls as {form} with a "
-        f"corner at waves of {rolloff.length * dx:.3g} m{_beside(rolloff)}",
+        note=note,
     )
 
 

@@ -29,11 +29,20 @@ from fractalcontact.dimensions._exponent_by_scale import (
     octaves,
     run_estimate,
 )
-from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
+from fractalcontact.dimensions._mode_blocks import (
+    HIGH_PASS,
+    HIGHEST,
+    LEAKY,
+    LOWEST,
+    SLOW,
+    SUDDEN,
+    Frame,
+    node_weights,
+)
 from fractalcontact.dimensions._records import NORMAL, Estimate, joined
 from fractalcontact.dimensions._rolloff import RollOff, fit_rolloff, rolloff_estimate
 from fractalcontact.dimensions._surface_input import Surface
-from fractalcontact.dimensions._transfer_functions import NONE
+from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, NONE, TRANSFER
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -51,6 +60,10 @@ ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur 
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
+_WEAK_NOISE = 0.1  # of the rms increment: noise beside a roll-off that the interval allows for
+_PRESENT, _ROLLED = 0.25, 0.6  # exponent of the longest waves that are not filtered; the same of a roll-off
+_NO_BLUR, _FIRST_SPREAD = (NONE, 0.0), 0.7  # the latter of a filter of short waves
+_LEFT = 45.0  # deviance that the edges change less where no waves are left out
 _AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
 _TWO_WINDOW = "the short waves, in which the rougher of two added surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
@@ -196,38 +209,91 @@ class Explanations:
         """Slow roll-offs of a fractal exponent with their `excess`, the likeliest first.
 
         Noise is fitted where a roll-off alone explains the waves. Elsewhere, where blur and noise leave the
-        longest waves out, or show noise, the roll-off has their blur, on their waves and longer ones.
+        longest waves out, or show noise, the roll-off has a blur. A high-pass filter is tried where the
+        longest waves are weak.
         """
-        fit, squares, inside = self.fit, self.blocks.wavelength**-2.0, self.everywhere
-        reference = self._reference(inside)
-        plain = fit_rolloff(self.blocks, inside, most=reference)
-        fits, most = [plain], np.inf
-        if plain is not None and plain.penalised < reference + ALIKE:
-            fits.append(fit_rolloff(self.blocks, inside, noise=True, starts=(plain.law.hurst + 0.05,)))
+        fit = self.fit
+        found = self._fitted(_NO_BLUR)
+        if found and found[0][0] < ALIKE:
+            starts = (found[0][1].law.hurst + 0.05,)
+            noisy = self._fitted(_NO_BLUR, noise=True, starts=starts)
+            found += [pair for pair in noisy if pair[0] < found[0][0] - _AGAINST_NOISE]
+            # without aliases noise would only stand for them
+            found += self._fitted(_NO_BLUR, weak_noise=_WEAK_NOISE, starts=starts) if self.has_aliases else []
         elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
-            inside = fit.inside | (squares < squares[fit.inside].min())
-            reference, blur = self._reference(inside), (fit.form, fit.spread)
-            fits = [fit_rolloff(self.blocks, inside, blur=blur, most=reference)]
-            if self.is_shortened:
-                fits.append(fit_rolloff(self.blocks, inside, blur=blur, noise=True, most=reference))
-            else:
-                most = 0.0  # what looks like noise may be the plateau
-        found = [(each.penalised - reference, each) for each in fits if each]
-        found = [each for each in found if each[0] < most]
+            found = self._blurred(dict.fromkeys((fit.form, FILTER, BEFORE), fit.spread), SLOW)
+            if not self.is_shortened:  # what looks like noise may be the plateau
+                found = [(excess, each) for excess, each in found if excess < 0.0 and not each.noise]
+        longest = self.record[-1].fit
+        if 0.5 * (longest.hurst + longest.high) < (_PRESENT if not found else _ROLLED):
+            found += self._high_passed
         found = [each for each in found if each[1].law.hurst > LEAST_EXPONENT and each[1].law.low < 1.0]
-        return sorted(
-            found, key=lambda each: each[0] + _AGAINST_NOISE * (each[1].noise and not each[1].spread)
+        return sorted(found, key=lambda each: each[0] + _AGAINST_NOISE * each[1].has_noise_alone)
+
+    @cached_property
+    def _high_passed(self) -> list[tuple[float, RollOff]]:
+        """High-pass filters; none where a sudden roll-off, of which a run of octaves is left, is likelier."""
+        spreads = {NONE: 0.0, FILTER: _FIRST_SPREAD, TRANSFER: _FIRST_SPREAD}
+        found = (
+            self._blurred(spreads, HIGH_PASS) if self.has_aliases else self._fitted(_NO_BLUR, shape=HIGH_PASS)
         )
+        if not found:
+            return []
+        least, best = min(found, key=lambda pair: pair[0])
+        sudden = self._fitted((best.form, best.spread), shape=SUDDEN)
+        return [] if sudden and sudden[0][0] < least else found
+
+    def _blurred(self, spreads: dict[str, float], shape: str) -> list[tuple[float, RollOff]]:
+        """Fit some forms of blur with a first guess of their spreads, the best of them also with noise.
+
+        Where the first form is no explanation, and the longest waves are not weak, nothing else is tried.
+        A filter of short waves before the high-pass filter has also removed noise.
+        """
+        found: list[tuple[float, RollOff]] = []
+        for blur in spreads.items():
+            if blur[0] == TRANSFER and found and found[0] == min(found, key=lambda pair: pair[0]):
+                break  # another form of blur is no better than none
+            found += self._fitted(blur, shape=shape)
+            if not (self.is_shortened or (found and found[0][0] < 0.0)):
+                return []
+        best = min(found, key=lambda pair: pair[0], default=(np.inf, None))[1]
+        blur = next(iter(spreads.items())) if best is None else (best.form, best.spread)
+        if shape == SLOW or blur == _NO_BLUR:
+            found += self._fitted(blur, shape=shape, noise=True)
+        return found + (self._fitted(blur, shape=LEAKY) if shape == HIGH_PASS else [])
+
+    def _fitted(self, blur: tuple[str, float], **options: Any) -> list[tuple[float, RollOff]]:
+        """Fit one roll-off; beside a blur on its waves and longer ones."""
+        inside, reference = self._whole if blur == _NO_BLUR else self._beside_blur
+        most = reference if self.is_shortened or blur == _NO_BLUR else reference - _LEFT
+        rolloff = fit_rolloff(self.blocks, inside, blur=blur, most=most, **options)
+        return [(rolloff.penalised - reference, rolloff)] if rolloff else []
+
+    @cached_property
+    def _whole(self) -> tuple[Array, float]:
+        """All blocks, and the penalised deviance of blur and noise on them."""
+        return self.everywhere, self._reference(self.everywhere)
+
+    @cached_property
+    def _beside_blur(self) -> tuple[Array, float]:
+        """Blocks of blur and noise with those of longer waves, and the penalised deviance on them."""
+        squares, inside = self.blocks.wavelength**-2.0, self.fit.inside
+        inside = inside | (squares < squares[inside].min())
+        return inside, self._reference(inside)
 
     @property
     def rolloff(self) -> RollOff | None:
-        """The likeliest slow roll-off; with a blur it holds others that are nearly as likely."""
+        """The likeliest roll-off; it holds those of other forms, or with noise, nearly as likely."""
         if not self._rolloffs:
             return None
         excess, best = self._rolloffs[0]
-        laws = [best.law]
-        if best.spread:
-            laws = [each.law for other, each in self._rolloffs if other < excess + ALIKE]
+        near = [each for other, each in self._rolloffs if other < excess + ALIKE]
+        alike = [
+            each
+            for each in near
+            if each.is_filtered != best.is_filtered or (each.has_noise_alone and not each.is_filtered)
+        ]
+        laws = [each.law for each in (near if best.spread else [best, *alike])]
         low, high = min(law.low for law in laws), max(law.high for law in laws)
         return replace(best, law=replace(best.law, low=low, high=high))
 
