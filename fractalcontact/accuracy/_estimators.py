@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy.ndimage import gaussian_filter
-from scipy.special import zeta
+from scipy.special import gamma, kv, zeta
 from scipy.stats import binomtest, chi2
 
 from fractalcontact import dimensions, surfaces
@@ -36,9 +36,11 @@ SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
 FAMILIES = {
     "fbm": "exact fractional Brownian surface",
     "crop": "free part of a periodic surface of twice the edge, power law down to the spacing, no aliases",
+    "matern": "exact surface of the Matern covariance, a slow roll-off from an eighth of the edge on",
     "profile": "exact fractional Brownian profile",
     "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
 }
+ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
 SPACING, HEIGHT = 1e-4, 1e-6  # m
 BATCH = 1 << 22  # points generated at a time
 MARK, MARK_ANGLE = 7.0, 0.5  # wavelength in spacings and azimuth, radian, of an oblique wave
@@ -121,8 +123,10 @@ def estimators(
         Points along an edge, at least 16.
     families : str or sequence of str
         "fbm": exact fractional Brownian surfaces; "spectral": periodic ones, a power law from the extent down
-        to 4 spacings; "crop": a free quarter of periodic ones, a power law down to the spacing; "profile":
-        exact fractional Brownian profiles. A method that is right on one of them may be wrong on another.
+        to 4 spacings; "crop": a free quarter of periodic ones, a power law down to the spacing; "matern":
+        exact samples of the Matern covariance, a slow roll-off with a corner at waves of an eighth of the
+        edge; "profile": exact fractional Brownian profiles. A method that is right on one of them may be
+        wrong on another.
     methods : str or sequence of str, optional
         Out of `fractalcontact.dimensions.methods()`. Default: all of them.
     members : int or sequence of int, optional
@@ -203,6 +207,8 @@ def _bound(family: str, hurst: float, n: int, blur: float = 0.0) -> float:
         return brownian_bound(hurst, n, blur)
     if family == "crop":
         return brownian_bound(hurst, n, blur, aliases=False)
+    if family == "matern":
+        return rolloff_bound(hurst, n, n / ROLLOFF, blur)
     if family == "profile":
         return brownian_bound(hurst, n, blur, axes=1)
     return band_bound((n, n), SHORTEST, float(n))
@@ -222,9 +228,28 @@ def _surfaces(
         steps = np.diff(periodic.values, axis=-1)
         result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide[0]), x=slice(wide[1]))
         result = surfaces.from_array(result.values, SPACING)
+    elif family == "matern":
+        heights = [matern(wide, hurst, n / ROLLOFF, stream) for _ in range(count)]
+        result = surfaces.from_array(HEIGHT * np.array(heights), SPACING)
     else:
         result = surfaces.fbm(wide, SPACING, rms_increment=HEIGHT, **options)
     return _with_defects(result, n, margin, defects, stream)
+
+
+def matern(shape: tuple[int, ...], hurst: float, corner: float, stream: np.random.Generator) -> Array:
+    """Return heights of unit rms increment with the spectrum (q^2 + q_0^2)^(-1 - H), exact by embedding.
+
+    `corner` is the wavelength of q_0 in spacings. Dietrich and Newsam (1997), SIAM J. Sci. Comput. 18.
+    """
+    y, x = (np.minimum(np.arange(2 * n), 2 * n - np.arange(2 * n)) for n in shape)
+    lag = 2.0 * np.pi / corner * np.hypot(y[:, None], x)
+    covariance = 2.0 ** (hurst - 1.0) * gamma(hurst) * np.ones(lag.shape)
+    apart = lag > 0.0
+    covariance[apart] = lag[apart] ** hurst * kv(hurst, lag[apart])
+    covariance /= 2.0 * (covariance[0, 0] - covariance[0, 1])
+    power = np.maximum(np.fft.fft2(covariance).real, 0.0)
+    heights = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
+    return np.asarray(heights[: shape[0], : shape[1]])
 
 
 def _with_defects(
@@ -392,6 +417,28 @@ def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, al
         slope = -np.log(squares)
     inside = blur**2 * squares < np.log(2.0)
     return float(np.sqrt(2.0 / (np.var(slope[inside]) * inside.mean() * n**axes)))
+
+
+def rolloff_bound(hurst: float, n: int, corner: float, blur: float = 0.0) -> float:
+    """Return the bound of a surface with a slow roll-off, whose corner and amplitude are unknown."""
+    points = min(n, 2 * BOUND_POINTS)
+    w = (np.arange(points) + 0.5) / points * np.pi
+    turns = 2.0 * np.pi * np.arange(-2, 3)[:, None]
+    squares = (w + turns)[:, None, :, None] ** 2 + (w + turns)[None, :, None, :] ** 2
+
+    def logs(exponent: float, length: float) -> Array:
+        """Far aliases do not feel the corner."""
+        rolled = (squares + (2.0 * np.pi / length) ** 2) ** (-1.0 - exponent) - squares ** (-1.0 - exponent)
+        return np.asarray(np.log(aliased_power_law((w[:, None], w), exponent) + rolled.sum(axis=(0, 1))))
+
+    step = BOUND_STEP
+    low, high = max(hurst - step, 1e-6), hurst + step
+    slope = (logs(high, corner) - logs(low, corner)) / (high - low)
+    bend = logs(hurst, corner * (1.0 + step)) - logs(hurst, corner)
+    inside = blur**2 * (w[:, None] ** 2 + w**2) < np.log(2.0)
+    slope, bend = (part[inside] - part[inside].mean() for part in (slope, bend))
+    unexplained = slope - bend * (slope @ bend) / (bend @ bend)
+    return float(np.sqrt(2.0 / np.sum(unexplained**2)) * points / n)
 
 
 def aliased_density(hurst: float) -> Array:

@@ -14,8 +14,9 @@ import numpy as np
 
 from fractalcontact.base.spectra import half_wavenumbers, periodogram, radial_wavenumber
 from fractalcontact.dimensions import _whittle
+from fractalcontact.dimensions._exponent_by_scale import best_scored
 from fractalcontact.dimensions._quantisation import rounding_note
-from fractalcontact.dimensions._records import ASKED, SIGNIFICANT, Estimate, joined, undefined
+from fractalcontact.dimensions._records import ASKED, NORMAL, SIGNIFICANT, Estimate, joined, undefined
 from fractalcontact.dimensions._surface_input import Scales, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -24,6 +25,9 @@ LEAST_BEYOND = 7  # modes beyond the last corner of a roll-off that is tried
 _CUT_OFF = 1e-3  # a fall of the mean power by this factor from one ring to all the next is a cut-off
 _NEXT = 4  # rings that must all have fallen: a single mode may be that weak by chance
 _PENALTY = 6.0  # decrease of the deviance that a roll-off of a surface must bring
+_ALIKE = 4.0  # deviance up to which one form of roll-off may be another
+_PER_OCTAVE = 32  # rings of a slow roll-off
+_OR_SLOW = "a slow roll-off explains the waves nearly as well: the interval holds its exponent"
 _EVERY, _CORNERS = 64, 50  # corners tried: all of the first, then so many at growing distances
 _LOWEST, _HIGHEST, _POINTS = -0.4, 1.9, 24  # Hurst exponents searched with a roll-off, and first points
 _WINDOW = "all modes of the band: cut-offs and roll-off found from the spectrum"
@@ -46,6 +50,7 @@ def periodic_likelihood(surface: Surface, scales: Scales, noise: bool) -> Estima
         low, high = band(modes)
     else:
         low, high = unit / scales[1], unit / scales[0]
+    slow = fit_slow_rolloff(modes, low) if surface.axes == 2 and scales is None and not noise else None
     modes = modes.between(low, high)
     if modes.weights.sum() < _whittle.LEAST_MODES:
         return undefined(
@@ -55,6 +60,8 @@ def periodic_likelihood(surface: Surface, scales: Scales, noise: bool) -> Estima
         modes, fit, estimate = _with_rolloff(modes)
     else:
         fit, estimate = _whittle.fit_interval(modes, 0.5, noise)
+    if slow is not None:
+        modes, estimate = _with_slow_rolloff(slow, modes, estimate, unit)
     if noise and (surface.axes == 1 or (scales is None and abs(fit.misfit) > SIGNIFICANT)):
         estimate = estimate.without_interval(_CUT_OFF_BELOW_NOISE)
     rounding = "" if noise else rounding_note(surface.heights, estimate.standard_error)
@@ -90,6 +97,26 @@ def _with_rolloff(modes: PeriodicModes) -> tuple[PeriodicModes, _whittle.Whittle
         ci_high=high,
     )
     return modes, fit, estimate
+
+
+def _with_slow_rolloff(
+    slow: SlowRolloff, modes: PeriodicModes, estimate: Estimate, unit: float
+) -> tuple[PeriodicModes, Estimate]:
+    """Return the estimate of a slow roll-off, or hold it in that of a power law that is nearly as likely."""
+    law = slow.fit
+    if slow.gain < 0.0:
+        return modes, estimate.holding(law.low, law.high, _OR_SLOW)
+    rolled = Estimate(
+        law.hurst,
+        law.standard_error,
+        law.low,
+        law.high,
+        note="a slow roll-off: the spectrum falls as (q^2 + q_0^2)^(-1 - H) with a corner at waves of "
+        f"{unit / law.corner:.3g} m",
+    )
+    if slow.gain < _ALIKE:
+        rolled = rolled.holding(estimate.ci_low, estimate.ci_high)
+    return modes.between(law.corner, np.inf), rolled
 
 
 @dataclass(frozen=True)
@@ -263,6 +290,53 @@ class RolloffFit:
     low: float
     high: float
     corner: float
+
+
+@dataclass(frozen=True)
+class SlowRolloff:
+    """A slow roll-off, and the decrease of the deviance against the best sudden one, or none."""
+
+    fit: RolloffFit
+    gain: float
+
+
+def fit_slow_rolloff(modes: PeriodicModes, low: float) -> SlowRolloff | None:
+    """Fit amplitude * (q^2 + q_0^2)^(-axes / 2 - H) between the cut-offs; None where it is not likely.
+
+    `low` is the wavenumber from which a power law holds without it, or -inf.
+    """
+    modes = modes.between(*cut_offs(modes))
+    if modes.wavenumber.size < LEAST_BEYOND:
+        return None
+    ring = np.unique(np.rint(_PER_OCTAVE * np.log2(modes.wavenumber)), return_inverse=True)[1]
+    count = np.bincount(ring, modes.weights)
+    mean = np.bincount(ring, modes.weights * modes.power) / count
+    logs = np.bincount(ring, modes.weights * np.log(modes.wavenumber)) / count
+    power = 0.5 * modes.axes
+
+    def model(values: Array) -> tuple[Array, Array]:
+        square = np.exp(2.0 * values[1])
+        rolled = np.log(np.exp(2.0 * logs) + square)
+        return -(power + values[0]) * rolled, np.stack(
+            [-rolled, -2.0 * (power + values[0]) * square * np.exp(-rolled)]
+        )
+
+    first, last = float(logs.min()), float(logs.max())
+    bounds = np.array([_LOWEST, first - 1.0]), np.array([_HIGHEST, last])
+    starts = [np.array([hurst, 0.7 * first + 0.3 * last]) for hurst in (0.3, 0.8)]
+    best = best_scored(model, mean, count, starts, bounds, np.array([0.2, 0.7]))
+    hurst, corner = (float(value) for value in best.values)
+    if not (bounds[0][1] < corner < last and best.is_regular and 0.0 < hurst < 1.0):
+        return None
+    radius = np.exp(logs)
+    plain = _deviance(radius, mean, count, modes.axes)
+    sudden = plain if low == -np.inf else _deviance(np.maximum(radius, low), mean, count, modes.axes)
+    gain = sudden - best.deviance
+    if gain < -_ALIKE or plain - best.deviance < _PENALTY:
+        return None
+    error = float(best.half_widths[0])
+    law = RolloffFit(hurst, error / NORMAL, hurst - error, hurst + error, float(np.exp(corner)))
+    return SlowRolloff(law, gain)
 
 
 def fit_rolloff(modes: PeriodicModes) -> RolloffFit:

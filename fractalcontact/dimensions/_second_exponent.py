@@ -65,6 +65,7 @@ _PRESENT, _ROLLED = 0.25, 0.6  # exponent of the longest waves that are not filt
 _NO_BLUR, _FIRST_SPREAD = (NONE, 0.0), 0.7  # the latter of a filter of short waves
 _LEFT = 45.0  # deviance that the edges change less where no waves are left out
 _AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
+_AGAINST_FILTER = 4.0  # the same of a high-pass filter in place of a roll-off
 _TWO_WINDOW = "the short waves, in which the rougher of two added surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
 NO_ALIASES = "there are no waves shorter than two spacings, as in a crop of a periodic surface"
@@ -228,7 +229,12 @@ class Explanations:
         if 0.5 * (longest.hurst + longest.high) < (_PRESENT if not found else _ROLLED):
             found += self._high_passed
         found = [each for each in found if each[1].law.hurst > LEAST_EXPONENT and each[1].law.low < 1.0]
-        return sorted(found, key=lambda each: each[0] + _AGAINST_NOISE * each[1].has_noise_alone)
+        return sorted(
+            found,
+            key=lambda pair: (
+                pair[0] + _AGAINST_NOISE * pair[1].has_noise_alone + _AGAINST_FILTER * pair[1].is_filtered
+            ),
+        )
 
     @cached_property
     def _high_passed(self) -> list[tuple[float, RollOff]]:
@@ -359,7 +365,10 @@ class Explanations:
             limit = _SHORTENED if self.is_shortened else limit
         elif run.first > 0 or run.last == len(self.record):
             return None  # only the shortest waves show that there are no aliases
-        return ("run", self.run_excess) if self.run_excess < limit else None
+        if self.run_excess > limit:
+            return None
+        # where blur and noise leave the longest waves out, the same is left to a roll-off
+        return min(("run", self.run_excess), ("rolloff", self.rolloff_excess), key=lambda kind: kind[1])
 
     def excess(self, penalised: float) -> float:
         """Return a penalised deviance less that of blur and noise."""

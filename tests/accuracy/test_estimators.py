@@ -107,6 +107,17 @@ def test_blurred_and_noisy_members_of_a_family(family, n):
     assert min(sharp["interval_coverage"], wide["interval_coverage"]) > 0.7
 
 
+def test_slow_rolloff_is_fitted_near_its_bound():
+    """With an unknown corner the least error is more than twice that of fractional Brownian heights."""
+    table = fc.accuracy.estimators(0.5, 96, "matern", "likelihood", members=8, rng=3).squeeze()
+    assert table["interval_coverage"].item() > 0.7
+    assert 0.4 < table["error_ratio"].item() < 2.0
+    assert (
+        table["least_error"].item()
+        > 2.0 * fc.accuracy.estimators(0.5, 96, "fbm", "increments", members=2, rng=3)["least_error"].item()
+    )
+
+
 def test_marks_of_a_profile_are_removed():
     table = fc.accuracy.estimators(0.5, 512, "profile", "likelihood", members=6, marks=3.0, rng=3).squeeze()
     assert abs(table["bias"].item()) < 0.15

@@ -59,3 +59,22 @@ def test_rolloff_interval_coverage(corner, count):
         result = _periodic_modes.fit_rolloff(modes_of_a_profile(expected * rng.exponential(size=count)))
         covered += result.low <= 0.5 <= result.high
     assert 0.95 - 3 * 0.0126 < covered / 300 < 0.95 + 3 * 0.0126
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_slow_rolloff_of_whole_periodic_surfaces(hurst):
+    """Once .08 to .28 too small: no octave has the exponent of the short waves."""
+    n, corner = 128, 16.0
+    wave = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.fftfreq(n), indexing="ij")) * corner
+    inside, found = 0, []
+    for rng in range(8):
+        white = np.fft.fft2(np.random.default_rng(rng).standard_normal((n, n)))
+        heights = np.fft.ifft2(white * (1.0 + wave**2) ** (-0.5 - 0.5 * hurst)).real
+        surface = fc.surfaces.from_array(1e-6 * heights, 1e-4, periodic=True)
+        result = fc.dimensions.estimate(surface).isel(method=0)
+        inside += bool(result.ci_low <= hurst <= result.ci_high)
+        found.append(float(result.hurst))
+        assert float(result.ci_high - result.ci_low) < 0.2
+        assert "a slow roll-off" in result.hurst.attrs["comment"]
+    assert inside >= 7  # measured: .98 of 240
+    assert np.mean(found) == pytest.approx(hurst, abs=0.03)
