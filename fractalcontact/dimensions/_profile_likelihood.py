@@ -34,11 +34,9 @@ from fractalcontact.dimensions._mode_blocks import LOWEST, SLOW, SUDDEN
 from fractalcontact.dimensions._profile_increments import by_increments, without_jumps
 from fractalcontact.dimensions._quantisation import quantisation
 from fractalcontact.dimensions._records import Estimate, joined, undefined
-from fractalcontact.dimensions._rolloff import fit_rolloff, rolloff_estimate
+from fractalcontact.dimensions._rolloff import ALIKE, LEAST_EXPONENT, fit_rolloff, rolloff_estimate
 from fractalcontact.dimensions._second_exponent import (
-    ALIKE,
     DECISIVE,
-    LEAST_EXPONENT,
     NO_ALIASES,
     Explanations,
     fit_knee,

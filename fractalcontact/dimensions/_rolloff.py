@@ -1,19 +1,21 @@
 """A spectrum that bends slowly into a plateau of long waves, as (q^2 + q_0^2)^(-1 - H) (K-correlation).
 
 It is that of the Matern covariance. No octave has the exponent of the short waves, but all waves together
-have it. Palasantzas (1993), Phys. Rev. B 48, 14472.
+have it. Palasantzas (1993), Phys. Rev. B 48, 14472. Also a spectrum whose long waves a Gaussian high-pass
+filter has taken (ISO 16610-61), as instrument software does: (1 - 2^(-(q / q_0)^2))^2 q^(-2 - 2 H).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.dimensions._blur import BlurredFit
 from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, Scored, best_scored
 from fractalcontact.dimensions._mode_blocks import (
     HIGH_PASS,
@@ -29,10 +31,18 @@ from fractalcontact.dimensions._mode_blocks import (
 )
 from fractalcontact.dimensions._records import NORMAL, Estimate
 from fractalcontact.dimensions._surface_input import Surface
-from fractalcontact.dimensions._transfer_functions import NONE, Window
+from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, NONE, TRANSFER, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
+ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
+_LEFT = 45.0  # deviance that the edges change less where no waves are left out
+_AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
+_AGAINST_FILTER = 4.0  # the same of a high-pass filter in place of a roll-off
+_WEAK_NOISE = 0.1  # of the rms increment: noise beside a roll-off that the interval allows for
+_PRESENT, _ROLLED = 0.25, 0.6  # exponent of the longest waves that are not filtered; the same of a roll-off
+_NO_BLUR, _FIRST_SPREAD = (NONE, 0.0), 0.7  # the latter of a filter of short waves
 _LEAST_LENGTH = 2.5  # spacings: a shorter corner leaves no waves beyond it
 _STARTS = 0.3, 0.8  # first guesses of H
 _LARGEST_SQUARE = 200.0  # spread of a blur
@@ -257,6 +267,131 @@ def _edges(
     blurred = power(np.exp(logs - blur * (y[:, None] ** 2 + x**2)))
     jump = np.maximum(blurred - plain * np.exp(-blur * frame.squares), _LEAST_JUMP * plain)
     return edges, np.log(jump / plain)
+
+
+@dataclass(frozen=True)
+class RollOffs:
+    """Roll-offs and high-pass filters as explanations of the same waves.
+
+    Attributes
+    ----------
+    blocks : Blocks
+    fit : BlurredFit
+        Blur and noise.
+    longest : PowerLaw
+        That of the longest octave.
+    reference : callable
+        Return the penalised deviance of blur and noise on some blocks.
+    is_shortened : bool
+        Whether the longest waves do not belong to blur and noise.
+    has_aliases : bool
+    """
+
+    blocks: Blocks
+    fit: BlurredFit
+    longest: PowerLaw
+    reference: Callable[[Array], float]
+    is_shortened: bool
+    has_aliases: bool
+
+    @cached_property
+    def ranked(self) -> list[tuple[float, RollOff]]:
+        """Slow roll-offs of a fractal exponent with their `excess`, the likeliest first.
+
+        Noise is fitted where a roll-off alone explains the waves. Elsewhere, where blur and noise leave the
+        longest waves out, or show noise, the roll-off has a blur. A high-pass filter is tried where the
+        longest waves are weak.
+        """
+        fit = self.fit
+        found = self._fitted(_NO_BLUR)
+        if found and found[0][0] < ALIKE:
+            starts = (found[0][1].law.hurst + 0.05,)
+            noisy = self._fitted(_NO_BLUR, noise=True, starts=starts)
+            found += [pair for pair in noisy if pair[0] < found[0][0] - _AGAINST_NOISE]
+            # without aliases noise would only stand for them
+            found += self._fitted(_NO_BLUR, weak_noise=_WEAK_NOISE, starts=starts) if self.has_aliases else []
+        elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
+            found = self._blurred(dict.fromkeys((fit.form, FILTER, BEFORE), fit.spread), SLOW)
+            if not self.is_shortened:  # what looks like noise may be the plateau
+                found = [(excess, each) for excess, each in found if excess < 0.0 and not each.noise]
+        longest = self.longest
+        if 0.5 * (longest.hurst + longest.high) < (_PRESENT if not found else _ROLLED):
+            found += self._high_passed
+        found = [each for each in found if each[1].law.hurst > LEAST_EXPONENT and each[1].law.low < 1.0]
+        return sorted(
+            found,
+            key=lambda pair: (
+                pair[0] + _AGAINST_NOISE * pair[1].has_noise_alone + _AGAINST_FILTER * pair[1].is_filtered
+            ),
+        )
+
+    @cached_property
+    def _high_passed(self) -> list[tuple[float, RollOff]]:
+        """High-pass filters; none where a sudden roll-off, of which a run of octaves is left, is likelier."""
+        spreads = {NONE: 0.0, FILTER: _FIRST_SPREAD, TRANSFER: _FIRST_SPREAD}
+        found = (
+            self._blurred(spreads, HIGH_PASS) if self.has_aliases else self._fitted(_NO_BLUR, shape=HIGH_PASS)
+        )
+        if not found:
+            return []
+        least, best = min(found, key=lambda pair: pair[0])
+        sudden = self._fitted((best.form, best.spread), shape=SUDDEN)
+        return [] if sudden and sudden[0][0] < least else found
+
+    def _blurred(self, spreads: dict[str, float], shape: str) -> list[tuple[float, RollOff]]:
+        """Fit some forms of blur with a first guess of their spreads, the best of them also with noise.
+
+        Where the first form is no explanation, and the longest waves are not weak, nothing else is tried.
+        A filter of short waves before the high-pass filter has also removed noise.
+        """
+        found: list[tuple[float, RollOff]] = []
+        for blur in spreads.items():
+            if blur[0] == TRANSFER and found and found[0] == min(found, key=lambda pair: pair[0]):
+                break  # another form of blur is no better than none
+            found += self._fitted(blur, shape=shape)
+            if not (self.is_shortened or (found and found[0][0] < 0.0)):
+                return []
+        best = min(found, key=lambda pair: pair[0], default=(np.inf, None))[1]
+        blur = next(iter(spreads.items())) if best is None else (best.form, best.spread)
+        if shape == SLOW or blur == _NO_BLUR:
+            found += self._fitted(blur, shape=shape, noise=True)
+        return found + (self._fitted(blur, shape=LEAKY) if shape == HIGH_PASS else [])
+
+    def _fitted(self, blur: tuple[str, float], **options: Any) -> list[tuple[float, RollOff]]:
+        """Fit one roll-off; beside a blur on its waves and longer ones."""
+        inside, reference = self._whole if blur == _NO_BLUR else self._beside_blur
+        most = reference if self.is_shortened or blur == _NO_BLUR else reference - _LEFT
+        rolloff = fit_rolloff(self.blocks, inside, blur=blur, most=most, **options)
+        return [(rolloff.penalised - reference, rolloff)] if rolloff else []
+
+    @cached_property
+    def _whole(self) -> tuple[Array, float]:
+        """All blocks, and the penalised deviance of blur and noise on them."""
+        everywhere = np.ones(self.blocks.count.size, dtype=bool)
+        return everywhere, self.reference(everywhere)
+
+    @cached_property
+    def _beside_blur(self) -> tuple[Array, float]:
+        """Blocks of blur and noise with those of longer waves, and the penalised deviance on them."""
+        squares, inside = self.blocks.wavelength**-2.0, self.fit.inside
+        inside = inside | (squares < squares[inside].min())
+        return inside, self.reference(inside)
+
+    @property
+    def likeliest(self) -> RollOff | None:
+        """The likeliest roll-off; it holds those of other forms, or with noise, nearly as likely."""
+        if not self.ranked:
+            return None
+        excess, best = self.ranked[0]
+        near = [each for other, each in self.ranked if other < excess + ALIKE]
+        alike = [
+            each
+            for each in near
+            if each.is_filtered != best.is_filtered or (each.has_noise_alone and not each.is_filtered)
+        ]
+        laws = [each.law for each in (near if best.spread else [best, *alike])]
+        low, high = min(law.low for law in laws), max(law.high for law in laws)
+        return replace(best, law=replace(best.law, low=low, high=high))
 
 
 def rolloff_estimate(rolloff: RollOff, blocks: Blocks, surface: Surface) -> Estimate:

@@ -30,23 +30,17 @@ from fractalcontact.dimensions._exponent_by_scale import (
     run_estimate,
 )
 from fractalcontact.dimensions._mode_blocks import (
-    HIGH_PASS,
     HIGHEST,
-    LEAKY,
     LOWEST,
-    SLOW,
-    SUDDEN,
     Frame,
     node_weights,
 )
 from fractalcontact.dimensions._records import NORMAL, Estimate, joined
-from fractalcontact.dimensions._rolloff import RollOff, fit_rolloff, rolloff_estimate
+from fractalcontact.dimensions._rolloff import ALIKE, LEAST_EXPONENT, RollOff, RollOffs, rolloff_estimate
 from fractalcontact.dimensions._surface_input import Surface
-from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, NONE, TRANSFER
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-LEAST_EXPONENT = 0.02  # of the rougher of two surfaces; noise has 0
 _LEAST_CROSSOVER = 2.0  # spacings: shorter waves run along the diagonals only
 _WIDEST = 0.15  # half-width of the exponent of a rougher surface that may be there
 DECISIVE = 2.0  # decrease of the penalised deviance by which several exponents replace blur and noise
@@ -56,16 +50,9 @@ _UNDECIDED = 5.4  # the same beside a run of octaves: 1.4 times 3.84
 _POSSIBLE = 0.5  # decrease of the penalised deviance by which blur or noise may be there
 _AGAINST_SINGLE = 6.0  # decrease by which several exponents without aliases replace a single one
 _FAR = 30.0  # penalised deviance of a run beyond which aliases are not missing
-ALIKE = 4.0  # its increase up to which two exponents may be there, beside blur and noise
 _SHORTEST_KNEE = 8.0  # spacings: shorter waves show blur and noise
 _KNEE_PARAMETERS, _LEAST_KNEE = 5, 12.0  # of two power laws and their place; modes of either
 _KNEE_SEEN = 6.0  # decrease of the deviance by a knee from which the interval of a single exponent holds it
-_WEAK_NOISE = 0.1  # of the rms increment: noise beside a roll-off that the interval allows for
-_PRESENT, _ROLLED = 0.25, 0.6  # exponent of the longest waves that are not filtered; the same of a roll-off
-_NO_BLUR, _FIRST_SPREAD = (NONE, 0.0), 0.7  # the latter of a filter of short waves
-_LEFT = 45.0  # deviance that the edges change less where no waves are left out
-_AGAINST_NOISE = 6.0  # decrease by which noise must lower the penalised deviance of a roll-off
-_AGAINST_FILTER = 4.0  # the same of a high-pass filter in place of a roll-off
 _TWO_WINDOW = "the short waves, in which the rougher of two added surfaces is the stronger"
 _KNEE_WINDOW = "the waves shorter than those on which the exponent changes"
 NO_ALIASES = "there are no waves shorter than two spacings, as in a crop of a periodic surface"
@@ -206,107 +193,26 @@ class Explanations:
         return self.excess(penalised_deviance(self.record, self.run, self.inside))
 
     @cached_property
-    def _rolloffs(self) -> list[tuple[float, RollOff]]:
-        """Slow roll-offs of a fractal exponent with their `excess`, the likeliest first.
-
-        Noise is fitted where a roll-off alone explains the waves. Elsewhere, where blur and noise leave the
-        longest waves out, or show noise, the roll-off has a blur. A high-pass filter is tried where the
-        longest waves are weak.
-        """
-        fit = self.fit
-        found = self._fitted(_NO_BLUR)
-        if found and found[0][0] < ALIKE:
-            starts = (found[0][1].law.hurst + 0.05,)
-            noisy = self._fitted(_NO_BLUR, noise=True, starts=starts)
-            found += [pair for pair in noisy if pair[0] < found[0][0] - _AGAINST_NOISE]
-            # without aliases noise would only stand for them
-            found += self._fitted(_NO_BLUR, weak_noise=_WEAK_NOISE, starts=starts) if self.has_aliases else []
-        elif fit.form != NONE and (self.is_shortened or np.isfinite(fit.noise) or fit.low <= LOWEST):
-            found = self._blurred(dict.fromkeys((fit.form, FILTER, BEFORE), fit.spread), SLOW)
-            if not self.is_shortened:  # what looks like noise may be the plateau
-                found = [(excess, each) for excess, each in found if excess < 0.0 and not each.noise]
-        longest = self.record[-1].fit
-        if 0.5 * (longest.hurst + longest.high) < (_PRESENT if not found else _ROLLED):
-            found += self._high_passed
-        found = [each for each in found if each[1].law.hurst > LEAST_EXPONENT and each[1].law.low < 1.0]
-        return sorted(
-            found,
-            key=lambda pair: (
-                pair[0] + _AGAINST_NOISE * pair[1].has_noise_alone + _AGAINST_FILTER * pair[1].is_filtered
-            ),
+    def rolloffs(self) -> RollOffs:
+        """Roll-offs and high-pass filters of the same waves."""
+        return RollOffs(
+            self.blocks,
+            self.fit,
+            self.record[-1].fit,
+            self._reference,
+            is_shortened=self.is_shortened,
+            has_aliases=self.has_aliases,
         )
-
-    @cached_property
-    def _high_passed(self) -> list[tuple[float, RollOff]]:
-        """High-pass filters; none where a sudden roll-off, of which a run of octaves is left, is likelier."""
-        spreads = {NONE: 0.0, FILTER: _FIRST_SPREAD, TRANSFER: _FIRST_SPREAD}
-        found = (
-            self._blurred(spreads, HIGH_PASS) if self.has_aliases else self._fitted(_NO_BLUR, shape=HIGH_PASS)
-        )
-        if not found:
-            return []
-        least, best = min(found, key=lambda pair: pair[0])
-        sudden = self._fitted((best.form, best.spread), shape=SUDDEN)
-        return [] if sudden and sudden[0][0] < least else found
-
-    def _blurred(self, spreads: dict[str, float], shape: str) -> list[tuple[float, RollOff]]:
-        """Fit some forms of blur with a first guess of their spreads, the best of them also with noise.
-
-        Where the first form is no explanation, and the longest waves are not weak, nothing else is tried.
-        A filter of short waves before the high-pass filter has also removed noise.
-        """
-        found: list[tuple[float, RollOff]] = []
-        for blur in spreads.items():
-            if blur[0] == TRANSFER and found and found[0] == min(found, key=lambda pair: pair[0]):
-                break  # another form of blur is no better than none
-            found += self._fitted(blur, shape=shape)
-            if not (self.is_shortened or (found and found[0][0] < 0.0)):
-                return []
-        best = min(found, key=lambda pair: pair[0], default=(np.inf, None))[1]
-        blur = next(iter(spreads.items())) if best is None else (best.form, best.spread)
-        if shape == SLOW or blur == _NO_BLUR:
-            found += self._fitted(blur, shape=shape, noise=True)
-        return found + (self._fitted(blur, shape=LEAKY) if shape == HIGH_PASS else [])
-
-    def _fitted(self, blur: tuple[str, float], **options: Any) -> list[tuple[float, RollOff]]:
-        """Fit one roll-off; beside a blur on its waves and longer ones."""
-        inside, reference = self._whole if blur == _NO_BLUR else self._beside_blur
-        most = reference if self.is_shortened or blur == _NO_BLUR else reference - _LEFT
-        rolloff = fit_rolloff(self.blocks, inside, blur=blur, most=most, **options)
-        return [(rolloff.penalised - reference, rolloff)] if rolloff else []
-
-    @cached_property
-    def _whole(self) -> tuple[Array, float]:
-        """All blocks, and the penalised deviance of blur and noise on them."""
-        return self.everywhere, self._reference(self.everywhere)
-
-    @cached_property
-    def _beside_blur(self) -> tuple[Array, float]:
-        """Blocks of blur and noise with those of longer waves, and the penalised deviance on them."""
-        squares, inside = self.blocks.wavelength**-2.0, self.fit.inside
-        inside = inside | (squares < squares[inside].min())
-        return inside, self._reference(inside)
 
     @property
     def rolloff(self) -> RollOff | None:
-        """The likeliest roll-off; it holds those of other forms, or with noise, nearly as likely."""
-        if not self._rolloffs:
-            return None
-        excess, best = self._rolloffs[0]
-        near = [each for other, each in self._rolloffs if other < excess + ALIKE]
-        alike = [
-            each
-            for each in near
-            if each.is_filtered != best.is_filtered or (each.has_noise_alone and not each.is_filtered)
-        ]
-        laws = [each.law for each in (near if best.spread else [best, *alike])]
-        low, high = min(law.low for law in laws), max(law.high for law in laws)
-        return replace(best, law=replace(best.law, low=low, high=high))
+        """The likeliest roll-off."""
+        return self.rolloffs.likeliest
 
     @property
     def rolloff_excess(self) -> float:
-        """`excess` of the slow roll-off; infinite without one."""
-        return self._rolloffs[0][0] if self._rolloffs else np.inf
+        """`excess` of the likeliest roll-off; infinite without one."""
+        return self.rolloffs.ranked[0][0] if self.rolloffs.ranked else np.inf
 
     @property
     def is_rolloff(self) -> bool:
