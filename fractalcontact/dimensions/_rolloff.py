@@ -110,7 +110,7 @@ def fit_rolloff(
     waves, see `Frame.rolled_densities`.
 
     A blur of some form, with a first guess of its spread, and `noise` are fitted as well; `starts` are first
-    guesses of H. `weak_noise` is the rms height of noise that is not fitted, over the rms increment along x.
+    guesses of H. `weak_noise` is the rms height of noise that is not fitted, over the rms increment.
     A blur changes the power as that of fractional Brownian heights. The power over the spectral
     density, which is that of such heights at first, is in a second fit that of the covariance that the first
     one found: a plateau of long waves has less effect of the edges.
@@ -235,8 +235,11 @@ def _fitted(
 
 
 def _white(frame: Frame, inside: Array, logs: Array, share: float) -> float:
-    """Return the logarithm of the power of noise, given as a share of the rms increment along x."""
-    steps = 2.0 - 2.0 * np.cos(frame.waves[-1][inside] * frame.spacing[-1])
+    """Return the logarithm of the power of noise, given as a share of the rms increment."""
+    # along all axes: where both axes are alike, a block stands for two that are mirrored
+    steps = np.mean(
+        [2.0 - 2.0 * np.cos(w[inside] * d) for w, d in zip(frame.waves, frame.spacing, strict=True)], 0
+    )
     return float(2.0 * np.log(share) + np.log(np.average(steps * np.exp(logs), weights=frame.count[inside])))
 
 

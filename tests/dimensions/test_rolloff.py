@@ -76,3 +76,17 @@ def test_high_passed_surface_has_the_exponent_of_the_shorter_waves():
     assert result.ci_high - result.ci_low < 0.25
     assert result.scale_max.item() == pytest.approx(CUT_OFF * SPACING, rel=0.15)
     assert "a Gaussian high-pass filter" in result.hurst.attrs["comment"]
+
+
+def test_known_noise_of_a_slow_rolloff():
+    """A tenth of the rms increment; without it H is 0.1 too small."""
+    hurst = 0.9
+    lines_of_modes = lines(0, 0.0)
+
+    def matern(r):
+        lag = np.maximum(2.0 * np.pi / 10.0 * r, 1e-7)
+        return lag**hurst * kv(hurst, lag)
+
+    power = pair_sums(lines_of_modes, lines_of_modes, matern, 0) + 0.1**2 * 2.0 * (matern(0.0) - matern(1.0))
+    assert fitted(power, weak_noise=0.1).law.hurst == pytest.approx(hurst, abs=0.02)
+    assert fitted(power).law.hurst < hurst - 0.02
