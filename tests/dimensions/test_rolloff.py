@@ -79,7 +79,7 @@ def test_high_passed_surface_has_the_exponent_of_the_shorter_waves():
 
 
 def test_known_noise_of_a_slow_rolloff():
-    """A tenth of the rms increment; without it H is 0.1 too small."""
+    """A tenth of the rms increment; without it H is 0.03 too small."""
     hurst = 0.9
     lines_of_modes = lines(0, 0.0)
 
