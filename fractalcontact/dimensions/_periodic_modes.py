@@ -14,9 +14,9 @@ import numpy as np
 
 from fractalcontact.base.spectra import half_wavenumbers, periodogram, radial_wavenumber
 from fractalcontact.dimensions import _whittle
-from fractalcontact.dimensions._exponent_by_scale import best_scored
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import ASKED, NORMAL, SIGNIFICANT, Estimate, joined, undefined
+from fractalcontact.dimensions._scored_fit import best_scored
 from fractalcontact.dimensions._surface_input import Scales, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -16,7 +16,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.dimensions._blur import BlurredFit
-from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw, Scored, best_scored
+from fractalcontact.dimensions._exponent_by_scale import Blocks, PowerLaw
 from fractalcontact.dimensions._mode_blocks import (
     HIGH_PASS,
     HIGHEST,
@@ -30,6 +30,7 @@ from fractalcontact.dimensions._mode_blocks import (
     node_weights,
 )
 from fractalcontact.dimensions._records import NORMAL, Estimate
+from fractalcontact.dimensions._scored_fit import Scored, best_scored
 from fractalcontact.dimensions._surface_input import Surface
 from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, NONE, TRANSFER, Window
 

@@ -21,7 +21,6 @@ from fractalcontact.dimensions._exponent_by_scale import (
     Octave,
     PowerLaw,
     Run,
-    best_scored,
     fit_power_law,
     frame_blocks,
     interval_of_run,
@@ -37,6 +36,7 @@ from fractalcontact.dimensions._mode_blocks import (
 )
 from fractalcontact.dimensions._records import NORMAL, Estimate, joined
 from fractalcontact.dimensions._rolloff import ALIKE, LEAST_EXPONENT, RollOff, RollOffs, rolloff_estimate
+from fractalcontact.dimensions._scored_fit import best_scored
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]

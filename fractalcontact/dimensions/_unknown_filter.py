@@ -15,9 +15,9 @@ import numpy as np
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._blur_fit import scatter_of, score_statistic
-from fractalcontact.dimensions._exponent_by_scale import Scored, best_scored
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate
+from fractalcontact.dimensions._scored_fit import Scored, best_scored
 from fractalcontact.dimensions._transfer_functions import edge_power
 
 Array = np.ndarray[Any, np.dtype[Any]]
