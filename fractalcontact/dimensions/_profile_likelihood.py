@@ -30,7 +30,7 @@ from fractalcontact.dimensions._exponent_by_scale import (
     octaves,
     run_estimate,
 )
-from fractalcontact.dimensions._mode_blocks import LOWEST, SLOW, SUDDEN
+from fractalcontact.dimensions._mode_blocks import HIGH_PASS, LOWEST, SLOW, SUDDEN
 from fractalcontact.dimensions._profile_increments import by_increments, without_jumps
 from fractalcontact.dimensions._quantisation import quantisation
 from fractalcontact.dimensions._records import Estimate, joined, undefined
@@ -69,6 +69,8 @@ _SHORTEST_ALIKE = 2.0  # wavenumber of such waves, rad per spacing
 _HOPELESS = (
     2.0  # deviance of octaves without aliases over that of one exponent, beyond which none are missing
 )
+_PRESENT = 0.25  # exponent of the longest waves that no filter has removed
+_LEAST_SPREAD = 0.3  # of a blur beside a high-pass filter, as a first guess
 _LITTLE_NOISE, _LEAST_ALIKE = 0.1, 14.0  # of the power of a wave; modes of such waves
 # standard errors from which the interval holds their exponent, and from which it holds that alone
 _DIFFERENT = 0.5, 2.5
@@ -191,7 +193,7 @@ def _likeliest(
     """
     everywhere = np.ones(blocks.count.size, dtype=bool)
     plain = fit_power_law(blocks, everywhere).deviance + 4.0
-    ranked = _several(blocks, everywhere, surface, plain)
+    ranked = _several(blocks, everywhere, surface, plain) + _high_passed(blocks, fit, surface)
     if fit is not None and blurred is not None:
         ranked.append((Explanations(fit, blocks, has_aliases=False).reference, blurred))
     ranked.sort(key=lambda pair: pair[0])
@@ -240,6 +242,30 @@ def _several(
             found = [(cost, replace(each, note=joined(each.note, NO_ALIASES))) for cost, each in found]
         result += [(cost + DECISIVE, each) for cost, each in found]
     return result
+
+
+def _high_passed(blocks: Blocks, fit: BlurredFit | None, surface: Surface) -> list[tuple[float, Estimate]]:
+    """Return estimates of a Gaussian high-pass filter, perhaps with a blur and noise, and their deviances.
+
+    Octaves of waves shorter than those of the blur have their own law.
+    """
+    record = octaves(blocks)
+    longest, inside = record[-1].fit, np.ones(blocks.count.size, dtype=bool)
+    if 0.5 * (longest.hurst + longest.high) > _PRESENT:
+        return []
+    blurs = [(NONE, 0.0)]
+    if fit is not None and fit.form != NONE:
+        inside = blocks.wavelength >= blocks.wavelength[fit.inside].min()
+        blurs.append((fit.form, max(fit.spread, _LEAST_SPREAD)))
+    parts = [part for part in (octave.inside & ~inside for octave in record) if np.any(part)]
+    rest = sum(fit_power_law(blocks, part).deviance + 4.0 for part in parts)
+    fits = [
+        fit_rolloff(blocks, inside, shape=HIGH_PASS, blur=blur, noise=noise)
+        for blur in blurs
+        for noise in (False, True)
+    ]
+    found = [each for each in fits if each is not None and each.law.hurst > LOWEST and each.law.low < 1.0]
+    return [(each.penalised + rest, rolloff_estimate(each, blocks, surface)) for each in found]
 
 
 def _largest_share(power: Array) -> float:

@@ -66,3 +66,14 @@ def test_other_methods_allow_for_what_a_profile_does_not_show(method):
     low, high = result.ci_low.values, result.ci_high.values
     assert low[1] <= low[0]
     assert high[1] >= high[0] > 0.7
+
+
+def test_roughness_profile_between_two_gaussian_filters():
+    """ISO 16610-21: waves from 5 spacings to an 8th of the length; the exponent was 0.2 too small."""
+    for rng in range(2):
+        heights = gaussian_filter1d(profile(512, 0.7, rng, 130), 0.1874 * 5.0, truncate=6.0)
+        low, high, note = interval(
+            (heights - gaussian_filter1d(heights, 0.1874 * 64.0, truncate=6.0))[130:-130]
+        )
+        assert low < 0.7 < high
+        assert "high-pass filter" in note
