@@ -19,7 +19,8 @@ _PENALTY = 2.0  # Akaike: deviance that a parameter must bring
 CORRELATION = 1.05  # of the squared standard error, for the modes are slightly correlated
 _MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matters
 NARROW = 0.03  # squared spread below which the jump does not matter
-_COST, _NOISE_COST = 5.0, 1.0  # deviance of blur and of noise in the interval where neither is seen
+# deviance of blur, of weak noise, and of stronger noise in the interval where neither is seen
+_COST, _NOISE_COST, _STRONG_NOISE_COST = 5.0, 1.0, 4.0
 _LARGEST = 200.0  # squared spread
 _FILTERED = 0.15  # least squared spread to start a filter from: it is flat at 0, where points have no weight
 _ENDS = 6  # steps to an end of an interval
@@ -319,29 +320,32 @@ class Comparison:
 
         `largest` is the rms noise over the rms increment. The limits are those of the deviance at the best
         blur and noise for each exponent (profile likelihood), so that neither is taken as absent because it
-        is not seen.
+        is not seen. Noise beyond `largest` without blur costs so much that it counts where it makes the modes
+        likelier: unlimited, it would double the interval of an exact surface.
         """
         plain = self.plain
         most = np.inf
         if not plain.has_noise and plain.hurst < 1.0:
             most = 2.0 * largest**2 / (1.0 - plain.hurst)
+
+        def cost(model: Fit) -> float:
+            """Return the deviance with a cost: an exact surface keeps nearly its own interval."""
+            noise = _NOISE_COST if model.most_noise == most else _STRONG_NOISE_COST
+            return model.deviance + _COST * (model.form != NONE) + noise * model.has_noise
+
         forms = ((NONE, 0.0), (TRANSFER, 0.0), (TRANSFER, 0.1), (FILTER, 0.15))[: 4 if blur else 1]
         starts = [replace(plain, form=form, square=square, most_noise=most) for form, square in forms]
+        starts += [plain] if np.isfinite(most) else []
         fits = [plain, *(fit(self.window, start.with_noise(True, self.window)) for start in starts)]
-        least, low, high = min(map(_with_cost, fits)), plain.hurst, plain.hurst
+        least, low, high = min(map(cost, fits)), plain.hurst, plain.hurst
         # of the two starts of one form the better
-        better = {(each.form, each.has_noise): each for each in sorted(fits, key=_with_cost, reverse=True)}
+        better = {(each.form, each.has_noise, each.most_noise): each for each in sorted(fits, key=cost)[::-1]}
         for best in better.values():
-            below, above = (end * best.correlation + least - _with_cost(best) for end in (_BELOW, _ABOVE))
+            below, above = (end * best.correlation + least - cost(best) for end in (_BELOW, _ABOVE))
             if below > 0.0:
                 ends = interval(self.window, best, below, above)
                 low, high = min(low, ends[0]), max(high, ends[1])
         return (low if low > LOWEST else 0.0), high
-
-
-def _with_cost(model: Fit) -> float:
-    """Return the deviance with the cost of blur and noise: an exact surface keeps nearly its own interval."""
-    return model.deviance + _COST * (model.form != NONE) + _NOISE_COST * model.has_noise
 
 
 def compare(window: Window, start: float, *, noise: bool) -> Comparison:
