@@ -1,4 +1,4 @@
-"""Hurst exponent octave by octave of wavelength, and the longest run of octaves with one exponent."""
+"""Fit of an exponent to the modes of an octave of wavelength, or of a run of octaves."""
 
 from __future__ import annotations
 
@@ -7,24 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _blur_fit, _cosine_modes, _mode_blocks
 from fractalcontact.dimensions._blur_fit import CORRELATION
 from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
 from fractalcontact.dimensions._records import NORMAL, Estimate
-from fractalcontact.dimensions._restored_power import MOST_MISSING, restored_power
-from fractalcontact.dimensions._surface_input import (
-    Scales,
-    Surface,
-    between,
-    check_surface,
-    is_lazy,
-    read_surfaces,
-)
+from fractalcontact.dimensions._restored_power import restored_power
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, TRANSFER, Window
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -37,110 +26,6 @@ _FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
 _WITHOUT_ALIASES = 10.0  # decrease of the deviance from which a surface has no aliases
 _BLURS = (BEFORE, 0.05), (TRANSFER, 0.1), (FILTER, 0.15)  # forms of a blur, and where their fits start
 _RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
-_NAMES = (
-    "hurst",
-    "ci_low",
-    "ci_high",
-    "mode_count",
-    "in_window",
-    "wavelength",
-    "window_hurst",
-    "window_ci_low",
-    "window_ci_high",
-    "scale_min",
-    "scale_max",
-    "run_time",
-)
-
-
-def _check(problems: Problems, *, surface: Any) -> None:
-    is_plane = "y" in getattr(surface, "dims", ())
-    is_valid = check_surface(problems, surface, smallest=16, gaps=is_plane, squares=True, reserved=_NAMES)
-    if is_valid and is_plane and not is_lazy(surface):
-        most = float(surface.isnull().mean(["y", "x"]).max())
-        problems.require(most <= MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")
-
-
-@public_result(
-    title="Hurst exponent against scale",
-    references="Whittle (1957), J. R. Stat. Soc. B 19",
-    check=_check,
-    memory=46.0,
-)
-def scaling(surface: xr.DataArray) -> xr.Dataset:
-    """Return the Hurst exponent of every octave of wavelength, and the window that has one exponent.
-
-    Parameters
-    ----------
-    surface : DataArray
-        Heights in m, dims (..., y, x), of which up to half may be missing, or (..., x) for a profile without
-        gaps; at least 16 points along each axis.
-
-    Returns
-    -------
-    Dataset over `wavelength` (m, the middle of an octave)
-        `hurst` of the waves of the octave, with its 95 % interval `ci_low`, `ci_high`, and `mode_count`.
-        The exponents are not limited: long waves of white noise have -1 (a profile -0.5), waves as short as
-        the blur of an instrument more than 1.
-        `in_window` marks the longest run of octaves that one exponent between 0 and 1 fits; `window_hurst`,
-        `window_ci_low`, `window_ci_high`, `scale_min` and `scale_max` (m) are its exponent and its ends, NaN
-        if there is no such run.
-
-    Raises
-    ------
-    InvalidInput
-        More heights are missing, an axis is not uniform, or an axis has fewer than 16 points.
-
-    Notes
-    -----
-    Whittle's likelihood of the cosine modes, as in `estimate`. A run is accepted if the likelihood ratio
-    against separate exponents and amplitudes of its octaves is below the 99.7 % quantile of chi square.
-    Beside other octaves its interval also holds that of the run without the octave there, as a blur ends
-    gradually. Waves beyond the sampling are in the model of a surface with free edges, as aliases, unless the
-    two shortest octaves have one exponent only without them, as in a crop of a periodic surface, and no blur.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
-    >>> result = fc.dimensions.scaling(surface)
-    >>> bool(result.in_window.all()), round(float(result.window_hurst), 1)
-    (True, 0.7)
-    """
-    surfaces = read_surfaces(surface)
-    records = [octaves(with_or_without_aliases(blocks_of(single))) for single in surfaces]
-    runs = [longest_run(record) for record in records]
-    intervals = [interval_of_run(run, record) for run, record in zip(runs, records, strict=True)]
-    spacing = surfaces[0].spacing[1]
-    leading = surface.dims[: surface.ndim - surfaces[0].axes]
-    sizes = [surface.sizes[dim] for dim in leading]
-
-    def stacked(values: Sequence[Any], *dims: str) -> tuple[tuple[Any, ...], Array]:
-        array = np.asarray(values)
-        return (*leading, *dims), array.reshape((*sizes, *array.shape[1:]))
-
-    fits = [[octave.fit for octave in record] for record in records]
-    data = {
-        "hurst": stacked([[fit.hurst for fit in row] for row in fits], "wavelength"),
-        "ci_low": stacked([[fit.low for fit in row] for row in fits], "wavelength"),
-        "ci_high": stacked([[fit.high for fit in row] for row in fits], "wavelength"),
-        "mode_count": stacked([[round(fit.modes) for fit in row] for row in fits], "wavelength"),
-        "in_window": stacked(
-            [
-                [run.first <= k < run.last for k in range(len(row))]
-                for run, row in zip(runs, fits, strict=True)
-            ],
-            "wavelength",
-        ),
-        "window_hurst": stacked([run.fit.hurst for run in runs]),
-        "window_ci_low": stacked([low for low, _ in intervals]),
-        "window_ci_high": stacked([high for _, high in intervals]),
-        "scale_min": stacked([run.low * spacing for run in runs]),
-        "scale_max": stacked([run.high * spacing for run in runs]),
-    }
-    middle = np.array([np.sqrt(octave.low * octave.high) for octave in records[0]]) * spacing
-    coords = {**leading_coords(surface, leading, _NAMES), "wavelength": middle}
-    return xr.Dataset(data, coords=coords)
 
 
 @dataclass(frozen=True)

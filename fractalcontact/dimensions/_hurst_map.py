@@ -30,6 +30,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along the edge of a window
 FEWEST = 25  # observed points in a window
+_SUSPECTED = 0.7  # |z| of a bend from which on intervals allow for what that of the whole surface does
 _SLIGHT = 2.0  # |z| of a bend that counts where the surface shows blur or noise
 _FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
 
@@ -152,9 +153,12 @@ def _without_bent(records: list[Estimate], new: float, surface: xr.DataArray) ->
     bends = np.array([record.misfit for record in records if np.isfinite(record.misfit)])
     z = float(bends.sum() * np.sqrt(new / bends.size)) if bends.size else 0.0
     is_bent = abs(z) > SIGNIFICANT
-    if not is_bent and abs(z) > _SLIGHT and not has_blocks(surface):
+    if not is_bent and abs(z) > _SUSPECTED and not has_blocks(surface):
         whole = likelihood(read_surfaces(surface)[0], None, False)
-        is_bent = bool(np.isfinite(whole.blur_spread) or np.isfinite(whole.noise_height))
+        is_seen = bool(np.isfinite(whole.blur_spread) or np.isfinite(whole.noise_height))
+        is_bent = is_seen and abs(z) > _SLIGHT
+        if not is_bent and np.isfinite(whole.ci_low):
+            records = [record if record.reason else record.allowing(whole).limited() for record in records]
     if not is_bent:
         return records
     reason = (

@@ -76,15 +76,23 @@ class Estimate:
         return f"{self.hurst:.2f}, which offsets of rows or columns do not change" if differ else ""
 
     def beside_modes(self, by_modes: Estimate, found: str) -> Estimate:
-        """Widen an interval for fractional Brownian heights where the modes show others."""
-        if not (found and np.isfinite(self.ci_low)):
+        """Widen an interval for fractional Brownian heights where the modes show others, or may hide them."""
+        if not np.isfinite(self.ci_low):
             return self
+        if not found:
+            return self.allowing(by_modes)
         if not np.isfinite(by_modes.ci_low):
             return self.without_interval(f"`likelihood` gives no interval: {found}")
         note = (
             f"the interval assumes fractional Brownian heights, and also holds that of `likelihood`: {found}"
         )
         return self.holding(by_modes.ci_low, by_modes.ci_high, note)
+
+    def allowing(self, by_modes: Estimate) -> Estimate:
+        """Widen an interval by what another holds beyond its own scatter, as for noise that is not seen."""
+        low, high = normal_interval(by_modes.hurst, by_modes.standard_error)
+        below, above = max(low - by_modes.ci_low, 0.0), max(by_modes.ci_high - high, 0.0)
+        return replace(self, ci_low=self.ci_low - below, ci_high=self.ci_high + above)
 
     def averaged(self, other: Estimate, share: float, note: str) -> Estimate:
         """Return the mean with another estimate, of the weight `share`; the interval holds both."""

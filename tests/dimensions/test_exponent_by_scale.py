@@ -124,3 +124,28 @@ def test_blur_is_not_taken_for_missing_aliases():
         assert float(result.hurst[0]) > 0.7
         inside += float(result.window_ci_low) <= 0.3 <= float(result.window_ci_high)
     assert inside >= 3
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_steps_and_levelled_rows_that_octaves_do_not_show(hurst):
+    y, x = np.mgrid[:128, :128]
+    across = np.linspace(-1.0, 1.0, 128)
+    columns = np.vander(across, 3)
+    for seed in (1, 2):
+        surface = fc.surfaces.fbm((128, 128), 1e-6, hurst=hurst, rms_increment=1e-7, rng=seed)
+        step = surface + 5e-7 * (0.6 * x + 0.8 * y > 85)
+        parabolas = columns @ np.linalg.lstsq(columns, surface.values.T, rcond=None)[0]
+        for marked, word in ((step, "steps"), (surface - parabolas.T, "levelled")):
+            result = fc.dimensions.scaling(marked)
+            assert result.window_ci_low.item() < hurst < result.window_ci_high.item()
+            assert word in result.window_hurst.attrs["comment"]
+
+
+def test_the_interval_holds_noise_that_no_octave_shows():
+    held = []
+    for seed in range(8):
+        surface = fc.surfaces.fbm((128, 128), 1e-6, hurst=0.4, rms_increment=1e-7, rng=seed)
+        noisy = surface + 3e-8 * np.random.default_rng(seed).standard_normal((128, 128))
+        result = fc.dimensions.scaling(noisy)
+        held.append(result.window_ci_low.item() < 0.4 < result.window_ci_high.item())
+    assert sum(held) >= 7

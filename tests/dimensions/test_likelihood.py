@@ -109,3 +109,13 @@ def test_checkerboard_is_no_fractal_of_a_narrow_interval():
     result = estimate_one(surface)
     assert "few waves hold more than their share" in result.hurst.attrs["comment"]
     assert not float(result.ci_high - result.ci_low) < 0.1
+
+
+def test_interval_holds_noise_that_is_hardly_seen():
+    held = []
+    for seed in range(8):
+        surface = fc.surfaces.fbm((128, 128), 1e-6, hurst=0.4, rms_increment=1e-7, rng=seed)
+        noisy = surface + 2e-8 * np.random.default_rng(seed).standard_normal((128, 128))
+        result = fc.dimensions.estimate(noisy)
+        held.append(result.ci_low.item() < 0.4 < result.ci_high.item())
+    assert sum(held) >= 7  # 4 where noise beyond 0.08 rms increments is left out
