@@ -44,7 +44,7 @@ from fractalcontact.dimensions._whittle import QUANTILE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_POOR = 3.5  # z of the scatter of the blocks beyond which a model does not fit
+POOR = 3.5  # z of the scatter of the blocks beyond which a model does not fit
 LEAST_AGREEMENT = 1e-4  # probability of the levels of the octaves below which a model does not fit
 _UNEVEN = 4.0  # -z of the mean logarithm beyond which few waves dominate
 _FIRST, _GROWTH = 14.0, 1.5  # first window in numbers of the longest wave, and ratio of successive ones
@@ -130,7 +130,7 @@ class BlurredFit:
     @property
     def is_close(self) -> bool:
         """Whether single blocks of modes scatter about the model by chance."""
-        return self.scatter < _POOR
+        return self.scatter < POOR
 
     @property
     def is_even(self) -> bool:
@@ -318,7 +318,7 @@ class _Search:
                 return quiet_window, quiet
             noisy = _blur_fit.fit(window, noisy)
         noisy = self._best_form(window, noisy)
-        most = max(_POOR, min(quiet_scatter, 1e3))
+        most = max(POOR, min(quiet_scatter, 1e3))
         if self._is_white(window, noisy) and _blur_fit.scatter(window, noisy) < most:
             return window, noisy
         return quiet_window, quiet
@@ -342,7 +342,7 @@ class _Search:
                 return None
             fit = _blur_fit.fit(window, fit)
         fit = self._best_form(window, fit)
-        is_good = _blur_fit.scatter(window, fit) < _POOR
+        is_good = _blur_fit.scatter(window, fit) < POOR
         return (window, fit) if is_good and (not fit.has_noise or self._is_white(window, fit)) else None
 
     def _growing(self) -> tuple[Window, Fit, float]:
@@ -372,16 +372,16 @@ class _Search:
                 window, fit = narrowed, _blur_fit.fit(narrowed, fit)
             scatter = _blur_fit.scatter(window, fit)
             for form in forms[1:]:
-                if scatter < _POOR or fit.square > _WIDE:
+                if scatter < POOR or fit.square > _WIDE:
                     break
                 other = _blur_fit.fit(window, fit, form)
                 if other.deviance < fit.deviance:
                     fit, scatter = other, _blur_fit.scatter(window, other)
-            is_good = scatter < _POOR
+            is_good = scatter < POOR
             failures = 0 if is_good else failures + 1
             if is_good or best is None:
                 best, start = (window, fit, scatter), fit
-            if (failures > 1 and best[2] < _POOR) or reach >= end or fit.square * reach**2 > 20.0:
+            if (failures > 1 and best[2] < POOR) or reach >= end or fit.square * reach**2 > 20.0:
                 return best
             reach = min(reach * _GROWTH, end)
 
@@ -462,7 +462,7 @@ class _Search:
 
     def _best_form(self, window: Window, start: Fit) -> Fit:
         """Fit the forms that may differ, and return the best."""
-        if start.square > _WIDE or _blur_fit.scatter(window, start) < _POOR:
+        if start.square > _WIDE or _blur_fit.scatter(window, start) < POOR:
             return start
         forms = TRANSFER, BEFORE, BAND, FILTER
         return min((_blur_fit.fit(window, start, form) for form in forms), key=lambda fit: fit.deviance)

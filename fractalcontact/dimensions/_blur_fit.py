@@ -17,12 +17,14 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _BELOW, _ABOVE = 3.5, 3.7
 _PENALTY = 2.0  # Akaike: deviance that a parameter must bring
 CORRELATION = 1.05  # of the squared standard error, for the modes are slightly correlated
-_MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matters
+MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matters
 NARROW = 0.03  # squared spread below which the jump does not matter
 # deviance of blur, of weak noise, and of stronger noise in the interval where neither is seen
 _COST, _NOISE_COST, _STRONG_NOISE_COST = 5.0, 1.0, 4.0
 _LARGEST = 200.0  # squared spread
 _FILTERED = 0.15  # least squared spread to start a filter from: it is flat at 0, where points have no weight
+_ROUNDS = 6  # of a fit with noise of a known variance
+_SHOWN = 4.0  # decrease of the penalised deviance from which there is more than rounding
 _ENDS = 6  # steps to an end of an interval
 _NO_NOISE = 1e-4  # share of every mode below which noise is as good as none
 _STEPS, _TRIES, _DAMPING = 25, 8, 1e-3
@@ -69,7 +71,7 @@ class Fit:
     @property
     def correlation(self) -> float:
         """Factor on the squared standard error for the correlation of the modes."""
-        return CORRELATION if self.square < NARROW else _MORE_CORRELATION
+        return CORRELATION if self.square < NARROW else MORE_CORRELATION
 
     def with_noise(self, has_noise: bool, window: Window) -> Fit:
         """Return a start with noise or without."""
@@ -129,6 +131,21 @@ def fit(window: Window, start: Fit, form: str = "", hurst: float | None = None) 
         deviance=deviance,
         amplitude=amplitude,
     )
+
+
+def fit_known_noise(window: Window, start: float, variance: float) -> Fit:
+    """Fit a surface with white noise of a known variance, and without blur."""
+    result = fit(window, Fit(NONE, start, 0.0))
+    for _ in range(_ROUNDS):
+        result = fit(window, replace(result, noise=variance / result.amplitude))
+    return result
+
+
+def shows_blur(window: Window, plain: Fit) -> bool:
+    """Return whether a blur, or other noise than is known, makes the modes likelier than a fit without."""
+    blurs = [fit(window, replace(plain, form=form, square=0.15)) for form in (TRANSFER, FILTER)]
+    noisy = fit(window, plain.with_noise(True, window))
+    return min(each.penalised for each in (*blurs, noisy)) < plain.penalised - _SHOWN
 
 
 def _moved(values: Array, step: Array) -> Array:

@@ -19,6 +19,7 @@ from fractalcontact.dimensions._cosine_modes import (
 )
 from fractalcontact.dimensions._gapped_modes import PROBES, GappedModes
 from fractalcontact.dimensions._harmonic_interpolation import Filling
+from fractalcontact.dimensions._heterogeneity import seam_cells
 from fractalcontact.dimensions._increment_moments import Moments
 from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import Frame
@@ -196,6 +197,11 @@ class FreeEdges:
         """Whether nothing is known of the window, the instrument, or the points that were gridded."""
         is_asked = self.scales is not None or self.spread is not None or self.noise
         return not (is_asked or self.surface.finest_scale)
+
+    @cached_property
+    def has_seams(self) -> bool:
+        """Whether the complete heights have seams, as between tiles that were put together."""
+        return bool(self.share is None and self.power is not None and seam_cells(self.heights).any())
 
     @property
     def is_large(self) -> bool:

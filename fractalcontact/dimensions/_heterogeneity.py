@@ -30,6 +30,9 @@ _FAR, _NEAR = 4.5, 2.0  # deviations above the rest from which a block, and one 
 _LINE, _ON_LINE = 5, 2.2  # blocks of a short line, and deviations above the rest of their mean
 _LEFT = 0.35  # of the blocks that must be left
 _THICK = 0.4  # share of the blocks left out whose neighbours are all left out: more is a patch, no line
+# deviations of the mean square across a line from which on it is a seam; 5.3 was the most of 2250 exact and
+# blurred surfaces, H 0.1 to 0.9. More than this share of the lines is no seam
+_SEAM, _MOST_SEAMS = 6.0, 0.05
 _QUANTILES, _NORMAL_QUANTILES = (0.1, 0.25), (-1.2815515655446004, -0.6744897501960817)
 
 
@@ -140,15 +143,20 @@ def step_cells(heights: Array) -> Array | None:
     down, across = (n // _EDGE for n in heights.shape)
     if min(down, across) < _LEAST_BLOCKS:
         return None
+    seams = seam_cells(heights)
     squares = np.zeros(heights.shape)
     for axis in (0, 1):
         bend = np.diff(heights, 2, axis=axis)
         inner = [slice(None), slice(None)]
         inner[axis] = slice(1, -1)
         squares[tuple(inner)] += bend * bend
-    blocks = squares[: down * _EDGE, : across * _EDGE].reshape(down, _EDGE, across, _EDGE).mean(axis=(1, 3))
-    with np.errstate(divide="ignore"):
-        logs = np.log(blocks)
+    parts = [
+        plane[: down * _EDGE, : across * _EDGE].reshape(down, _EDGE, across, _EDGE).sum(axis=(1, 3))
+        for plane in (np.where(seams, 0.0, squares), ~seams)
+    ]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.log(parts[0] / parts[1])
+    logs = np.where(parts[1] > 0, logs, np.median(logs[parts[1] > 0]))
     logs = np.where(np.isfinite(logs), logs, logs[np.isfinite(logs)].min(initial=0.0))
     # the lower blocks tell what the ground is like, however many are crossed
     low, quarter = np.quantile(logs, _QUANTILES)
@@ -161,12 +169,32 @@ def step_cells(heights: Array) -> Array | None:
     out |= _neighbours(out, any_of=True) & (excess > _NEAR)
     out |= _lines(excess)
     thick = _neighbours(out, any_of=False) & out
-    if not out.any() or out.mean() > 1.0 - _LEFT or thick.sum() > _THICK * out.sum():
+    if not (out.any() or seams.any()) or thick.sum() > _THICK * out.sum():
         return None
-    cells = np.zeros(heights.shape, dtype=bool)
     rows = np.minimum(np.arange(heights.shape[0]) // _EDGE, down - 1)
     columns = np.minimum(np.arange(heights.shape[1]) // _EDGE, across - 1)
-    cells[:] = out[rows[:, None], columns]
+    cells = np.asarray(out[rows[:, None], columns] | seams)
+    return None if cells.mean() > 1.0 - _LEFT else cells
+
+
+def seam_cells(heights: Array) -> Array:
+    """Return the cells beside seams between tiles: lines along an axis that neighbours differ across more.
+
+    An offset of each row and of each column is taken out first. `heights` are complete.
+    """
+    level = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
+    cells = np.zeros(heights.shape, dtype=bool)
+    for lines, of_lines in ((level, cells), (level.T, cells.T)):
+        squares = np.mean(np.diff(lines, axis=0) ** 2, axis=1)
+        if not squares.min() > 0.0:
+            continue
+        logs = np.log(squares)
+        low, middle, high = np.quantile(logs, (0.25, 0.5, 0.75))
+        is_seam = logs - middle > _SEAM * (high - low) / (-2.0 * _NORMAL_QUANTILES[1])
+        if is_seam.mean() > _MOST_SEAMS:
+            continue
+        for line in np.flatnonzero(is_seam):
+            of_lines[max(line + 1 - _EDGE // 2, 0) : line + 1 + _EDGE // 2] = True
     return cells
 
 

@@ -18,13 +18,24 @@ from fractalcontact.dimensions._blur import (
     BLUR_WINDOW,
     CLEAR,
     LEAST_AGREEMENT,
+    POOR,
     BlurredFit,
     blurred_estimate,
     chosen_blocks,
     fit_blurred,
     is_seen,
 )
-from fractalcontact.dimensions._blur_fit import Comparison, agreement, compare
+from fractalcontact.dimensions._blur_fit import (
+    MORE_CORRELATION,
+    Comparison,
+    agreement,
+    compare,
+    error,
+    fit_known_noise,
+    interval,
+    scatter,
+    shows_blur,
+)
 from fractalcontact.dimensions._exponent_by_scale import (
     exponents_within,
     frame_blocks,
@@ -57,7 +68,7 @@ from fractalcontact.dimensions._mode_blocks import LOWEST
 from fractalcontact.dimensions._periodic_modes import periodic_likelihood
 from fractalcontact.dimensions._profile_increments import gapped_profile
 from fractalcontact.dimensions._profile_likelihood import profile_likelihood
-from fractalcontact.dimensions._quantisation import rounding_note
+from fractalcontact.dimensions._quantisation import quantisation, resolved_lag, rounding_note
 from fractalcontact.dimensions._records import (
     ASKED,
     CONSTANT,
@@ -80,6 +91,7 @@ from fractalcontact.dimensions._unknown_filter import is_filtered_locally, unfil
 from fractalcontact.dimensions._waves import MOST_REPEATED, without_waves
 from fractalcontact.dimensions._whittle import (
     LEAST_MODES,
+    QUANTILE,
     WhittleFit,
     fit_interval,
 )
@@ -98,6 +110,8 @@ _WEAK_NOISE = 0.08  # of the rms increment: noise that the interval of a surface
 _MAYBE_OTHER, _OTHER_FORM = 9.0, 14.0
 _REACHES = 0.95  # of the shortest wave of a run of octaves, from which a filter of unknown form changes it
 _EQUAL = 0.01  # share of heights that equal a neighbour: the nearest of other points, or a median
+_MATTERS = 0.005  # standard error of an exponent that rounding changes where it matters
+_LEAST_ROUNDED = 60  # modes of coarsely rounded heights
 _LEAST_NUMBER = 200  # modes of a surface whose blur is looked for
 _FREE_WINDOW = "all modes that vary along both axes"
 _INTERPOLATED = 0.01  # share of heights on a line with their neighbours
@@ -107,6 +121,7 @@ _LINEAR = (
     "`scales` from eight distances of the points on"
 )
 _RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
+_ROUNDED_WINDOW = "waves over whose quarter the heights differ by half a step of their rounding or more"
 _SEPARABLE = (
     "the heights vary along one axis only, or are a sum f(x) + g(y), as no fractal surface is: estimate "
     "profiles, or see `directions`"
@@ -206,8 +221,52 @@ def _free_surface(surface: Surface, scales: Scales, noise: bool, spread: float |
     if power is not None:
         power, levelling_note = without_levelling(power, spacing, pilot)
     free = FreeEdges(surface, heights, power, scales, noise, spread, pilot)
-    estimate = _explained(free if free.is_large else free.restored(), compared_parts)
+    estimate = _rounded(free, compared_parts)
+    if estimate is None:
+        estimate = _explained(free if free.is_large else free.restored(), compared_parts)
     return replace(estimate, note=joined(form_note, levelling_note, estimate.note))
+
+
+def _rounded(free: FreeEdges, compared_parts: Callable[[float, int], Heterogeneity]) -> Estimate | None:
+    """Return the estimate of coarsely rounded heights; None where rounding matters little, or more is seen.
+
+    Errors of rounding are white noise of a known variance while heights differ by half a step or more. Where
+    neighbours differ less, only waves over whose quarter they do so are used.
+    """
+    if not free.is_default or free.power is None or not rounding_note(free.heights, _MATTERS):
+        return None
+    step = quantisation(free.heights)[0]
+    lag, noise = resolved_lag(free.heights, step), step**2 / 12.0
+    frame = free.frame
+    inside = 2.0 * np.pi / np.sqrt(frame.squares) >= (4.0 * lag if lag > 1 else 0.0)
+    if not lag or frame.count[inside].sum() < _LEAST_ROUNDED:
+        return None
+    window = Window(frame, inside, frame.mean(free.power))
+    fit = fit_known_noise(window, free.pilot, noise)
+    is_good = LOWEST < fit.hurst < 1.0 and scatter(window, fit) < POOR
+    is_other = agreement(window, fit) < LEAST_AGREEMENT or shows_blur(window, fit)
+    if not is_good or (lag == 1 and is_other):
+        return None
+    low, high = interval(window, fit, QUANTILE * MORE_CORRELATION)
+    waves = 2.0 * np.pi / np.sqrt(window.squares) * free.surface.spacing[1]
+    parts = compared_parts(fit.hurst, 4 * lag)
+    low, high = parts.widened(fit.hurst, low, high)
+    note = (
+        f"heights are rounded to steps of {step * free.surface.unit:.3g} m: white noise of a twelfth of "
+        "their square is in the model"
+    )
+    return Estimate(
+        fit.hurst,
+        error(window, fit) * parts.widening,
+        low if low > LOWEST else 0.0,
+        high,
+        scale_min=float(waves.min()),
+        scale_max=float(waves.max()),
+        rms_increment=float(np.sqrt(2.0 * fit.amplitude / (1.0 - fit.hurst))) * free.surface.unit,
+        noise_height=step / np.sqrt(12.0) * free.surface.unit,
+        window=_FREE_WINDOW if lag == 1 else _ROUNDED_WINDOW,
+        note=joined(note, parts.note),
+    )
 
 
 def _explained(
@@ -272,7 +331,7 @@ def _explained(
 
 def _ground(free: FreeEdges, parts: Heterogeneity, hurst: float, misfit: float) -> Estimate | None:
     """Return the estimate of the ground between steps; None where there are none, or not by default."""
-    if not (free.is_default and parts.note):
+    if not free.is_default or not (parts.note or free.has_seams):
         return None
     surface = free.surface
     ground = without_steps(free.heights, surface.plane_spacing, hurst)

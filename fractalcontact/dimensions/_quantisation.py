@@ -10,6 +10,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 _ROWS, _SAMPLE = 16, 4096  # rows and heights looked at
 _TOLERANCE = 0.02  # of a step: distance of heights from whole steps, after a change of unit
+_RESOLVED = 0.47  # rms increments over a step from which on the errors of rounding are white noise
 _LARGEST_SHARE = 0.5  # of distinct heights among all: more are no rounded heights
 
 
@@ -46,6 +47,20 @@ def quantisation(heights: Array) -> tuple[float, float]:
     bends = np.diff(rows, 2, axis=1)
     square = float(np.nanmean(bends * bends)) if np.isfinite(bends).any() else 0.0
     return (step, 0.5 * step * step / square) if square > 0.0 else (0.0, 0.0)
+
+
+def resolved_lag(heights: Array, step: float) -> int:
+    """Return the least lag, a power of two, over which heights differ by half a step of rounding; 0 if none.
+
+    They differ by the root of the mean square less that of the rounding, step^2 / 6.
+    """
+    lag = 1
+    while lag <= heights.shape[1] // 4:
+        square = float(np.nanmean((heights[:, lag:] - heights[:, :-lag]) ** 2)) - step * step / 6.0
+        if square > (_RESOLVED * step) ** 2:
+            return lag
+        lag *= 2
+    return 0
 
 
 def quantisation_note(share: float, interval: str) -> str:
