@@ -30,8 +30,8 @@ _FAR, _NEAR = 4.5, 2.0  # deviations above the rest from which a block, and one 
 _LINE, _ON_LINE = 5, 2.2  # blocks of a short line, and deviations above the rest of their mean
 _LEFT = 0.35  # of the blocks that must be left
 _THICK = 0.4  # share of the blocks left out whose neighbours are all left out: more is a patch, no line
-# deviations of the mean square across a line from which on it is a seam; 5.3 was the most of 2250 exact and
-# blurred surfaces, H 0.1 to 0.9. More than this share of the lines is no seam
+# deviations of the mean square across a line from which on it is a seam; 5.3 was the most of 750 exact
+# surfaces, H 0.1 to 0.9. More than this share of the lines is no seam
 _SEAM, _MOST_SEAMS = 6.0, 0.05
 _QUANTILES, _NORMAL_QUANTILES = (0.1, 0.25), (-1.2815515655446004, -0.6744897501960817)
 
