@@ -21,6 +21,7 @@ MORE_CORRELATION = 1.4  # the same where the jump of the slope at the edges matt
 NARROW = 0.03  # squared spread below which the jump does not matter
 # deviance of blur, of weak noise, and of stronger noise in the interval where neither is seen
 _COST, _NOISE_COST, _STRONG_NOISE_COST = 5.0, 1.0, 4.0
+_LEAST_HURST = 0.02  # from which on there is more than noise
 _LARGEST = 200.0  # squared spread
 _FILTERED = 0.15  # least squared spread to start a filter from: it is flat at 0, where points have no weight
 _ROUNDS = 6  # of a fit with noise of a known variance
@@ -352,7 +353,8 @@ class Comparison:
 
         forms = ((NONE, 0.0), (TRANSFER, 0.0), (TRANSFER, 0.1), (FILTER, 0.15))[: 4 if blur else 1]
         starts = [replace(plain, form=form, square=square, most_noise=most) for form, square in forms]
-        starts += [plain] if np.isfinite(most) else []
+        # noise alone has an exponent of 0, and would hold every other
+        starts += [plain] if np.isfinite(most) and plain.hurst > _LEAST_HURST else []
         fits = [plain, *(fit(self.window, start.with_noise(True, self.window)) for start in starts)]
         least, low, high = min(map(cost, fits)), plain.hurst, plain.hurst
         # of the two starts of one form the better

@@ -77,8 +77,12 @@ def test_defects_widen_interval_to_true_exponent(name, method):
     hurst, defect, words = DEFECTS[name]
     for seed in (1, 3):
         result, low, high, note = estimated(defect(seed), method)
-        assert abs(result - hurst) > 0.01  # the estimate itself is wrong ...
-        assert low - 0.05 <= hurst <= high + 0.05  # ... and its interval is not that of one that is right
+        if (name, method) == ("5 bits", "likelihood"):  # the rounding is in the model
+            assert abs(result - hurst) < 0.1  # few waves are left of the coarser one
+            assert low <= hurst <= high
+        else:
+            assert abs(result - hurst) > 0.01  # the estimate itself is wrong ...
+            assert low - 0.05 <= hurst <= high + 0.05  # ... and its interval is not that of one that is right
         assert any(word in note for word in words.split("|"))
 
 
