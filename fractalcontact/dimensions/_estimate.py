@@ -50,9 +50,9 @@ from fractalcontact.dimensions._surface_input import (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 # bytes of a point at the peak of a method: of maximum likelihood on a torus, on a rectangle and, beyond a
-# million points, by blocks of modes (`_likelihood`), which take 61, and 127 where a surface is smooth but for
-# spikes: a factor of 1.45 from either; with gaps, which take 98 to 185, and 283 where two fifths are missing;
-# and of others
+# million points, by blocks of modes (`_surface_likelihood`), which take 61, and 127 where a surface is smooth
+# but for spikes: a factor of 1.45 from either; with gaps, which take 98 to 185, and 283 where two fifths are
+# missing; and of others
 PERIODIC_BYTES, FREE_BYTES, BLOCK_BYTES, GAPPED_BYTES = 97.0, 156.0, 88.0, 195.0
 METHOD_BYTES = {"variogram": 325.0, "increments": 16.0, "madogram": 16.0}
 

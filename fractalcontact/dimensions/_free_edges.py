@@ -28,6 +28,7 @@ from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+FREE_WINDOW = "all modes that vary along both axes"
 LARGE = 1 << 20  # points of a surface beyond which modes are taken in blocks
 _LARGE_GAPPED = 1 << 17  # the same of a surface with gaps
 _ROUNDING = 1e-26  # relative rounding of the mean square in transforms

