@@ -229,17 +229,19 @@ def _surfaces(
         result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide[0]), x=slice(wide[1]))
         result = surfaces.from_array(result.values, SPACING)
     elif family == "matern":
-        heights = [matern(wide, hurst, n / ROLLOFF, stream) for _ in range(count)]
-        result = surfaces.from_array(HEIGHT * np.array(heights), SPACING)
+        result = surfaces.from_array(HEIGHT * matern(wide, hurst, n / ROLLOFF, count, stream), SPACING)
     else:
         result = surfaces.fbm(wide, SPACING, rms_increment=HEIGHT, **options)
     return _with_defects(result, n, margin, defects, stream)
 
 
-def matern(shape: tuple[int, ...], hurst: float, corner: float, stream: np.random.Generator) -> Array:
-    """Return heights of unit rms increment with the spectrum (q^2 + q_0^2)^(-1 - H), exact by embedding.
+def matern(
+    shape: tuple[int, ...], hurst: float, corner: float, count: int, stream: np.random.Generator
+) -> Array:
+    """Return `count` surfaces of unit rms increment with the spectrum (q^2 + q_0^2)^(-1 - H).
 
-    `corner` is the wavelength of q_0 in spacings. Dietrich and Newsam (1997), SIAM J. Sci. Comput. 18.
+    `corner` is the wavelength of q_0 in spacings. Exact by circulant embedding: the covariance has fallen to
+    rounding at the extent. Dietrich and Newsam (1997), SIAM J. Sci. Comput. 18.
     """
     y, x = (np.minimum(np.arange(2 * n), 2 * n - np.arange(2 * n)) for n in shape)
     lag = 2.0 * np.pi / corner * np.hypot(y[:, None], x)
@@ -248,8 +250,11 @@ def matern(shape: tuple[int, ...], hurst: float, corner: float, stream: np.rando
     covariance[apart] = lag[apart] ** hurst * kv(hurst, lag[apart])
     covariance /= 2.0 * (covariance[0, 0] - covariance[0, 1])
     power = np.maximum(np.fft.fft2(covariance).real, 0.0)
-    heights = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
-    return np.asarray(heights[: shape[0], : shape[1]])
+    result = np.empty((count, *shape))
+    for heights in result:
+        whole = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
+        heights[...] = whole[: shape[0], : shape[1]]
+    return result
 
 
 def _with_defects(

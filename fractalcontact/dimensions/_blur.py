@@ -32,12 +32,12 @@ from fractalcontact.dimensions._transfer_functions import (
     BAND,
     BEFORE,
     FILTER,
-    FORMS,
     NONE,
     TRANSFER,
     Edges,
     Window,
     edge_power,
+    in_model,
     plain_power,
 )
 from fractalcontact.dimensions._whittle import QUANTILE
@@ -269,11 +269,6 @@ def blurred_estimate(
     in m.
     """
     has_noise = np.isfinite(fit.noise)
-    parts = []
-    if fit.form != NONE:
-        spread = f" with a spread of {fit.spread:.2g} spacings" if fit.spread > 0.0 else ""
-        parts = [FORMS[fit.form] + spread]
-    parts += ["white noise"] if has_noise else []
     half_square = amplitude / max(1.0 - fit.hurst, 1e-9)
     return Estimate(
         fit.hurst,
@@ -286,7 +281,7 @@ def blurred_estimate(
         noise_height=float(np.sqrt(fit.noise)) * surface.unit if has_noise else np.nan,
         blur_spread=fit.spread * surface.spacing[1] if fit.form != NONE else np.nan,
         window=BLUR_WINDOW if scales is None else ASKED,
-        note=f"the surface shows {' and '.join(parts)}, which is in the model" if parts else "",
+        note=in_model(fit.form, fit.spread, bool(has_noise)),
     )
 
 

@@ -55,7 +55,7 @@ def with_gaps(surface: Surface, mask: Array | None) -> tuple[Surface, str]:
         f"{100.0 * float(np.mean(mask)):.2g} % of the heights were filled in, as by `fill`: they were not "
         "measured, and count as missing"
     )
-    return Surface(surface.stack, surface.grid, surface.index, surface.unit, heights), note
+    return surface.with_heights(heights), note
 
 
 def _is_found(blocks: list[Array], spacing: tuple[float, float], rounding: float) -> bool:

@@ -25,6 +25,7 @@ from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._mode_blocks import Frame
 from fractalcontact.dimensions._restored_power import MOST_MISSING, restored_power
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
+from fractalcontact.dimensions._unknown_filter import is_filtered_locally
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -203,6 +204,11 @@ class FreeEdges:
     def has_seams(self) -> bool:
         """Whether the complete heights have seams, as between tiles that were put together."""
         return bool(self.share is None and self.power is not None and seam_cells(self.heights).any())
+
+    @cached_property
+    def is_filtered_locally(self) -> bool:
+        """Whether neighbours differ by a distribution of another form than distant heights."""
+        return is_filtered_locally(self.heights)
 
     @property
     def is_large(self) -> bool:

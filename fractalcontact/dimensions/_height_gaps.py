@@ -55,7 +55,7 @@ def without_height_gaps(surface: Surface) -> tuple[Surface, str]:
         "of their scatter is left"
     )
     cut = np.where(missing, np.nan, heights)
-    return Surface(surface.stack, surface.grid, surface.index, surface.unit, cut), note
+    return surface.with_heights(cut), note
 
 
 def beside_gaps(observed: Array) -> Array:

@@ -20,7 +20,7 @@ from fractalcontact.dimensions._increments import closed_form
 from fractalcontact.dimensions._quantisation import rounding_note
 from fractalcontact.dimensions._records import ASKED, Estimate, joined, undefined
 from fractalcontact.dimensions._surface_input import Scales, Surface
-from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, FORMS, NONE
+from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, NONE, in_model
 from fractalcontact.dimensions._whittle import QUANTILE, crossing, minimum
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -30,12 +30,17 @@ SMALLEST = 8  # observed points
 _LOWEST, _HIGHEST = 1e-3, 0.999
 _SHORT_CHUNK, _LEAST_POINTS, _MOST_POINTS = 64, 64, 2048  # points of a profile with gaps, in blur and noise
 _NO_NOISE = 1e-6  # over the squared amplitude: the covariance of blurred increments stays positive
-_SEEN, _UNSEEN, _ALIKE, _RISE = (
-    9.0,
-    0.0,
-    4.0,
-    4.5,
-)  # decreases of the deviance; that at the ends of an interval
+_SEEN, _ALIKE = 9.0, 4.0  # decreases of the penalised deviance: of what is there, and of what may be
+_RISE = 4.5  # of the deviance at the ends of an interval
+# exponent, logarithms of the noise and of the squared spread: first guesses, limits and first steps
+_FIRST = 0.5, np.log(0.05), np.log(0.3)
+_LEAST_VALUES = np.array([_LOWEST, np.log(1e-6), np.log(4e-3)])
+_MOST_VALUES = np.array([_HIGHEST, np.log(1e2), np.log(60.0)])
+_SIMPLEX = np.array([0.1, 1.0, 1.0])
+_NO_BLUR = (
+    "a known blur is in the model of a profile with gaps for 64 points or more and without `scales`: leave "
+    "out `psf`, or `scales`"
+)
 _AT_LIMIT = 0.998  # H beyond which the search is repeated among profiles smoother than fractal ones
 _SMOOTHEST = 1.9
 _TOLERANCE = 1e-4  # of the exponent
@@ -47,38 +52,65 @@ _LEAST_NOISE, _MOST_NOISE = np.log(1e-5), np.log(100.0)  # logarithms of the noi
 
 
 def gapped_profile(surface: Surface, scales: Scales, noise: bool, spread: float | None) -> Estimate:
-    """Return the estimate of a profile with gaps; by default its interval holds blur and noise."""
+    """Return the estimate of a profile with gaps; by default its interval holds blur and noise.
+
+    `spread` in spacings is that of a known blur.
+    """
     surface, jump_note = without_jumps(surface) if scales is None else (surface, "")
-    estimate = by_increments(surface, scales, noise, (np.nan, np.nan))
-    estimate = replace(estimate, note=joined(jump_note, estimate.note))
     heights = surface.heights[0]
     heights = heights[: np.searchsorted(np.cumsum(np.isfinite(heights)), _MOST_POINTS)]
-    if scales is not None or noise or np.isfinite(heights).sum() < _LEAST_POINTS or not estimate.hurst > 0.0:
-        return estimate
-    known = None if spread is None else max(spread, 0.0) ** 2
-    increments = ProfileIncrements(heights, _SHORT_CHUNK)
+    is_fitted = scales is None and np.isfinite(heights).sum() >= _LEAST_POINTS
+    increments = ProfileIncrements(heights, _SHORT_CHUNK) if is_fitted else None
+    if spread and increments is not None:
+        estimate = _with_known_blur(surface, increments, noise, spread)
+    else:
+        estimate = by_increments(surface, scales, noise, (np.nan, np.nan))
+        if spread:
+            estimate = estimate.without_interval(_NO_BLUR)
+        elif increments is not None and not noise and estimate.hurst > 0.0:
+            estimate = _with_blur(surface, increments, estimate, has_blur=spread is None)
+    return replace(estimate, note=joined(jump_note, estimate.note))
+
+
+def _with_known_blur(surface: Surface, increments: ProfileIncrements, noise: bool, spread: float) -> Estimate:
+    """Return the estimate beside a blur of known spread, before sampling or of the sampled heights."""
+    levels = (True,) if noise else (False, True)
+    fits = [
+        _fit_blur(increments, has_noise, blur, square=spread**2)
+        for blur in (BEFORE, FILTER)
+        for has_noise in levels
+    ]
+    return _likeliest(surface, fits)
+
+
+def _with_blur(
+    surface: Surface, increments: ProfileIncrements, estimate: Estimate, *, has_blur: bool
+) -> Estimate:
+    """Return the estimate with blur or noise where they are seen; otherwise its interval holds them."""
     none, noisy = (_fit_blur(increments, has_noise, NONE) for has_noise in (False, True))
-    fits = [none, noisy]
-    if known is None:
-        fits += [_fit_blur(increments, has_noise, BEFORE) for has_noise in (False, True)]
-    best = min(fits, key=lambda fit: fit.penalised)
+    others = [noisy]
+    if has_blur:
+        others += [_fit_blur(increments, has_noise, BEFORE) for has_noise in (False, True)]
+    best = min(others, key=lambda fit: fit.penalised)
     if none.penalised - best.penalised < _SEEN:
-        for fit in fits[1:3]:  # noise would raise the exponent, and a blur lower it
+        for fit in others[:2]:  # noise would raise the exponent, and a blur lower it
             rise = QUANTILE - max(fit.deviance - none.deviance, 0.0)
             if rise > 0.0 and np.isfinite(estimate.ci_low):
                 end = fit.end(rise, 1.0 if fit is noisy else -1.0)
                 estimate = estimate.holding(min(end, estimate.ci_high), max(end, estimate.ci_low))
         return estimate
     if best.blur != NONE:
-        fits += [_fit_blur(increments, has_noise, FILTER) for has_noise in (False, True)]
-        best = min(fits, key=lambda fit: fit.penalised)
-    near = [fit for fit in fits[1:] if fit.penalised < best.penalised + _ALIKE]
+        others += [_fit_blur(increments, has_noise, FILTER) for has_noise in (False, True)]
+    return _likeliest(surface, others)
+
+
+def _likeliest(surface: Surface, fits: list[_BlurFit]) -> Estimate:
+    """Return the estimate of the likeliest fit; its interval holds those that are nearly as likely."""
+    best = min(fits, key=lambda fit: fit.penalised)
+    near = [fit for fit in fits if fit.penalised < best.penalised + _ALIKE]
     ends = [(fit.end(_RISE, -1.0), fit.end(_RISE, 1.0)) for fit in near]
     low, high = min(low for low, _ in ends), max(high for _, high in ends)
-    dx, parts = surface.spacing[1], []
-    if best.blur != NONE:
-        parts.append(f"{FORMS[best.blur]} with a spread of {np.sqrt(best.square):.2g} spacings")
-    parts += ["white noise"] if best.has_noise else []
+    dx, spread = surface.spacing[1], float(np.sqrt(best.square))
     noise_height = np.sqrt(best.amplitude * best.noise) * surface.unit
     return Estimate(
         best.hurst,
@@ -89,9 +121,9 @@ def gapped_profile(surface: Surface, scales: Scales, noise: bool, spread: float 
         scale_max=(_SHORT_CHUNK - 1) * dx,
         rms_increment=float(np.sqrt(best.amplitude)) * surface.unit,
         noise_height=float(noise_height) if best.has_noise else np.nan,
-        blur_spread=float(np.sqrt(best.square)) * dx if best.blur != NONE else np.nan,
+        blur_spread=spread * dx if best.blur != NONE else np.nan,
         window="exact likelihood of all increments, with blur and noise",
-        note=joined(jump_note, f"the surface shows {' and '.join(parts)}, which is in the model"),
+        note=in_model(best.blur, spread, best.has_noise),
     )
 
 
@@ -108,16 +140,20 @@ def without_jumps(surface: Surface) -> tuple[Surface, str]:
     heights = heights.copy()
     heights[observed[1:]] -= np.cumsum(np.where(large, jumps, 0.0))
     note = f"{large.sum()} increments beyond {_LARGE:g} robust deviations were taken out: steps or spikes"
-    return Surface(surface.stack, surface.grid, surface.index, surface.unit, heights[None]), note
+    return surface.with_heights(heights[None]), note
 
 
 @dataclass(frozen=True)
 class _BlurFit:
-    """A profile with blur or noise: H, the logarithms of noise and squared spread, and their likelihood."""
+    """A profile with blur or noise: H, the logarithms of noise and squared spread, and their likelihood.
+
+    `known` is the squared spread where it was given.
+    """
 
     increments: ProfileIncrements
     has_noise: bool
     blur: str
+    known: float | None
     values: tuple[float, ...]
     deviance: float
     amplitude: float
@@ -125,7 +161,7 @@ class _BlurFit:
     @property
     def penalised(self) -> float:
         """Deviance with Akaike's penalty."""
-        return self.deviance + 2.0 * (self.has_noise + (self.blur != NONE))
+        return self.deviance + 2.0 * (self.has_noise + (self.blur != NONE and self.known is None))
 
     @property
     def hurst(self) -> float:
@@ -140,7 +176,7 @@ class _BlurFit:
     @property
     def square(self) -> float:
         """Squared spread of the blur."""
-        return float(np.exp(self.values[-1])) if self.blur != NONE else 0.0
+        return float(np.exp(self.values[2])) if self.blur != NONE else 0.0
 
     def end(self, rise: float, sign: float) -> float:
         """Return where the deviance at the best other parameters has risen by `rise`, below or above."""
@@ -148,7 +184,9 @@ class _BlurFit:
         limit = _LOWEST if sign < 0.0 else _HIGHEST
         while (inside.hurst - limit) * sign < 0.0:
             hurst = float(np.clip(inside.hurst + step, _LOWEST, _HIGHEST))
-            outside = _fit_blur(self.increments, self.has_noise, self.blur, (hurst, *inside.values[1:]))
+            outside = _fit_blur(
+                self.increments, self.has_noise, self.blur, square=self.known, at=(hurst, *inside.values[1:])
+            )
             above = outside.deviance - self.deviance
             if above > rise:
                 share = (np.sqrt(rise) - np.sqrt(below)) / (np.sqrt(above) - np.sqrt(below))
@@ -158,39 +196,54 @@ class _BlurFit:
 
 
 def _fit_blur(
-    increments: ProfileIncrements, has_noise: bool, blur: str, at: tuple[float, ...] = ()
+    increments: ProfileIncrements,
+    has_noise: bool,
+    blur: str,
+    *,
+    square: float | None = None,
+    at: tuple[float, ...] | None = None,
 ) -> _BlurFit:
-    """Fit blur and noise; at a given exponent from given other parameters if `at` is not empty."""
+    """Fit blur and noise; with a known squared spread, or from `at`, whose exponent is then kept."""
     from scipy.optimize import minimize
 
     is_blurred = blur != NONE
-    low = np.array([_LOWEST, *[np.log(1e-6)] * has_noise, *[np.log(4e-3)] * is_blurred])
-    high = np.array([_HIGHEST, *[np.log(1e2)] * has_noise, *[np.log(60.0)] * is_blurred])
+    free = np.array([at is None, has_noise, is_blurred and square is None])
+    values = np.array(_FIRST if at is None else at)
+    if square is not None:
+        values[2] = np.log(square)
 
-    def evaluated(values: Array) -> tuple[float, float]:
+    def solved(values: Array) -> tuple[float, float]:
+        """Return deviance and amplitude."""
         noise = float(np.exp(values[1])) if has_noise else _NO_NOISE * is_blurred
         deviance, amplitude = increments.solve(
-            float(values[0]), noise, float(np.exp(values[-1])) * is_blurred, of_samples=blur == FILTER
+            float(values[0]), noise, float(np.exp(values[2])) * is_blurred, of_samples=blur == FILTER
         )
         return (deviance, amplitude) if np.isfinite(deviance) else (1e300, np.nan)
 
-    def best(start: Array, fixed: int) -> Array:
-        if start.size == fixed:
-            return start
-        steps = np.array([0.1, *[1.0] * (start.size - 1)])[fixed:]
-        simplex = np.clip(start[fixed:] + np.vstack([0.0 * steps, np.diag(steps)]), low[fixed:], high[fixed:])
-        found = minimize(
-            lambda v: evaluated(np.r_[start[:fixed], v])[0],
-            start[fixed:],
-            method="Nelder-Mead",
-            bounds=list(zip(low[fixed:], high[fixed:], strict=True)),
-            options={"initial_simplex": simplex, "xatol": 3e-3, "fatol": 0.02, "maxfev": 150},
-        )
-        return np.asarray(np.r_[start[:fixed], found.x])
+    def deviance(chosen: Array) -> float:
+        """Return the deviance for some values of the free parameters."""
+        trial = values.copy()
+        trial[free] = chosen
+        return solved(trial)[0]
 
-    start = np.array(at or [0.5, *[np.log(0.05)] * has_noise, *[np.log(0.3)] * is_blurred])
-    values = best(start, 1 if at else 0)
-    return _BlurFit(increments, has_noise, blur, tuple(map(float, values)), *evaluated(values))
+    if free.any():
+        low, high, start = _LEAST_VALUES[free], _MOST_VALUES[free], values[free]
+        found = minimize(
+            deviance,
+            start,
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            options={
+                "initial_simplex": np.clip(
+                    start + np.vstack([0.0 * start, np.diag(_SIMPLEX[free])]), low, high
+                ),
+                "xatol": 3e-3,
+                "fatol": 0.02,
+                "maxfev": 150,
+            },
+        )
+        values[free] = found.x
+    return _BlurFit(increments, has_noise, blur, square, tuple(map(float, values)), *solved(values))
 
 
 def by_increments(surface: Surface, scales: Scales, noise: bool, held: tuple[float, float]) -> Estimate:

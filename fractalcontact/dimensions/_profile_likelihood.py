@@ -66,9 +66,8 @@ _EXCESS = 4.0  # z of the power of waves shorter than those of a blur
 _LEAST_RATIO, _MOST_RATIO = 2.0, 1e3  # of their power over that of the model
 _ALIKE_FALL = 1.0  # logarithm of the squared transfer function up to which filters are alike
 _SHORTEST_ALIKE = 2.0  # wavenumber of such waves, rad per spacing
-_HOPELESS = (
-    2.0  # deviance of octaves without aliases over that of one exponent, beyond which none are missing
-)
+# deviance of octaves without aliases over that of one exponent, beyond which no aliases are missing
+_HOPELESS = 2.0
 _PRESENT = 0.25  # exponent of the longest waves that no filter has removed
 _LEAST_SPREAD = 0.3  # of a blur beside a high-pass filter, as a first guess
 _LITTLE_NOISE, _LEAST_ALIKE = 0.1, 14.0  # of the power of a wave; modes of such waves

@@ -82,6 +82,10 @@ class Surface:
         """Return the same surface with the scaled heights taken as metres."""
         return Surface(self.stack, self.grid, self.index, 1.0, self.heights, self._is_plane)
 
+    def with_heights(self, heights: Array) -> Surface:
+        """Return a surface with other scaled heights in the same unit."""
+        return Surface(self.stack, self.grid, self.index, self.unit, heights)
+
     @property
     def is_lazy(self) -> bool:
         """Whether the heights are not in memory yet."""

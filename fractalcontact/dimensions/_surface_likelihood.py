@@ -63,7 +63,7 @@ from fractalcontact.dimensions._second_exponent import (
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
 from fractalcontact.dimensions._transfer_functions import Window
-from fractalcontact.dimensions._unknown_filter import is_filtered_locally, unfiltered_estimate
+from fractalcontact.dimensions._unknown_filter import unfiltered_estimate
 from fractalcontact.dimensions._whittle import LEAST_MODES, WhittleFit, fit_interval
 
 _PLAIN = 10.0  # decrease of the penalised deviance from which blur and noise are taken, if one is to be
@@ -241,8 +241,7 @@ def _with_blur(free: FreeEdges, comparison: Comparison, fit: BlurredFit) -> tupl
     if free.is_default:
         explained = Explanations.likelier(fit, window.power, window.frame)
         several = several_exponents(explained, surface)
-        is_filter = fit.other_form > _OTHER_FORM and is_smooth(explained.record)
-        is_filter = is_filtered_locally(free.heights) or is_filter
+        is_filter = free.is_filtered_locally or (fit.other_form > _OTHER_FORM and is_smooth(explained.record))
         if several is not None and not is_filter:
             return several, _lag(several, surface)
         # blur and noise do not explain all octaves, or what they leave is no fractal
@@ -349,7 +348,7 @@ def _without_blur(
     run = None
     is_default = free.scales is None and free.spread is None
     if is_bent and is_default and comparison is not None and fit.misfit < 0.0:
-        run = _unfiltered(free, comparison.window) if is_filtered_locally(free.heights) else None
+        run = _unfiltered(free, comparison.window) if free.is_filtered_locally else None
     if run is None and is_bent and is_default and comparison is not None and (is_even or fit.hurst >= 1.0):
         run = _longest_run(free, comparison.window, is_even=is_even)
     if run is not None:
@@ -424,7 +423,7 @@ def _longest_run(free: FreeEdges, window: Window, *, is_even: bool = True) -> tu
     """
     record = octaves(frame_blocks(window.power, window.frame))
     run = longest_run(record)
-    if run.first > 0 and is_filtered_locally(free.heights):
+    if run.first > 0 and free.is_filtered_locally:
         return _unfiltered(free, window)
     if not run.last > run.first or not LOWEST < run.fit.hurst < 1.0:
         return None

@@ -34,6 +34,14 @@ _LEAST_JUMP = 1e-260  # of the slope at the edges: its smallest power
 _STEP = 0.05  # of the exponent, and relative one of the squared spread, between powers of the jump
 
 
+def in_model(form: str, spread: float, has_noise: bool) -> str:
+    """Return the note of an estimate with blur or noise in its model; empty without either."""
+    parts = ["white noise"] if has_noise else []
+    if form != NONE:
+        parts.insert(0, FORMS[form] + (f" with a spread of {spread:.2g} spacings" if spread > 0.0 else ""))
+    return f"the surface shows {' and '.join(parts)}, which is in the model" if parts else ""
+
+
 class Window:
     """Blocks of a window with what the models need of them.
 

@@ -144,7 +144,7 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
     named = ", ".join(map(_name, combs[:_NAMED]))
     more = f" and {len(combs) - _NAMED} weaker ones" if len(combs) > _NAMED else ""
     count = f"{len(combs)} single waves" if len(combs) > 1 else "a single wave"
-    without = Surface(surface.stack, surface.grid, surface.index, surface.unit, heights)
+    without = surface.with_heights(heights)
     return without, f"{count} removed: {named}{more}"
 
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
+from tests.dimensions.test_likelihood import noisy_surface
 
 SPACING = 1e-4
 
@@ -144,8 +145,6 @@ def test_steps_and_levelled_rows_that_octaves_do_not_show(hurst):
 def test_the_interval_holds_noise_that_no_octave_shows():
     held = []
     for seed in range(8):
-        surface = fc.surfaces.fbm((128, 128), 1e-6, hurst=0.4, rms_increment=1e-7, rng=seed)
-        noisy = surface + 3e-8 * np.random.default_rng(seed).standard_normal((128, 128))
-        result = fc.dimensions.scaling(noisy)
+        result = fc.dimensions.scaling(noisy_surface(seed, 0.3))
         held.append(result.window_ci_low.item() < 0.4 < result.window_ci_high.item())
     assert sum(held) >= 7

@@ -42,6 +42,20 @@ def test_gaps_beside_noise_or_blur(kind):
         assert low < 0.7 < high < low + 0.6
 
 
+@pytest.mark.parametrize("noise", [False, True])
+def test_known_blur_beside_gaps(noise):
+    """As a filter of fractional Brownian heights, and not as heights smoother than these."""
+    heights = gaussian_filter1d(profile(512, 0.7, 7, 8), 1.0)[8:-8]
+    heights[200:300] = np.nan
+    surface = fc.surfaces.from_array(STEP * heights, SPACING)
+    result = fc.dimensions.estimate(surface, psf=SPACING, noise=noise).isel(method=0)
+    assert result.ci_low < 0.7 < result.ci_high < result.ci_low + 0.5
+    assert result.blur_spread == pytest.approx(SPACING)
+    within = fc.dimensions.estimate(surface, psf=SPACING, noise=noise, scales=(SPACING, 2e-3)).isel(method=0)
+    assert np.isnan([within.ci_low, within.ci_high]).all()
+    assert "leave out `psf`" in within.ci_low.attrs["reason"]
+
+
 def test_step_of_a_profile_is_taken_out():
     heights = profile(512, 0.3, 4)
     heights[200:] += 50.0

@@ -38,6 +38,16 @@ def fitted(power, **options):
     return fit_rolloff(blocks, np.ones(frame.count.size, dtype=bool), **options)
 
 
+def matern(hurst):
+    """Covariance of a slow roll-off with a corner at waves of 10 spacings."""
+
+    def covariance(r):
+        lag = np.maximum(2.0 * np.pi / 10.0 * r, 1e-7)
+        return lag**hurst * kv(hurst, lag)
+
+    return covariance
+
+
 @pytest.mark.parametrize("margin", [0, 10])
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
 def test_high_pass_filter_of_known_power(hurst, margin):
@@ -54,14 +64,8 @@ def test_high_pass_filter_of_known_power(hurst, margin):
 
 def test_blurred_slow_rolloff_of_known_power():
     """Beyond the edges the slope of blurred heights jumps; without that H is 0.47."""
-    hurst = 0.8
-    lines_of_modes = lines(8, 1.0)
-
-    def matern(r):
-        lag = np.maximum(2.0 * np.pi / 10.0 * r, 1e-7)
-        return lag**hurst * kv(hurst, lag)
-
-    result = fitted(pair_sums(lines_of_modes, lines_of_modes, matern, 8), blur=("filter", 0.7))
+    hurst, lines_of_modes = 0.8, lines(8, 1.0)
+    result = fitted(pair_sums(lines_of_modes, lines_of_modes, matern(hurst), 8), blur=("filter", 0.7))
     assert result.law.hurst == pytest.approx(hurst, abs=0.08)
     assert result.length == pytest.approx(10.0, rel=0.06)
     assert result.spread == pytest.approx(1.0, abs=0.005)
@@ -80,13 +84,8 @@ def test_high_passed_surface_has_the_exponent_of_the_shorter_waves():
 
 def test_known_noise_of_a_slow_rolloff():
     """A tenth of the rms increment; without it H is 0.03 too small."""
-    hurst = 0.9
-    lines_of_modes = lines(0, 0.0)
-
-    def matern(r):
-        lag = np.maximum(2.0 * np.pi / 10.0 * r, 1e-7)
-        return lag**hurst * kv(hurst, lag)
-
-    power = pair_sums(lines_of_modes, lines_of_modes, matern, 0) + 0.1**2 * 2.0 * (matern(0.0) - matern(1.0))
+    hurst, lines_of_modes, covariance = 0.9, lines(0, 0.0), matern(0.9)
+    square = 2.0 * (covariance(0.0) - covariance(1.0))  # of an increment
+    power = pair_sums(lines_of_modes, lines_of_modes, covariance, 0) + 0.1**2 * square
     assert fitted(power, weak_noise=0.1).law.hurst == pytest.approx(hurst, abs=0.02)
     assert fitted(power).law.hurst < hurst - 0.02
