@@ -141,79 +141,35 @@ def _fitted(
     count, wavelength, frame = blocks.count[inside], blocks.wavelength[inside], blocks.frame
     if frame is None or not wavelength.max() > _LEAST_LENGTH:
         return None
-    form, spread = blur
-    is_filtered = shape in (HIGH_PASS, LEAKY)
-    free = np.array([True, True, form != NONE, noise, shape == LEAKY])
-    parameters = 1 + int(np.count_nonzero(free))
-    window = Window(frame, inside, blocks.power)
+    form, first_spread = blur
     first, last = -np.log(wavelength.max()), -np.log(_LEAST_LENGTH)
-    low = np.array([LOWEST, first, 0.0, -80.0, -12.0])
-    high = np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0, -0.5])
-    excess, edges, jump = frame.logs - frame.densities, None, None
-
-    def model(values: Array) -> tuple[Array, Array]:
-        """Return the logarithm of the power, and its derivatives."""
-        every = np.array([0.0, 0.0, 0.0, -np.inf, -np.inf])
-        every[free] = values
-        hurst, square, leak = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2), np.exp(every[4])
-        logs, slope, by_square = frame.rolled_densities(hurst, square, shape, leak)
-        if edges is None:
-            weights, slopes = node_weights(hurst)
-            logs, slope = logs + weights @ excess, slope + slopes @ excess
-        else:
-            logs = logs + edges
-        columns = np.zeros((5, count.size))
-        logs, columns[0], columns[1] = logs[inside], slope[inside], 2.0 * by_square[inside]
-        if form != NONE:
-            blurred, blurred_slope, by_blur = window.signal(form, hurst, float(every[2]))
-            plain, plain_slope, _ = window.signal(NONE, hurst, 0.0)
-            logs = logs + np.log(blurred / plain)
-            columns[0] += blurred_slope - plain_slope
-            columns[2] = by_blur
-            if jump is not None:
-                edge = logs - np.log(blurred / plain) + jump[inside]
-                share = 1.0 / (1.0 + np.exp(np.minimum(edge - logs, 600.0)))
-                columns[0] -= (1.0 - share) * (blurred_slope - plain_slope)
-                columns[2] *= share
-                logs = np.logaddexp(logs, edge)
-        if noise or weak_noise:
-            white: Any = every[3] if noise else _white(frame, inside, logs, weak_noise)
-            if is_filtered:
-                white = white + frame.passed(square, leak)[0][inside]
-            total = np.logaddexp(logs, white)
-            share = np.exp(logs - total)
-            columns[[0, 2]] *= share
-            columns[1] *= 1.0 if is_filtered else share
-            columns[3] = 1.0 - share
-            logs = total
-        if shape == LEAKY:
-            columns[4] = frame.passed(square, leak)[2][inside]
-        return logs, columns[free]
-
-    def start(hurst: float, place: float) -> Array:
-        """Return first values, with noise below the weakest waves."""
-        values = np.array([hurst, place * first + (1.0 - place) * last, spread**2, -80.0, -3.0])
-        values[3] = model(values[free])[0].min() - 2.0
-        return np.asarray(values[free])
-
-    guesses = [start(hurst, place) for hurst in starts for place in (0.3, 0.6, 0.8)]
-    steps = np.array([0.2, 0.7, 0.5, 2.0, 2.0])[free]
-    bounds = low[free], high[free]
+    model = _Model(frame, inside, blocks.power, form, noise, weak_noise, shape)
+    free, parameters = model.free, 1 + int(np.count_nonzero(model.free))
+    bounds = (
+        np.array([LOWEST, first, 0.0, -80.0, -12.0]),
+        np.array([HIGHEST, last, _LARGEST_SQUARE, 80.0, -0.5]),
+    )
+    guesses = [
+        model.start(hurst, place * first + (1.0 - place) * last, first_spread)
+        for hurst in starts
+        for place in (0.3, 0.6, 0.8)
+    ]
+    limits, steps = (bounds[0][free], bounds[1][free]), np.array([0.2, 0.7, 0.5, 2.0, 2.0])[free]
     fits: list[Scored] = []
     for _ in range(2 if form == NONE else 3):
-        best = best_scored(model, blocks.power[inside], count, guesses, bounds, steps, most + _HOPELESS)
+        best = best_scored(model, model.power, count, guesses, limits, steps, most + _HOPELESS)
         hurst, corner = (float(value) for value in best.values[:2])
         is_far = best.deviance + 2.0 * parameters > most + _FAR
         if is_far or not (first < corner < last and best.is_regular):
-            fits = fits if is_filtered or form != NONE else []
+            fits = fits if model.is_filtered or form != NONE else []
             break
         fits.append(best)
         if shape in (SUDDEN, LEAKY):
             break
         square = float(best.values[2]) if form != NONE else 0.0
-        edges, jump = _edges(frame, hurst, float(np.exp(-corner)), shape, square)
+        model.edges, model.jump = _edges(frame, hurst, float(np.exp(-corner)), shape, square)
         guesses = [best.values]
-        if edges is None:
+        if model.edges is None:
             break
     if not fits:
         return None
@@ -222,17 +178,90 @@ def _fitted(
     best = min(fits, key=lambda fit: fit.deviance)
     hurst, corner = (float(value) for value in best.values[:2])
     error = float(best.half_widths[0]) * (_CORRELATED if form != NONE else 1.0)
-    law = PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance)
-    spread = float(np.sqrt(best.values[2])) if form != NONE else 0.0
     return RollOff(
-        law,
+        PowerLaw(hurst, hurst - error, hurst + error, float(count.sum()), best.deviance),
         float(np.exp(-corner)),
         best.deviance + 2.0 * parameters,
-        spread,
+        float(np.sqrt(best.values[2])) if form != NONE else 0.0,
         noise or weak_noise > 0.0,
         shape,
         form,
     )
+
+
+class _Model:
+    """Expected power of some blocks under a roll-off, perhaps with blur and noise.
+
+    Its parameters are the exponent, the logarithm of the wavenumber of the corner over 2 pi, the squared
+    spread of the blur, and the logarithms of the noise and of the leak of a filter; `free` marks those that
+    it has. `edges` and `jump`, once known, are what `_edges` returns.
+    """
+
+    def __init__(
+        self, frame: Frame, inside: Array, power: Array, form: str, noise: bool, weak_noise: float, shape: str
+    ) -> None:
+        self.frame, self.inside, self.power = frame, inside, power[inside]
+        self.form, self.noise, self.weak_noise, self.shape = form, noise, weak_noise, shape
+        self.is_filtered = shape in (HIGH_PASS, LEAKY)
+        self.free = np.array([True, True, form != NONE, noise, shape == LEAKY])
+        self.window = Window(frame, inside, power)
+        self.excess = frame.logs - frame.densities
+        self.edges: Array | None = None
+        self.jump: Array | None = None
+
+    def __call__(self, values: Array) -> tuple[Array, Array]:
+        """Return the logarithm of the power, and its derivatives by the free parameters."""
+        every = np.array([0.0, 0.0, 0.0, -np.inf, -np.inf])
+        every[self.free] = values
+        hurst, square, leak = float(every[0]), float((2.0 * np.pi * np.exp(every[1])) ** 2), np.exp(every[4])
+        logs, slope, by_square = self.frame.rolled_densities(hurst, square, self.shape, leak)
+        if self.edges is None:
+            weights, slopes = node_weights(hurst)
+            logs, slope = logs + weights @ self.excess, slope + slopes @ self.excess
+        else:
+            logs = logs + self.edges
+        logs, columns = logs[self.inside], np.zeros((5, self.power.size))
+        columns[0], columns[1] = slope[self.inside], 2.0 * by_square[self.inside]
+        if self.form != NONE:
+            logs = self._blurred(logs, columns, hurst, float(every[2]))
+        if self.noise or self.weak_noise:
+            logs = self._with_noise(logs, columns, every[3], square, leak)
+        if self.shape == LEAKY:
+            columns[4] = self.frame.passed(square, leak)[2][self.inside]
+        return logs, columns[self.free]
+
+    def _blurred(self, logs: Array, columns: Array, hurst: float, blur: float) -> Array:
+        """Return the logarithm of the blurred power; the derivatives are changed in place."""
+        blurred, blurred_slope, by_blur = self.window.signal(self.form, hurst, blur)
+        plain, plain_slope, _ = self.window.signal(NONE, hurst, 0.0)
+        fallen = logs + np.log(blurred / plain)
+        columns[0] += blurred_slope - plain_slope
+        columns[2] = by_blur
+        if self.jump is None:
+            return np.asarray(fallen)
+        edge = fallen - np.log(blurred / plain) + self.jump[self.inside]
+        share = 1.0 / (1.0 + np.exp(np.minimum(edge - fallen, 600.0)))
+        columns[0] -= (1.0 - share) * (blurred_slope - plain_slope)
+        columns[2] *= share
+        return np.asarray(np.logaddexp(fallen, edge))
+
+    def _with_noise(self, logs: Array, columns: Array, noise: float, square: float, leak: float) -> Array:
+        """Return the logarithm of the power with white noise; the derivatives are changed in place."""
+        white: Any = noise if self.noise else _white(self.frame, self.inside, logs, self.weak_noise)
+        if self.is_filtered:
+            white = white + self.frame.passed(square, leak)[0][self.inside]
+        total = np.logaddexp(logs, white)
+        share = np.exp(logs - total)
+        columns[[0, 2]] *= share
+        columns[1] *= 1.0 if self.is_filtered else share
+        columns[3] = 1.0 - share
+        return np.asarray(total)
+
+    def start(self, hurst: float, corner: float, spread: float) -> Array:
+        """Return first values of the free parameters, with noise below the weakest waves."""
+        values = np.array([hurst, corner, spread**2, -80.0, -3.0])
+        values[3] = self(values[self.free])[0].min() - 2.0
+        return np.asarray(values[self.free])
 
 
 def _white(frame: Frame, inside: Array, logs: Array, share: float) -> float:
