@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import textwrap
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import FractalContactError, InvalidInput, TooLittleMemory
+from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory
 from fractalcontact.base.memory import require_libraries
 from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
+PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}  # of Pa
+SOFTEST = 1e4  # Pa: below the softest gels; a modulus below it is in another unit
 QUESTIONS = {
     "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
     "contact": "contact of a scan with a flat under growing pressure",
@@ -35,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         collect_garbage_less_often()
         block_dask_import()
     options = _parsers()[0].parse_args(arguments)
-    warnings.showwarning = _say_warning
+    warnings.showwarning = _WarningPrinter()
     try:
         require_libraries()
         with leaving(_leave):
@@ -80,11 +84,16 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
 
     run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
     run.add_argument("scene", help="a scene file (TOML), or the name of a shipped scene")
-    run.add_argument("-o", "--out", help="folder for result.nc and the figures; a stopped run resumes there")
+    run.add_argument(
+        "-o",
+        "--out",
+        help="folder for result.nc, the report and the figures (default: the name of the scene); a stopped "
+        "run resumes there",
+    )
     run.add_argument(
         "--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing"
     )
-    run.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    _add_run_options(run)
     run.add_argument(
         "--workers",
         type=int,
@@ -149,6 +158,31 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     return parser, commands.choices
 
 
+def _add_run_options(command: argparse.ArgumentParser) -> None:
+    """Add what all commands that run a scene take."""
+    command.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    command.add_argument(
+        "--verbose", action="store_true", help="all tables, remarks and caveats, and the time of every stage"
+    )
+    command.add_argument(
+        "--force", action="store_true", help="overwrite results of another study and files of others"
+    )
+
+
+def _pascal(text: str) -> float:
+    """Return a pressure in Pa, given as a number or with its unit: `30 GPa`."""
+    parts = re.fullmatch(r"\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*", text)
+    try:
+        value = float(parts[1]) * PREFIXES[parts[2]] if parts else None
+    except ValueError:
+        value = None
+    if value is None:
+        raise argparse.ArgumentTypeError(
+            f"expected a pressure in Pa, or with its unit (30 GPa), got {text!r}"
+        )
+    return value
+
+
 def _add_question(commands: Any, question: str, line: str) -> None:
     """Add a command that answers one question to a scan."""
     command = commands.add_parser(question, help=line)
@@ -160,12 +194,35 @@ def _add_question(commands: Any, question: str, line: str) -> None:
         command.add_argument(
             "--as-scanned", action="store_true", help="do not move the upper face into mated position"
         )
-    if question != "roughness":
-        command.add_argument("--young", type=float, required=True, help="Young's modulus of both bodies, Pa")
-        command.add_argument("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
         command.add_argument(
-            "--despike", action="store_true", help="remove spikes of the scan before it is pressed"
+            "--turn-upper",
+            choices=("x", "y"),
+            help="the upper body was scanned with its face up: turn it over about this axis",
         )
+        command.add_argument("--friction-angle", type=float, help="basic friction angle, degree")
+        command.add_argument(
+            "--jcs",
+            type=_pascal,
+            help="compressive strength of the joint walls, Pa or with its unit; with --friction-angle: shear "
+            "strength, and a datasheet",
+        )
+    else:
+        command.add_argument(
+            "--level",
+            type=int,
+            choices=(0, 1, 2),
+            help="remove the mean plane (1, the default unless the surface is periodic) or quadric (2); 0 "
+            "keeps the tilt",
+        )
+    if question != "roughness":
+        command.add_argument(
+            "--young",
+            type=_pascal,
+            required=True,
+            help="Young's modulus of both bodies, Pa, or with its unit: 30e9, 30GPa",
+        )
+        command.add_argument("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
+    command.add_argument("--despike", action="store_true", help="remove spikes of the scan")
     command.add_argument(
         "--units",
         help="unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of the "
@@ -176,33 +233,67 @@ def _add_question(commands: Any, question: str, line: str) -> None:
         "-o", "--out", help="folder for the results (default: SCAN_QUESTION, without suffix)"
     )
     command.add_argument("--scene", action="store_true", help="print the scene and run nothing")
-    command.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
+    _add_run_options(command)
     command.set_defaults(action=_answer, question=question, plan=False, workers=0)
 
 
 def _answer(options: argparse.Namespace) -> int:
-    """Write the scene of a question into the folder of its results, and run it."""
+    """Run the scene of a question, and write it beside its results."""
+    import tomllib
+
     from fractalcontact import scenes
-    from fractalcontact.base.output_folder import output_folder
 
     scan, folder = Path(options.scan), options.out
     if folder is None:
         folder = f"{scan.name.partition('.')[0]}_{options.question}"
-    arguments = {"spacing": options.spacing, "units": options.units}
-    if options.question != "roughness":
-        arguments |= {"young": options.young, "poisson": options.poisson, "despike": options.despike}
+    arguments: dict[str, Any] = {
+        name: getattr(options, name)
+        for name in (
+            "spacing",
+            "units",
+            "level",
+            "despike",
+            "young",
+            "poisson",
+            "turn_upper",
+            "friction_angle",
+        )
+        if hasattr(options, name)
+    }
     if options.question == "joint":
-        arguments["register"] = not options.as_scanned
+        arguments |= {"register": not options.as_scanned, "wall_strength": options.jcs}
+    if arguments.get("young", SOFTEST) < SOFTEST:
+        message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
+        warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
     upper = getattr(options, "upper", None)
     text = scenes.template(options.question, scan, upper, folder=place, **arguments)
     if options.scene:
         print(text)
         return 0
-    output_folder(folder)
-    options.out, options.scene = folder, Path(folder) / f"{options.question}.toml"
-    options.scene.write_text(text, encoding="utf-8")
-    return _run(options)
+    target = Path(folder) / f"{options.question}.toml"
+    if not options.force and target.exists() and not _is_unedited(target.read_text(encoding="utf-8")):
+        remedy = f"fractalcontact run {target} -o {folder} runs it, --force overwrites it"
+        expected = "no scene of yours under the name of the one that is written"
+        got = f"{target.name!r} ({remedy})"
+        raise InvalidInput(f"fractalcontact {options.question}", [f"-o: expected {expected}, got {got}"])
+    scene = scenes.Scene(options.question, tomllib.loads(text), Path(folder).absolute())
+    options.out, options.scene = folder, scene
+    try:
+        return _run(options)
+    finally:
+        if Path(folder).is_dir():  # also after a stop, and not after a refusal
+            target.write_text(f"{_mark(text)}\n{text}", encoding="utf-8")
+
+
+def _mark(text: str) -> str:
+    """Return the first line of a scene that a command wrote, which shows whether it was edited since."""
+    return f"# Written by fractalcontact; checksum {zlib.crc32(text.encode()):08x}"
+
+
+def _is_unedited(text: str) -> bool:
+    first, _, rest = text.partition("\n")
+    return first == _mark(rest)
 
 
 def _init(options: argparse.Namespace) -> int:
@@ -228,21 +319,22 @@ def _run(options: argparse.Namespace) -> int:
     if options.plan:
         print(scenes.plan(scenes.validate(options.scene)))
         return 0
-    if options.out is None:
-        raise InvalidInput("fractalcontact run", ["-o: expected a folder for the results, got none"])
     with Problems("fractalcontact run") as problems:
         problems.integer("--workers", options.workers, at_least=0, at_most=most_workers())
     speaks = not options.quiet
-    scenes.run(options.scene, out=options.out, progress=speaks, summary=speaks, workers=options.workers)
+    out = Path(options.out or Path(str(options.scene)).stem)
+    more = {"verbose": options.verbose, "workers": options.workers, "force": options.force}
+    scenes.run(options.scene, out=out, progress=speaks, summary=speaks, **more)
     if speaks:
         from fractalcontact.base.tables import screen_width
 
-        figures = len(list(Path(options.out).glob("*.png")))
-        size = (Path(options.out) / RESULT).stat().st_size
+        figures = len(list(out.glob("*.png")))
+        size = (out / RESULT).stat().st_size
         drawn = f" and {figures} figures" if figures else ""
         files = f"{RESULT} ({size / 1e6:.2g} MB), report.html"
-        written = f"written to {options.out}: {files}{drawn}{_memory()}"
+        written = f"written to {out}: {files}{drawn}{_memory()}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
+        print(f"next: open {out / 'report.html'} in a browser")
     return 0
 
 
@@ -359,14 +451,24 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from fractalcontact.scenes import contents
+    from fractalcontact.base.file_contents import file_contents
 
-    print(contents(options.file))
+    print(file_contents(options.file))
     return 0
 
 
-def _say_warning(message: Any, category: Any, *_: Any, **__: Any) -> None:
-    print(f"{getattr(category, '__name__', 'warning')}: {message}", file=sys.stderr)
+class _WarningPrinter:
+    """Prints every warning once, whatever it comes from."""
+
+    def __init__(self) -> None:
+        self.printed: set[str] = set()
+
+    def __call__(self, message: Any, category: Any, *_: Any, **__: Any) -> None:
+        """Print a warning, in the place of `warnings.showwarning`."""
+        text = f"{getattr(category, '__name__', 'warning')}: {message}"
+        if text not in self.printed:
+            self.printed.add(text)
+            print(text, file=sys.stderr)
 
 
 def _leave(number: int, _: object) -> None:

@@ -1,17 +1,9 @@
 """Configuration of the site: sphinx-build -W -b html gallery gallery/_build/html (no network needed)."""
 
-import atexit
-import os
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # helpers of the examples
-# one study for all examples of the 1998 paper, computed once per build
-if "FRACTALCONTACT_GALLERY" not in os.environ:
-    os.environ["FRACTALCONTACT_GALLERY"] = tempfile.mkdtemp(prefix="fractalcontact-gallery-")
-    atexit.register(shutil.rmtree, os.environ["FRACTALCONTACT_GALLERY"], ignore_errors=True)
 
 import matplotlib.pyplot as plt
 
@@ -45,7 +37,7 @@ autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
-SECTIONS = ("paper", "tutorials", "rough_surfaces", "contacts", "crack_joints", "contact_sets")
+SECTIONS = ("tutorials", "rough_surfaces", "contacts", "crack_joints", "contact_sets")
 
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
@@ -83,6 +75,7 @@ PAGES = (
     "estimator_accuracy",
     "speed",
     "scene_files",
+    "paper_1998",
     "data_model",
     "conventions",
     "glossary",

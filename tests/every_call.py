@@ -19,8 +19,10 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-import test_labels as labels
+import test_labels
 import xarray as xr
+from calls import CALLS as ARGUMENTS
+from calls import crack, labelled_functions, measured, rough
 from study import SOUND
 
 import fractalcontact as fc
@@ -36,15 +38,12 @@ LEFT_OUT = {
     "accuracy.Method",
     "accuracy.Result",
     "accuracy.cases",
-    "contact.ContactOptions",
-    "contact.LoadPath",
-    "joints.PARK_PAULAY",
     "scenes.Scene",
     "surfaces.SelfAffine",
 }
 # figures draw on the axes of a caller what others have computed, and Matplotlib promises nothing for threads;
 # of `plotting` only `draw`, which reads a study and writes files, is called here, and by `scenes.run`
-SUBPACKAGES = [name for name in fc.__all__ if name not in ("plotting", "save", "open")]
+CALLED = [name for name in fc.__all__ if name not in ("plotting", "save", "open")]
 
 
 @functools.cache
@@ -60,7 +59,7 @@ def scene():
 
 
 def opened(folder):
-    return fc.open(fc.save(labels.rough(), folder / "opened.nc"))
+    return fc.open(fc.save(rough(), folder / "opened.nc"))
 
 
 def run(folder):
@@ -69,51 +68,29 @@ def run(folder):
     return tree
 
 
-def measured():
-    method = fc.accuracy.Method("m", [4, 8], lambda n: n, lambda n: n, lambda n, _: 1.0 / n)
-    return fc.accuracy.measure({"surfaces": [fc.accuracy.Benchmark("b", "e", "t", (method,))]}, budget=0.1)
-
-
 def extremes():
     """Return the results of one case, which is examined in a process of its own."""
     return fc.accuracy.extremes("one cell")
 
 
 CALLS = {
-    "save": lambda folder: xr.open_dataset(fc.save(labels.rough(), folder / "saved.nc")).load(),
+    "save": lambda folder: xr.open_dataset(fc.save(rough(), folder / "saved.nc")).load(),
     "open": opened,
     "contact.effective_modulus": lambda _: fc.contact.effective_modulus(1e9, 0.2),
     "contact.effective_poisson": lambda _: fc.contact.effective_poisson(1e9, 0.2),
     "contact.flat_stiffness": lambda _: fc.contact.flat_stiffness((20, 20), 1e-4, contact_modulus=1e9),
     "dimensions.methods": lambda _: fc.dimensions.methods(),
-    "joints.Crack": lambda _: labels.crack().faces()[0],
-    "joints.bandis_aperture": lambda _: fc.joints.bandis_aperture(10.0, 50e6, 100e6),
-    "joints.hydraulic_aperture": lambda _: fc.joints.hydraulic_aperture(1e-4, roughness=10.0),
-    "joints.bandis_constants": lambda _: fc.joints.bandis_constants(10.0, 100e6, 0.2e-3),
-    "joints.bandis_closure": lambda _: fc.joints.bandis_closure(
-        1e6, initial_stiffness=1e10, greatest_closure=1e-3
-    ),
-    "joints.barton_bandis_scaled": lambda _: fc.joints.barton_bandis_scaled(10.0, 100e6, 1.0),
-    "joints.barton_choubey_strength": lambda _: fc.joints.barton_choubey_strength(
-        1e6, roughness=10.0, wall_strength=100e6, residual_angle=30.0
-    ),
-    "joints.self_weight_strength": lambda _: fc.joints.self_weight_strength(
-        10.0, unit_weight=25e3, friction_angle=30.0
-    ),
-    "joints.size_effect": lambda _: fc.joints.size_effect(10.0, contact_dimension=1.7),
-    "scenes.contents": lambda _: fc.scenes.contents(study()[1] / "result.nc"),
+    "joints.Crack": lambda _: crack().faces()[0],
     "scenes.json_schema": lambda _: fc.scenes.json_schema(),
     "scenes.load": lambda _: str(fc.scenes.load(scene()).tables),
     "scenes.validate": lambda _: str(fc.scenes.validate(scene()).tables),
     "scenes.plan": lambda _: str(fc.scenes.plan(fc.scenes.load(scene()))),
-    "scenes.paper_criteria": lambda _: fc.scenes.paper_criteria(),
-    "scenes.paper_table": lambda _: fc.scenes.paper_table(study()[0]),
     "scenes.report": lambda folder: fc.scenes.report(study()[0], folder / "report.html").name,
     "scenes.reproduce": lambda _: fc.scenes.reproduce(study()[0]["joints/closure"].to_dataset()),
     "scenes.run": run,
     "scenes.summary": lambda _: fc.scenes.summary(study()[0]),
     "scenes.template": lambda folder: fc.scenes.template(
-        "roughness", fc.save(labels.rough(), folder / "scan.nc"), folder=folder
+        "roughness", fc.save(rough(), folder / "scan.nc"), folder=folder
     ),
     "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
     "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
@@ -121,7 +98,6 @@ CALLS = {
     "accuracy.examine": lambda _: str([r.name for r in fc.accuracy.examine(fc.accuracy.cases["one cell"])]),
     "accuracy.measure": lambda _: str(sorted(measured().children)),
     "accuracy.extremes": lambda _: extremes(),
-    "accuracy.worst_results": lambda _: fc.accuracy.worst_results(extremes()),
     "plotting.draw": lambda folder: str(
         sorted(path.name for path in fc.plotting.draw(study()[0], folder / "figures"))
     ),
@@ -132,20 +108,20 @@ CALLS = {
 def names():
     """Return every public function that computes or reads; a new one is in it by itself."""
     found = ["save", "open", "plotting.draw"]
-    for subpackage in SUBPACKAGES:
+    for subpackage in CALLED:
         module = importlib.import_module(f"fractalcontact.{subpackage}")
         found += [name for function in module.__all__ if (name := f"{subpackage}.{function}") not in LEFT_OUT]
     return found
 
 
 def has_call(name):
-    return name in CALLS or (name.partition(".")[0] in labels.SUBPACKAGES and name not in labels.UNLABELLED)
+    return name in CALLS or (name in ARGUMENTS and name in labelled_functions())
 
 
 def fingerprint(name, folder):
     """Return a digest of the numbers that a function returns; run times are left out."""
     folder.mkdir(exist_ok=True)
-    result = CALLS[name](folder) if name in CALLS else labels.result_of(name, folder)
+    result = CALLS[name](folder) if name in CALLS else test_labels.result_of(name)
     if isinstance(result, xr.DataArray):
         result = result.to_dataset(name="values")
     if isinstance(result, xr.Dataset):
@@ -160,7 +136,7 @@ def fingerprint(name, folder):
     if isinstance(result, np.ndarray):
         result = result.tobytes()
     text = repr(result)
-    if name in ("scenes.contents", "scenes.summary"):
+    if name == "scenes.summary":
         text = "".join(letter for letter in text if not letter.isdigit() and letter not in " .")
     return hashlib.sha256(text.encode()).hexdigest()
 

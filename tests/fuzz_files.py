@@ -11,9 +11,11 @@ import numpy as np
 import scipy.io
 import skimage as ski
 import xarray as xr
-from fuzz_calls import fault_of, rough
+from calls import rough
+from fuzz_faults import fault_of
 
 import fractalcontact as fc
+from fractalcontact.base.file_contents import file_contents
 
 SHAPE = (8, 9)
 HEIGHTS = np.random.default_rng(1).normal(size=SHAPE) * 1e-6
@@ -158,7 +160,7 @@ READERS = {
     "surfaces.read_points": fc.surfaces.read_points,
     "domains.read_mask": lambda path: fc.domains.read_mask(path, 1e-5),
     "open": lambda path: opened(path),
-    "scenes.contents": fc.scenes.contents,
+    "scenes.contents": file_contents,
 }  # fmt: skip
 WORDS = (
     b"0", b"-1", b"9999999999", b"1e308", b"nan", b"inf", b"-", b"\0", b"\n", b",", b";", b"\t", b" ",

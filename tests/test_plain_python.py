@@ -43,7 +43,7 @@ def test_gliding_box_lacunarity():
 
 
 def test_correlation_mass():
-    result = fc.domains.correlation_dimension(mask_of(MASK), scales=[1, 3])
+    result = fc.domains.correlation_dimension(mask_of(MASK), box_sizes=[1, 3])
     assert float(result.mean_mass[0]) == pytest.approx(1.0)
 
 

@@ -20,6 +20,7 @@ from fractalcontact.base.errors import (
     InvalidInput,
     UnreadableFile,
 )
+from fractalcontact.base.file_contents import file_contents
 
 PACKAGE = Path(fc.__file__).parent
 # calls that run code of a string or of a file
@@ -45,7 +46,7 @@ def test_no_code_of_a_file_is_run():
             if isinstance(node, ast.Import | ast.ImportFrom):
                 modules = {alias.name for alias in node.names} | {getattr(node, "module", None) or ""}
                 unpacks = {name.partition(".")[0] for name in modules} & UNPACKING
-                found += [(path.name, unpacks)] if unpacks and path.name != "kernel_cache.py" else []
+                found += [(path.name, unpacks)] if unpacks and path.name != "jit.py" else []
             elif isinstance(node, ast.Call):
                 found += [(path.name, fault) for fault in faults_of(node)]
     assert found == []
@@ -88,7 +89,7 @@ def test_pickled_objects_are_not_made(tmp_path, name):
         fc.surfaces.read_points,
         lambda path: fc.domains.read_mask(path, 1.0),
         fc.open,
-        fc.scenes.contents,
+        file_contents,
         fc.scenes.load,
     ):
         with pytest.raises(InvalidInput):
@@ -153,12 +154,13 @@ def test_scene_cannot_name_a_folder_to_write_in(tmp_path, key):
 CODE = """
 import sys, fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError
+from fractalcontact.base.file_contents import file_contents
 readers = {
     "read": lambda path: fc.surfaces.read(path, spacing=1.0),
     "read_points": lambda path: fc.surfaces.read_points(path),
     "read_mask": lambda path: fc.domains.read_mask(path, 1.0),
     "open": lambda path: fc.open(path),
-    "contents": lambda path: fc.scenes.contents(path),
+    "contents": lambda path: file_contents(path),
     "load": lambda path: fc.scenes.load(path),
     "template": lambda path: fc.scenes.template("roughness", path),
 }

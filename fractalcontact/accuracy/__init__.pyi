@@ -9,7 +9,6 @@ from ._examine import examine as examine
 from ._extremes import extremes as extremes
 from ._measure import measure as measure
 from ._summary import summary as summary
-from ._summary import worst_results as worst_results
 
 __all__ = [
     "Benchmark",
@@ -23,5 +22,4 @@ __all__ = [
     "extremes",
     "measure",
     "summary",
-    "worst_results",
 ]

@@ -74,6 +74,10 @@ class SmallStrainWarning(FractalContactWarning):
     """The slopes of a pressed surface are beyond small strains; see the variable `rms_slope`."""
 
 
+class AnisotropyWarning(FractalContactWarning):
+    """A method for isotropic contacts is used on one with a lay; see the variable `superposition_error`."""
+
+
 class LoadedWarning(FractalContactWarning):
     """A dask array is loaded into memory by a function that needs all of it."""
 

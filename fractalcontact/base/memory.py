@@ -194,7 +194,11 @@ def loaded_bytes(arguments: Mapping[str, Any]) -> float:
 
 
 def plane_in(arguments: Mapping[str, Any]) -> Plane | None:
-    """Return the grid of the array that a call is given; None without one."""
+    """Return the grid of the array that a call is given, or is to make; None without one."""
+    if "shape" in arguments:
+        shape = arguments["shape"]
+        sizes = (1, *(shape if hasattr(shape, "__len__") else (shape,)))[-2:]
+        return Plane((int(sizes[0]), int(sizes[1])), planes=int(arguments.get("members") or 1))
     return next((plane_of(arguments[name]) for name in PLANES if name in arguments), None)
 
 

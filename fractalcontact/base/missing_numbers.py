@@ -11,14 +11,24 @@ import xarray as xr
 _FIT = "NaN where no power law was fitted: the set or the surface is empty, flat or too small"
 _AMPLITUDE = "NaN where the method gives no amplitude, or no power law was fitted"
 _EMPTY = "NaN where the set is empty, or the mask is too small"
-_LENGTH = "NaN where the mask has no coordinates in metres, or cells that are not square"
-_AREA = "NaN where the set is empty, or the mask has no coordinates in metres"
+_AREA = "NaN where the set is empty"
 _SLOPE = "NaN where a value is not positive, or stands alone"
 _OCTAVES = "NaN where no run of octaves has one exponent"
 _HEIGHTS = "NaN where too few heights are observed at this scale"
 _FLAT = "NaN where the heights do not vary, or too few are observed"
+_STATE = "NaN where the state has none, see signature_flag and reason, or has no state before it"
+_OF_STATES = ("spot_size", "gap_size", "domain_dimension", "excess_dimension", "clustering", "integral_range")
+_OF_CHANGES = ("gap_size_ratio", "domain_dimension_change", "excess_dimension_change", "clustering_ratio")
+_WITH_ENDS = (*_OF_STATES, *_OF_CHANGES, "integral_range_ratio", "lacunarity_ratio")
 
 REASONS = {
+    **dict.fromkeys((f"{name}{end}" for name in _WITH_ENDS for end in ("", "_low", "_high")), _STATE),
+    **dict.fromkeys(
+        ("local_dimension_min", "local_dimension_max", "spots_dimension", "median_cells"), _STATE
+    ),
+    **dict.fromkeys(("pair_correlation_length", "hit_fraction", "spots_fraction"), _STATE),
+    **dict.fromkeys(("window_low", "window_high"), "NaN where no window of ratio 4 fits into the mask"),
+    "stationary_exponent": "NaN where a mask is empty, or cells or ratios of spacings do not allow one",
     **dict.fromkeys(
         ("scale_min", "scale_max", "fitted_hurst", "fractal_dimension", "singularity_strength"), _FIT
     ),
@@ -28,21 +38,17 @@ REASONS = {
     "blur_spread": "NaN where the method has no model of blur, or no power law was fitted",
     "misfit": "NaN where the method has no test of its model, or no power law was fitted",
     **dict.fromkeys(("window_hurst", "window_ci_low", "window_ci_high"), _OCTAVES),
-    **dict.fromkeys(("hurst", "standard_error"), _FLAT),
+    "hurst": _FLAT,
+    "standard_error": "NaN where no interval with tested coverage can be given",
     **dict.fromkeys(("covering_area", "cube_count", "roughness", "madogram", "variogram"), _HEIGHTS),
     **dict.fromkeys(("second_variogram", "variation"), _HEIGHTS),
     **dict.fromkeys(("fluctuation", "divider_length", "higuchi_length"), _HEIGHTS),
-    **dict.fromkeys(("box_length", "radius_length"), _LENGTH),
-    **dict.fromkeys(("area", "length", "perimeter", "x_min", "x_max", "y_min", "y_max"), _AREA),
     **dict.fromkeys(("total_perimeter", "largest_island", "mean_island_area"), _AREA),
     **dict.fromkeys(("largest_length", "mean_island_length"), _AREA),
     **dict.fromkeys(("null_dimension", "null_spread", "mean_mass", "null_mass"), _EMPTY),
     **dict.fromkeys(("minkowski_null_dimension", "correlation_null_dimension"), _EMPTY),
-    **dict.fromkeys(
-        ("lacunarity", "null_lacunarity", "relative_lacunarity", "normalised_lacunarity"), _EMPTY
-    ),
-    **dict.fromkeys(("lacunarity_slope", "lacunarity_area"), _EMPTY),
-    **dict.fromkeys(("null_lacunarity_slope", "null_lacunarity_area"), _EMPTY),
+    **dict.fromkeys(("lacunarity", "null_lacunarity", "normalised_lacunarity"), _EMPTY),
+    **dict.fromkeys(("lacunarity_low", "lacunarity_high"), f"{_EMPTY}, or the method gives no interval"),
     **dict.fromkeys(("box_local_slope", "minkowski_local_slope", "correlation_local_slope"), _SLOPE),
     "correlation": "NaN where the heights of a face do not vary",
     "tangential_stiffness": "NaN where periodic bodies stick everywhere: they move together as rigid bodies",

@@ -23,10 +23,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.content_checksum import DAMAGED, append_checksum, require_checksum
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
 from fractalcontact.base.memory import require_unpacked, unpacked_limit
+from fractalcontact.base.netcdf_header import DAMAGED, append_checksum, require_checksum
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import CONVENTIONS, encoded
 from fractalcontact.base.validation import Problems, reading
 
@@ -35,6 +36,8 @@ PARTIAL = ".partial"
 LONGEST_NAME = 255  # bytes, of a variable, a dim or an attribute
 RATIO = 250  # size in memory over that of a large file; contact maps are packed to a hundredth
 FULL_DISK = 1 << 16  # bytes: a disk with less free space counts as full
+# attributes by which a file is unpacked as it is read; left by another reader, they would change the values
+PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
 _TYPE = "fractalcontact_kind"
 _GLOBAL = ("Conventions", "title", "institution", "source", "history", "references", "comment", "provenance")
 
@@ -59,7 +62,8 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     ------
     InvalidInput
         `result` is not labelled data or has something that NetCDF cannot store (an attribute that is a dict,
-        for example), the name does not end in `.nc`, or the folder cannot be written.
+        for example) or that would change its values (the `scale_factor` of another file), the name does not
+        end in `.nc`, or the folder cannot be written.
 
     Examples
     --------
@@ -162,7 +166,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
     for node in tree.subtree:
-        node.dataset = encoded(_with_fixed_width_strings(node.to_dataset(inherit=False)))
+        node.dataset = with_load_indexes(encoded(_with_fixed_width_strings(node.to_dataset(inherit=False))))
     saved_type = tree.attrs.get(_TYPE, "DataTree" if tree.children else "Dataset")
     if saved_type == "DataTree":
         return tree
@@ -186,6 +190,9 @@ def _check_words(problems: Problems, groups: Mapping[str, xr.Dataset]) -> None:
             problems.require(_is_name(name), f"{place}name of a variable or dim", expected, name)
         for owner, attributes in owners.items():
             for key, value in attributes.items():
+                if owner and key in PACKING:
+                    expected = "values that are unpacked, without this attribute of a file"
+                    problems.add(f"{place}{owner}{key}", expected, value)
                 expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
                 problems.require(_is_name(key), f"{place}{owner}name of an attribute", expected, key)
                 expected = "text, a number or a list of them"
@@ -262,13 +269,19 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
     for name in names:
         store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
         dataset = xr.open_dataset(store)
-        own = (
-            {dim: size for dim, size in chunks.items() if dim in dataset.dims}
-            if hasattr(chunks, "items")
-            else chunks
-        )
-        groups[name] = dataset.chunk(own)
+        numbers = [str(key) for key, array in dataset.data_vars.items() if array.dtype != object]
+        for key in dataset.variables.keys() - set(numbers):
+            dataset.variables[key].load()  # coordinates, and words, whose blocks dask cannot size
+        # without the coordinates, which `chunk` would cut as well
+        values = dataset[numbers].reset_coords(drop=True)
+        groups[name] = dataset.assign(values.chunk(_own_chunks(chunks, values)).data_vars)
     return groups
+
+
+def _own_chunks(chunks: Any, dataset: xr.Dataset) -> Any:
+    """Return the sizes of blocks along the dims that a group has."""
+    is_by_dim = isinstance(chunks, Mapping)
+    return {dim: size for dim, size in chunks.items() if dim in dataset.dims} if is_by_dim else chunks
 
 
 def _is_size(size: object) -> bool:
@@ -376,7 +389,9 @@ def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> dict[str, xr.Da
         tree = result.copy(deep=False)  # a tree of its own, even of a part of a tree
         groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
     else:
-        groups = {"/": _marked(result) if isinstance(result, xr.DataArray) else result.copy(deep=False)}
+        groups = {"/": _marked(result) if isinstance(result, xr.DataArray) else result}
+    # that of another file could pack the numbers into integers
+    groups = {path: encoded(dataset) for path, dataset in groups.items()}
     groups["/"].attrs = {"Conventions": CONVENTIONS} | groups["/"].attrs
     return groups
 

@@ -75,7 +75,11 @@ def logarithm(values: Array) -> tuple[Array, Array]:
 
     Each curve, along the last axis, has its own k, which has shape (..., 1).
     """
-    lowest = np.min(values, axis=-1, keepdims=True, initial=np.inf, where=np.isfinite(values) & (values > 0))
+    positive = np.isfinite(values) & (values > 0)
+    lowest = np.min(values, axis=-1, keepdims=True, initial=np.inf, where=positive)
+    highest = np.max(values, axis=-1, keepdims=True, initial=0.0, where=positive)
+    # a value of rounding beside large ones must not make these overflow: float64 ends at 2^1024
+    lowest = np.maximum(lowest, np.ldexp(highest, -1000))
     unit = np.frexp(np.where(np.isfinite(lowest), lowest, 0.5))[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.log(np.ldexp(values, -unit)), unit

@@ -142,6 +142,20 @@ def file_checksum(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def with_load_indexes(result: T) -> T:
+    """Return a result in which a load can be selected, ``closure.sel(normal_force=300)``.
+
+    That is a coordinate along `step` that the call prescribed. Files hold no such index.
+    """
+    entry = _read(result.attrs.get("provenance", "{}"))
+    parameters = entry.get("parameters", {}) if isinstance(entry, dict) else {}
+    for name, coordinate in result.coords.variables.items():
+        is_load = coordinate.dims == ("step",) and name != "step" and parameters.get(name) is not None
+        if is_load and name not in result.xindexes:
+            result = result.set_xindex(str(name))
+    return result
+
+
 def with_provenance(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable of a result with the provenance of the result, as an input of the next call."""
     array = dataset[name]

@@ -29,7 +29,6 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.construction import with_variables
 from fractalcontact.base.errors import InvalidInput, LoadedWarning, TooLittleMemory
 from fractalcontact.base.memory import (
     NEGLIGIBLE,
@@ -42,7 +41,7 @@ from fractalcontact.base.memory import (
 )
 from fractalcontact.base.missing_numbers import give_reasons
 from fractalcontact.base.numbers import python_number
-from fractalcontact.base.provenance import stamp
+from fractalcontact.base.provenance import stamp, with_load_indexes
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import label
 from fractalcontact.base.surface_argument import with_surface
@@ -158,7 +157,7 @@ def public_result(
             result = stamp(result, name, parameters, **entries)
             if notes:
                 result.attrs["history"] += f" (surface: {notes})"
-            return result
+            return with_load_indexes(result)
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
             with _memory_errors(name):
@@ -208,12 +207,8 @@ def _memory_errors(name: str) -> Iterator[None]:
 
 
 def _with_run_time(dataset: xr.Dataset, seconds: float) -> xr.Dataset:
-    """Return the result with `run_time`, unless the function has set it; a scalar NaN is overwritten."""
-    variable = dataset.variables.get("run_time")
-    if variable is not None and (variable.ndim > 0 or not np.isnan(variable.values)):
-        return dataset
-    run_time = xr.Variable((), np.array(seconds), fastpath=True)
-    return with_variables(dataset, {**dataset.variables, "run_time": run_time})
+    """Return the result with `run_time`, unless the function has set it."""
+    return dataset if "run_time" in dataset.variables else dataset.assign(run_time=seconds)
 
 
 def public_name(function: Callable[..., Any]) -> str:

@@ -16,8 +16,6 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.construction import with_variables
-
 CONVENTIONS = "CF-1.11"
 CORE_DIMS = ("y", "x")
 
@@ -68,6 +66,10 @@ _SLIP_STATE = {
     "flag_values": np.array([OPEN, STICK, SLIP], dtype=np.int8),
     "flag_meanings": "open stick slip",
 }
+_SLIP_METHOD = {
+    "flag_values": np.array([0, 1], dtype=np.int8),
+    "flag_meanings": "superposition full",
+}
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")  # that `partial_slip` can return
 
 CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  # that `press` can return
@@ -75,6 +77,10 @@ CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  
 _EVENT = {
     "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
     "flag_meanings": "continuation birth death merge split merge_and_split",
+}
+_SIGNATURE = {
+    "flag_values": np.arange(7, dtype=np.int8),
+    "flag_meanings": "measured empty full no_window filled too_few unresolved",
 }
 _SCALE_POSITION = {
     "flag_values": np.array([-1, 0, 1], dtype=np.int8),
@@ -89,6 +95,16 @@ _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_FACET = {"comment": "NaN where no facet faces the shear"}
 _NO_WATER = {"comment": "NaN where no water comes from an edge or a drain"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
+
+
+def _with_ends(name: str, units: str, long_name: str, words: str = "") -> dict[str, Quantity]:
+    """Return the rows of a quantity and of the ends of its 95 % interval, called `words` there."""
+    ends = {
+        f"{name}_{short}": Quantity(units, f"{end} end of the 95 % interval of the {words or long_name}")
+        for short, end in (("low", "lower"), ("high", "upper"))
+    }
+    return {name: Quantity(units, long_name), **ends}
+
 
 QUANTITIES: dict[str, Quantity] = {
     # coordinates of the plane and of the paths through it
@@ -145,6 +161,15 @@ QUANTITIES: dict[str, Quantity] = {
     "method": Quantity(None, "estimator"),
     "hurst": Quantity("1", "Hurst exponent"),
     "fractal_dimension": Quantity("1", "fractal dimension"),
+    "fractal_dimension_low": Quantity(
+        "1", "lower end of the 95 % confidence interval of the fractal dimension", _NO_INTERVAL
+    ),
+    "fractal_dimension_high": Quantity(
+        "1", "upper end of the 95 % confidence interval of the fractal dimension", _NO_INTERVAL
+    ),
+    "note": Quantity(None, "remarks on the estimate"),
+    "reason": Quantity(None, "why there is no interval, or no estimate"),
+    "window_rule": Quantity(None, "how the scales of the fit were chosen"),
     "fitted_hurst": Quantity("1", "Hurst exponent as fitted, not limited to 0 ... 1"),
     "misfit": Quantity("1", "goodness of fit: z of the change of the exponent with scale"),
     "standard_error": Quantity("1", "standard error of the Hurst exponent"),
@@ -233,8 +258,10 @@ QUANTITIES: dict[str, Quantity] = {
     "contact_modulus": Quantity("Pa", "contact modulus E* of the pair"),
     "poisson": Quantity("1", "Poisson's ratio of the bodies"),
     "friction_coefficient": Quantity("1", "coefficient of friction"),
-    "tangential_force": Quantity("N", "tangential force on the upper body, positive towards the azimuth"),
-    "tangential_displacement": Quantity("m", "elastic displacement of the upper body along the azimuth"),
+    "tangential_force": Quantity("N", "tangential force on the upper body, positive towards the direction"),
+    "tangential_displacement": Quantity("m", "elastic displacement of the upper body along the direction"),
+    "slip_method": Quantity("1", "method that solved the partial slip", _SLIP_METHOD),
+    "superposition_error": Quantity("1", "relative error of a tangential displacement by superposition"),
     "tangential_stiffness": Quantity("N m-1", "increment of tangential force over that of displacement"),
     "contact_stiffness": Quantity("Pa m-1", "derivative of the nominal pressure by the closure"),
     "relative_conductance": Quantity(
@@ -313,6 +340,11 @@ QUANTITIES: dict[str, Quantity] = {
     "roughness_coefficient_low": Quantity("1", "JRC below which 2.5 % of the single profiles lie"),
     "roughness_coefficient_high": Quantity("1", "JRC above which 2.5 % of the single profiles lie"),
     "scaled_roughness_coefficient": Quantity("1", "joint roughness coefficient JRC of the longer joint"),
+    "scaled_wall_strength": Quantity("Pa", "wall strength JCS of the longer joint"),
+    "size_ratio": Quantity("1", "ratio of the sizes of two joints"),
+    "strength_factor": Quantity("1", "factor of the shear strength"),
+    "friction_factor": Quantity("1", "factor of the friction coefficient"),
+    "fracture_energy_factor": Quantity("1", "factor of the fracture energy"),
     "scale_position": Quantity("1", "position of JRC on the scale of standard profiles", _SCALE_POSITION),
     "regression_interval": Quantity("m", "sampling interval to which the regression was fitted"),
     "area_fraction": Quantity("1", "share of the area that faces the shear"),
@@ -362,6 +394,9 @@ QUANTITIES: dict[str, Quantity] = {
     "transmissivity": Quantity("m3", "transmissivity: hydraulic aperture cubed over 12"),
     "percolates": Quantity("1", "an open path crosses the joint along the axis"),
     "open_fraction": Quantity("1", "open over nominal area"),
+    "narrow_fraction": Quantity(
+        "1", "area open by less than 0.001 of the mean opening, which counts as closed, over nominal area"
+    ),
     "overlap_fraction": Quantity("1", "area where the faces overlap over nominal area"),
     "flow_conductance": Quantity("m3 Pa-1 s-1", "flow per width and pressure gradient"),
     "relative_pressure": Quantity("1", "fluid pressure over its drop along the axis"),
@@ -380,6 +415,45 @@ QUANTITIES: dict[str, Quantity] = {
     "wet_fraction": Quantity("1", "area under water pressure over nominal area"),
     "isolated_fraction": Quantity("1", "open area that no water reaches over nominal area"),
     # domains
+    "exponent": Quantity("1", "exponent s of the content"),
+    "hausdorff_content": Quantity(None, "Hausdorff content in m^s, by dyadic squares; mean over the shifts"),
+    "hausdorff_content_min": Quantity(None, "Hausdorff content in m^s, least over the shifts"),
+    "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
+    "coarsest_side": Quantity("m", "side of the largest square of the cover"),
+    "stationary_exponent": Quantity("1", "exponent at which the content does not depend on the resolution"),
+    "scale": Quantity("m", "side of the square"),
+    "side": Quantity("m", "side of the square"),
+    "window_low": Quantity("m", "shortest side of a square in the window"),
+    "window_high": Quantity("m", "longest side of a square in the window"),
+    **_with_ends("spot_size", "m", "4 coverage over perimeter per area, the diameter of discs", "spot size"),
+    **_with_ends("gap_size", "m", "square that meets the set at half of its positions", "gap size"),
+    **_with_ends("gap_size_ratio", "1", "gap size over that of the state before"),
+    "pair_correlation_length": Quantity("m", "distance up to which the pair correlation exceeds 2"),
+    **_with_ends("domain_dimension", "1", "box dimension of the domain over the window"),
+    **_with_ends("domain_dimension_change", "1", "box dimension less that of the state before"),
+    "local_dimension_min": Quantity("1", "least local box dimension in the window"),
+    "local_dimension_max": Quantity("1", "greatest local box dimension in the window"),
+    "spots_dimension": Quantity("1", "box dimension of random spots of equal area, widths and number"),
+    **_with_ends("excess_dimension", "1", "box dimension less that of random spots"),
+    **_with_ends("excess_dimension_change", "1", "excess dimension less that of the state before"),
+    **_with_ends(
+        "clustering", "1", "squares that meet random spots over those that meet the set", "clustering"
+    ),
+    **_with_ends("clustering_ratio", "1", "clustering over that of the state before"),
+    **_with_ends(
+        "integral_range", "m2", "integral range: area of an independent patch of the set", "integral range"
+    ),
+    **_with_ends("integral_range_ratio", "1", "integral range over that of the state before"),
+    **_with_ends(
+        "lacunarity_ratio",
+        "1",
+        "lacunarity less 1 of boxes along x over that of boxes along y",
+        "lacunarity ratio",
+    ),
+    "hit_fraction": Quantity("1", "share of positions at which the square meets the set"),
+    "spots_fraction": Quantity("1", "share of positions at which the square meets random spots"),
+    "median_cells": Quantity("1", "number of cells of the median island"),
+    "signature_flag": Quantity("1", "whether the state has a dimension", _SIGNATURE),
     "box_size": Quantity("1", "edge of the box in cells"),
     "box_length": Quantity("m", "edge of the box"),
     "box_count": Quantity("1", "number of boxes that meet the set"),
@@ -397,6 +471,7 @@ QUANTITIES: dict[str, Quantity] = {
     "null_count": Quantity("1", "expected number of boxes that meet the random null"),
     "differs_from_random": Quantity("1", "the set differs from the random null of equal coverage"),
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
+    "is_saturated": Quantity("1", "more than half of the largest boxes meet the islands of the set"),
     "follows_power_law": Quantity("1", "the local slopes of the window agree with one power law"),
     "minkowski_dimension": Quantity("1", "Minkowski dimension of the set"),
     "minkowski_dimension_low": Quantity(
@@ -418,14 +493,9 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "mean_mass": Quantity("1", "mean number of cells of the set in a square around one of them"),
     "null_mass": Quantity("1", "mean number of cells of the random null in a square around one of them"),
-    "lacunarity": Quantity("1", "gliding-box lacunarity"),
+    **_with_ends("lacunarity", "1", "gliding-box lacunarity"),
     "null_lacunarity": Quantity("1", "lacunarity of the random null of equal coverage"),
-    "relative_lacunarity": Quantity("1", "lacunarity over that of the random null of equal coverage"),
     "normalised_lacunarity": Quantity("1", "lacunarity minus 1 over that of single cells minus 1"),
-    "lacunarity_slope": Quantity("1", "slope of ln lacunarity over ln box size"),
-    "lacunarity_area": Quantity("1", "integral of ln lacunarity over ln box size"),
-    "null_lacunarity_slope": Quantity("1", "slope of ln lacunarity over ln box size of the random null"),
-    "null_lacunarity_area": Quantity("1", "integral of ln lacunarity over ln box size of the random null"),
     "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension", _NO_INTERVAL),
     "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension", _NO_INTERVAL),
     "boundary_dimension_low": Quantity(
@@ -456,6 +526,10 @@ QUANTITIES: dict[str, Quantity] = {
     "length": Quantity("m", "length of the island"),
     "cells": Quantity("1", "number of cells of the island"),
     "perimeter": Quantity("m", "perimeter of the island"),
+    "orientation": Quantity("degree", "angle from y to the long axis of the island", _NO_CENTRE),
+    "eccentricity": Quantity("1", "eccentricity of the ellipse of equal second moments", _NO_CENTRE),
+    "gyration_radius": Quantity("m", "rms distance of the cells of the island from its centroid", _NO_CENTRE),
+    "solidity": Quantity("1", "cells of the island over those of its convex hull", _NO_CENTRE),
     "centroid_x": Quantity("m", "centroid along x", _NO_CENTRE),
     "centroid_y": Quantity("m", "centroid along y", _NO_CENTRE),
     "x_min": Quantity("m", "western edge of the island"),
@@ -473,7 +547,11 @@ QUANTITIES: dict[str, Quantity] = {
     "deaths": Quantity("1", "islands of the step before that overlap no island"),
     "merges": Quantity("1", "islands that overlap several of the step before"),
     "splits": Quantity("1", "islands of the step before that overlap several"),
+    "absorbed": Quantity("1", "islands of the step before that merges joined to others"),
+    "fragments": Quantity("1", "islands that splits added"),
     "overlap": Quantity("1", "common over united area of successive sets"),
+    "chance_overlap": Quantity("1", "expected overlap of successive sets placed at random"),
+    "overlap_beyond_chance": Quantity("1", "overlap beyond that by chance, over the largest possible"),
     "hausdorff_distance": Quantity("m", "Hausdorff distance between successive sets"),
     "return_step": Quantity("1", "step with the same load on the opposite branch of the path"),
     "hysteresis": Quantity("1", "share of the united area of two sets at the same load that is in only one"),
@@ -497,12 +575,7 @@ QUANTITIES: dict[str, Quantity] = {
     "parameter_name": Quantity(None, "meaning of the parameter"),
     "error_meaning": Quantity(None, "meaning of the error"),
     "truth": Quantity(None, "what the error is measured against"),
-    "on_pareto_front": Quantity("1", "no other method of the benchmark is clearly better in error and time"),
-    "share_on_pareto_front": Quantity("1", "share of the settings on the Pareto front"),
-    "verdict": Quantity(None, "Pareto optimal, dominated, undecided, or alone in its benchmark"),
-    "run_time_scatter": Quantity(
-        "1", "standard deviation of the logarithm of a run time between two timings"
-    ),
+    "on_pareto_front": Quantity("1", "no setting of another method is better in both error and time"),
     "result": Quantity("1", "number of the result"),
     "case": Quantity(None, "extreme case"),
     "quantity": Quantity(None, "subpackage, function and quantity"),
@@ -536,6 +609,12 @@ T = TypeVar("T", xr.Dataset, xr.DataArray)
 NOTES = ("long_name", "comment", "reason")
 
 
+def in_cells(name: str) -> dict[str, str]:
+    """Return the attributes of a length or an area that is counted in cells; none of other quantities."""
+    quantity = QUANTITIES.get(name)
+    return {"units": "1", "comment": "in cells"} if quantity and quantity.units in ("m", "m2") else {}
+
+
 def label(data: T, *, keep_notes: bool = False) -> T:
     """Return `data` with the labels of this table; of other attributes only the period of an axis is kept.
 
@@ -559,20 +638,18 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     KeyError
         A name is not in the table.
     """
-    if isinstance(data, xr.Dataset):
-        variables = {name: variable.copy(deep=False) for name, variable in data.variables.items()}
-        data = with_variables(data, variables)
-    else:
-        data = data.copy(deep=False)
+    data = data.copy(deep=False)
     coordinates = data.coords.variables  # not DataArrays, which take 30 microseconds each to make
     for name, coordinate in coordinates.items():
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
             _label_own(str(name), coordinate)
         else:
-            reason = coordinate.attrs.get("reason") if keep_notes else None
+            given = coordinate.attrs
             _label_variable(str(name), coordinate, is_coordinate=True)
-            if reason is not None:
-                coordinate.attrs["reason"] = reason
+            if keep_notes and "reason" in given:
+                coordinate.attrs["reason"] = given["reason"]
+            if keep_notes and given.get("comment") == "in cells":
+                coordinate.attrs.update(in_cells(str(name)))
     if not hasattr(data, "data_vars"):
         _label_variable(str(data.name), data.variable, is_coordinate=False)
         return data
@@ -585,6 +662,8 @@ def label(data: T, *, keep_notes: bool = False) -> T:
             notes = {key: given[key] for key in NOTES if keep_notes and key in given}
             if given.get("units") in QUANTITIES[str(name)].other_units:
                 notes["units"] = given["units"]
+            if keep_notes and given.get("units") == "1":
+                notes |= in_cells(str(name)) | notes
             variable.attrs.update(notes)
     return data
 

@@ -221,25 +221,43 @@ def _square(waves: Sequence[Array]) -> Array:
     return np.asarray(waves[0][:, None] ** 2 + waves[1] ** 2)
 
 
-def aliased_power_law(waves: tuple[Array, Array], hurst: float, images: int = 5) -> Array:
+def aliased_power_law(
+    waves: tuple[Array, Array], hurst: float, images: int = 5, spacing: tuple[float, float] = (1.0, 1.0)
+) -> Array:
     """Return the spectral density of a sampled fractional Brownian surface, up to a factor.
 
-    It is the sum of |w + 2 pi k|^(-2 - 2 hurst) over all integer vectors k, the aliases of w on a square
-    grid; those beyond `images` along either axis are summed as an integral.
+    It is the sum of |w + 2 pi k / spacing|^(-2 - 2 hurst) over all integer vectors k, the aliases of w;
+    those beyond `images` along either axis are summed as an integral.
 
     Parameters
     ----------
     waves : (w_y, w_x)
-        Wavenumbers in rad per cell that broadcast against each other; not both zero.
+        Wavenumbers in rad per unit length that broadcast against each other; not both zero.
     hurst : float
         Above 0.
+    images : int
+    spacing : (dy, dx)
     """
-    offsets = 2.0 * np.pi * np.arange(-images, images + 1)
+    step_y, step_x = (2.0 * np.pi / length for length in spacing)
+    offsets = np.arange(-images, images + 1)
     total: Array = np.zeros(1)
-    for dy in offsets:
-        for dx in offsets:
+    for dy in step_y * offsets:
+        for dx in step_x * offsets:
             total = total + ((waves[0] + dy) ** 2 + (waves[1] + dx) ** 2) ** (-1.0 - hurst)
     angle = (np.arange(2000) + 0.5) / 2000 * np.pi
-    radius = (2 * images + 1) * np.pi / np.maximum(np.abs(np.sin(angle)), np.abs(np.cos(angle)))
-    tail = np.mean(radius ** (-2.0 * hurst)) / (2.0 * hurst) / (2.0 * np.pi)
+    sides = np.maximum(np.abs(np.sin(angle)) / step_y, np.abs(np.cos(angle)) / step_x)
+    radius = (images + 0.5) / sides
+    tail = np.mean(radius ** (-2.0 * hurst)) / (2.0 * hurst) * (2.0 * np.pi) / (step_y * step_x)
     return np.asarray(total + tail)
+
+
+def aliased_line_power_law(waves: Array, hurst: float) -> Array:
+    """Return the spectral density of a sampled fractional Brownian profile, up to a factor.
+
+    The sum of |w + 2 pi k|^(-1 - 2 hurst) over all integers k is one of Hurwitz zeta functions; `waves` are
+    in rad per cell, from 0, where it is infinite, to pi.
+    """
+    from scipy.special import zeta
+
+    p, share = 1.0 + 2.0 * hurst, np.asarray(waves) / (2.0 * np.pi)
+    return np.asarray((zeta(p, share) + zeta(p, 1.0 - share)) * (2.0 * np.pi) ** -p)

@@ -21,6 +21,8 @@ from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.validation import Problems, float_array
 
 SURFACE, SPACING = "surface", "spacing"
+MASK, VALID = "mask", "valid"
+MASK_DIMS = ("step", "y", "x")  # of a plain array; of one row of cells (x,)
 WIDE = 20.0  # m: a surface without units that is wider may be in millimetres
 
 
@@ -37,6 +39,17 @@ def with_surface(
         That of the function; nothing is done where it has no argument `surface`, or it has a `spacing`.
     """
     names = signature.parameters
+    if MASK in names:
+        arguments = (
+            tuple(
+                labelled_mask(value) if name in (MASK, VALID) else value
+                for name, value in zip(names, arguments, strict=False)
+            )
+            + arguments[len(names) :]
+        )
+        options = {
+            word: labelled_mask(value) if word in (MASK, VALID) else value for word, value in options.items()
+        }
     if SURFACE not in names or SPACING in names:
         return arguments, dict(options), ""
     place, words = list(names).index(SURFACE), dict(options)
@@ -49,6 +62,14 @@ def with_surface(
         else:
             words[SURFACE] = surface
     return arguments, words, ", ".join(notes)
+
+
+def labelled_mask(value: Any) -> Any:
+    """Return a plain array of True and False as a mask without coordinates; other values as they are."""
+    if not isinstance(value, np.ndarray) or value.dtype.kind != "b" or value.ndim == 0:
+        return value
+    outer = tuple(f"dim_{k}" for k in range(value.ndim - len(MASK_DIMS)))
+    return xr.DataArray(value, dims=outer + MASK_DIMS[max(len(MASK_DIMS) - value.ndim, 0) :])
 
 
 def usual_form(where: str, value: Any, spacing: Any = None) -> tuple[Any, list[str]]:

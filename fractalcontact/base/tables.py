@@ -24,11 +24,11 @@ def screen_width() -> int:
     return shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
 
 
-def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
+def table(rows: Sequence[Sequence[str]], width: int | None = None, *, rule: bool = True) -> str:
     """Return rows of text as aligned columns; the first row is the head.
 
     Where the table would be wider than `width` (by default the screen), its widest cells take several lines;
-    a number keeps its unit.
+    a number keeps its unit. Without `rule` there is no line below the head.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def table(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
     text = tabulate(
         body,
         headers=head,
-        tablefmt="simple",
+        tablefmt="simple" if rule else "plain",
         disable_numparse=True,
         maxcolwidths=widths if body else None,
         maxheadercolwidths=[max(size - GAP, 1) for size in widths] if body else None,  # heads are padded

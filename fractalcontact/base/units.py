@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,45 +39,8 @@ class Scale:
         return f"{number(shown, digits)} {self.unit}".rstrip() if np.isfinite(shown) else "-"
 
 
-_recorded: list[list[tuple[str, Scale]]] = []
-_replayed: list[Iterator[tuple[str, Scale]]] = []
-
-
 def scale_for(units: str, values: Any) -> Scale:
     """Return the scale for values in `units`; prefixes only for the units in `PREFIXED`."""
-    for entries in _replayed:
-        same = next((scale for name, scale in entries if name == units), None)
-        if same is not None:
-            return same
-    scale = _scale_for(units, values)
-    for record in _recorded:
-        record.append((units, scale))
-    return scale
-
-
-@contextmanager
-def recorded_scales() -> Iterator[list[tuple[str, Scale]]]:
-    """Within this context note every scale in the order in which it was chosen."""
-    record: list[tuple[str, Scale]] = []
-    _recorded.append(record)
-    try:
-        yield record
-    finally:
-        _recorded.remove(record)
-
-
-@contextmanager
-def replayed_scales(record: list[tuple[str, Scale]]) -> Iterator[None]:
-    """Within this context the same calls as those of a record get its scales, whatever the values."""
-    entries = iter(record)
-    _replayed.append(entries)
-    try:
-        yield
-    finally:
-        _replayed.remove(entries)
-
-
-def _scale_for(units: str, values: Any) -> Scale:
     if units in ("", "1"):
         return Scale(1.0, "")
     if units == "degree":
@@ -134,7 +95,7 @@ def quantity_text(value: Any, units: str, digits: int = 3) -> str:
     >>> quantity_text(1e6, "Pa"), quantity_text(-2.4e-5, "m"), quantity_text(999.9, "N")
     ('1 MPa', '-24 µm', '1 kN')
     """
-    return _scale_for(units, value).text(value, digits)
+    return scale_for(units, value).text(value, digits)
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -4,8 +4,8 @@
 
 `press` presses a rigid flat down on a surface and returns a Dataset over the steps of a load path; both
 elastic bodies are in the contact modulus E*, see `effective_modulus`. `flat_stiffness` is the force per
-closure of a block with perfectly mating surfaces. `ContactOptions` and `LoadPath` hold the options of the
-solver and the load path, for functions that press many surfaces.
+closure of a block with perfectly mating surfaces. `partial_slip` shears a pressed surface below sliding.
+Under them lies `solver`, on plain arrays, which the joints call.
 """
 
 import lazy_loader

@@ -16,8 +16,8 @@ from fractalcontact.contact._scaled_problem import sum_by_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MAX_NEWTON_STEPS = 200
-MAX_FORCE_CORRECTIONS = 50
+MAX_NEWTON_STEPS = 200  # far more than the pieces that a bracketed Newton step passes; it ends at rounding
+MAX_FORCE_CORRECTIONS = 50  # each clips more nodes to p_max; without success the lowest nodes bear the force
 
 
 def project_onto_capped_simplex(q: Array, force: float, p_max: float) -> Array:

@@ -18,7 +18,15 @@ from fractalcontact.base.jit import kernel, sum_kernel
 
 @kernel
 def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ignore[no-untyped-def]
-    """Mean of 1/(pi r) over a cell of edges (dy, dx), for every offset (i dy, j dx) in `table`."""
+    """Mean of 1/(pi r) over a cell of edges (dy, dx), for every offset (i dy, j dx) in `table`.
+
+    The closed form (Love 1929) is a difference of four corners, which loses the square of the distance in
+    digits. It serves the 3 x 3 nearest cells. Cells up to 4 away take the closed form along one edge and
+    Gauss quadrature along the other, farther cells quadrature along both, of lower order with the distance.
+    Against 40 points along one edge and the closed form along the other, for dx = dy and 2 dy, the relative
+    differences were 2e-15, 7e-16 and, beyond 4, 10, 30 and 100 cells, 1e-15, 3e-15, 8e-15 and 1e-14, where
+    the reference is a difference of two near numbers itself.
+    """
     nx = table.shape[1]
     largest = max(dy, dx)
     for i in range(start, stop):

@@ -245,10 +245,10 @@ def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) ->
 
 @lru_cache(maxsize=32)
 def wavenumber_weights(
-    shape: tuple[int, int], spacing: tuple[float, float], factor: float, invert: bool, mean: float, kind: str
+    shape: tuple[int, int], spacing: tuple[float, float], factor: float, invert: bool, mean: float, char: str
 ) -> Array:
     """Return factor |q| or factor / |q| (`mean` for the mean), each twice: for real and imaginary part."""
-    dtype = np.dtype(kind).type
+    dtype = np.dtype(char).type
     qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(shape, spacing))
     q = np.sqrt(qy2[:, None] + qx2[None, :])
     q[0, 0] = 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -62,13 +62,6 @@ class ContactOptions:
         Bound on the scale-free residual of each step, between 0 and 1.
     method : {"fast", "elimination"}
         Constrained conjugate gradients, or the dense active set method.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> options = fc.contact.ContactOptions(influence="square", tolerance=1e-6)
-    >>> options.keywords()["influence"]
-    'square'
     """
 
     boundary: str | None = None
@@ -96,10 +89,6 @@ class ContactOptions:
             value = getattr(self, name)
             if value is not None and not isinstance(value, str):
                 object.__setattr__(self, name, float(value))
-
-    def keywords(self) -> dict[str, Any]:
-        """Return the options as keyword arguments of `press`."""
-        return asdict(self)
 
     def references(self, grid: Grid) -> str:
         """Return the sources of the methods used on this grid."""
@@ -186,12 +175,6 @@ class LoadPath:
         The imposed quantity.
     values : float or sequence of float
         Its value at each step, not negative: m, N or Pa. The load may go up and down.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> fc.contact.LoadPath.from_keywords(normal_force=[1.0, 2.0])
-    LoadPath(control='normal_force', values=(1.0, 2.0))
     """
 
     control: str
@@ -210,10 +193,6 @@ class LoadPath:
         with Problems("fractalcontact.contact.LoadPath") as problems:
             problems.exactly_one(**loads)
         return cls(*given_option(**loads))
-
-    def keywords(self) -> dict[str, Any]:
-        """Return the path as a keyword argument of `press`."""
-        return {self.control: self.values}
 
     def solver_values(self, nominal_area: float) -> tuple[str, Array]:
         """Return the control of the solver, "closure" (m) or "normal_force" (N), and its values."""
@@ -234,10 +213,11 @@ def check_scale(
     grid: Grid,
     height_range: float,
     contact_modulus: float,
-    hardness: float | None,
+    options: ContactOptions,
     load: LoadPath,
 ) -> bool:
     """Check that heights, modulus, hardness and load are in proportion, so that no product overflows."""
+    hardness = options.hardness
     control, values = load.solver_values(grid.nominal_area)
     spacing = (grid.spacing[0], grid.spacing[1])
     units = make_units(spacing, height_range, contact_modulus, control, float(values.max()))

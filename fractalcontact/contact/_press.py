@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
-from fractalcontact.base.grid import Grid, contact_edges, read_grid
+from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT, CONTACT_MAPS, OPEN, STEEP, STOP_REASONS, YIELDED
+from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
 from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
-from fractalcontact.contact._load_path import ScaledPath, Step, scaled_path, solve_path
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale, is_periodic
+from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -34,16 +31,13 @@ BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond
 BEYOND_SMALL_STRAINS = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
 SMALL_PLANE = 512 * 512  # nodes up to which surfaces are pressed side by side, each on one thread
 SIDE_BY_SIDE = 8  # surfaces for each thread between two steps of the progress bar
-ALSO = ("stiffness", "pressure_distribution")
-PRESSURE_CLASSES = 50  # of a distribution of pressures, from 0 to the greatest of the step
-PUNCH_TOLERANCE = 1e-2  # left an error of the stiffness below 1e-5 on rough surfaces of 256 x 256 nodes
+INCLUDE = ("stiffness", "pressure_distribution")
 NO_STIFFNESS = (
     "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
 )
 # bytes of a node: solver of a periodic and of a free body, steps before, indentation, gap with last solution
 PERIODIC_BYTES, FREE_BYTES, PATH_BYTES, YIELD_BYTES, RESULT_BYTES = 48.0, 156.0, 32.0, 48.0, 32.0
 PUNCH_BYTES = 72.0  # of a node: the solution that gives the stiffness, beside that of the step
-PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 
 
 def _check(
@@ -52,7 +46,7 @@ def _check(
     surface: Any,
     contact_modulus: Any,
     keep: Any,
-    also: Any,
+    include: Any,
     closure: Any,
     normal_force: Any,
     nominal_pressure: Any,
@@ -63,7 +57,7 @@ def _check(
     problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
-    problems.choices("also", also, ALSO)
+    problems.choices("include", include, INCLUDE)
     options = problems.construct(ContactOptions, **keywords)
     load = problems.construct(
         LoadPath.from_keywords,
@@ -79,7 +73,7 @@ def _check(
         return
     ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
     for height_range in {float(ranges.min()), float(ranges.max())}:
-        check_scale(problems, grid, height_range, float(contact_modulus), options.hardness, load)
+        check_scale(problems, grid, height_range, float(contact_modulus), options, load)
     options.check_load(load, grid.nominal_area, problems)
 
 
@@ -89,7 +83,7 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     steps = max(1, int(np.size(loads[0]))) if loads else 1
     solver = PERIODIC_BYTES if is_periodic(arguments.get("boundary"), plane.periodic) else FREE_BYTES
     solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
-    solver += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("also")) else 0.0
+    solver += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("include")) else 0.0
     maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
     if plane.planes == 1:
         return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
@@ -112,7 +106,7 @@ def press(
     tolerance: float = 1e-8,
     method: str = "fast",
     keep: Sequence[str] = ("state",),
-    also: str | Sequence[str] = (),
+    include: str | Sequence[str] = (),
     progress: bool = False,
 ) -> xr.Dataset:
     """Press a rigid flat down on a rough elastic surface, without friction or adhesion.
@@ -145,7 +139,7 @@ def press(
         Constrained conjugate gradients, or the dense active set of the 1998 paper for small surfaces.
     keep : any of "state", "pressure", "gap", "displacement", "residual_height"
         Maps (step, y, x) to return: flags open, contact, yielded; Pa; m; m; heights after unloading (m).
-    also : any of "stiffness", "pressure_distribution"
+    include : any of "stiffness", "pressure_distribution"
         Further results: stiffness and conductance, from one more solution a step; shares of the pressures.
     progress : bool
         Show a progress bar over the steps.
@@ -197,69 +191,49 @@ def press(
     )
     grid = read_grid(surface)
     heights = np.asarray(surface.values, dtype=np.float64)
-    names, further = word_tuple(keep), word_tuple(also)
+    names, further = word_tuple(keep), word_tuple(include)
 
-    def pressed(plane: Array, progress: bool) -> PressedPlane:
-        path = scaled_path(plane, grid, float(contact_modulus), options, load)
-        return _press_plane(plane, grid, path, names, further, progress)
+    def pressed(plane: Array, progress: bool) -> Pressed:
+        return solve(
+            plane,
+            grid,
+            float(contact_modulus),
+            options,
+            load,
+            keep=names,
+            include=further,
+            progress=progress,
+        )
 
-    planes = _pressed_planes(heights.reshape(-1, *grid.shape), pressed, progress)
-    result = _dataset(surface, grid, planes)
+    stack = heights.reshape(-1, *grid.shape)
+    planes = _pressed_planes(stack, pressed, progress)
+    slopes = [rms_slope(plane, grid) for plane in stack]
+    result = _dataset(surface, grid, float(contact_modulus), load, planes, slopes)
     _add_reasons(result)
     _warn(result)
-    slope = max(plane.slope for plane in planes)
+    slope = max(slopes)
     if slope > STEEP:
         message = f"fractalcontact.contact.press: the surface has an rms slope of {slope:.2g}"
         warnings.warn(f"{message}; {BEYOND_SMALL_STRAINS}", SmallStrainWarning, stacklevel=3)
-    body = planes[0].path.body
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     result.attrs = {
         "references": options.references(grid),
-        "boundary": "periodic" if body.periodic else "free",
-        "influence": body.influence,
+        "boundary": "periodic" if options.is_periodic(grid) else "free",
+        "influence": options.influence_on(grid),
         "achieved_residual": float(np.fmax.reduce(result.variables["residual"].values, axis=None)),
     }
     return result
 
 
-@dataclass(frozen=True)
-class PressedPlane:
-    """One plane of heights under its load path: the scalars of each step, its maps, its rms slope."""
-
-    path: ScaledPath
-    scalars: list[dict[str, Any]]
-    maps: dict[str, list[Array]]
-    slope: float
-
-
-def _press_plane(
-    heights: Array,
-    grid: Grid,
-    path: ScaledPath,
-    names: Sequence[str],
-    further: Sequence[str],
-    progress: bool,
-) -> PressedPlane:
-    """Press one plane along its load path."""
-    more = Further(further, grid, path.units.modulus)
-    scalars: list[dict[str, Any]] = []
-    maps: dict[str, list[Array]] = {name: [] for name in names}
-    for step in track(solve_path(path), progress, "press", total=len(path.values)):
-        scalars.append(_scalars(step, grid, path.body.periodic) | more.of(step))
-        for name in names:
-            maps[name].append(np.asarray(MAPS[name](step, heights)))
-    return PressedPlane(path, scalars, maps, rms_slope(heights, grid))
-
-
 def _pressed_planes(
-    planes: Array, pressed: Callable[[Array, bool], PressedPlane], progress: bool
-) -> list[PressedPlane]:
+    planes: Array, pressed: Callable[[Array, bool], Pressed], progress: bool
+) -> list[Pressed]:
     """Press all planes: small ones side by side on a thread each, large ones one after the other."""
     if len(planes) == 1:
         return [pressed(planes[0], progress)]
     together = SIDE_BY_SIDE * thread_count() if planes[0].size <= SMALL_PLANE else 1
-    results: dict[int, PressedPlane] = {}
+    results: dict[int, Pressed] = {}
 
     def press_some(start: int, stop: int, first: int) -> None:
         with limit(1):
@@ -275,138 +249,40 @@ def _pressed_planes(
     return [results[number] for number in range(len(planes))]
 
 
-def rms_slope(heights: Array, grid: Grid) -> float:
-    """Return the root mean square gradient, from the differences of neighbours."""
-    square = 0.0
-    for axis, (spacing, wraps) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
-        steps = np.diff(
-            heights, axis=axis, append=heights.take([0], axis) if wraps else heights.take([], axis)
-        )
-        largest = float(np.abs(steps).max()) or 1.0  # heights of any unit: no square leaves the range
-        square += float(np.mean((steps / largest) ** 2)) * (largest / spacing) ** 2
-    return float(np.sqrt(square))
-
-
-def _state(step: Step) -> Array:
-    """Return the flags open, contact, yielded."""
-    state = np.where(step.contact, np.int8(CONTACT), np.int8(OPEN))
-    state[step.contact & step.yielded] = YIELDED
-    return state
-
-
-# each map of a step, from the step and the heights of the surface
-MAPS: dict[str, Callable[[Step, Array], Array]] = {
-    "state": lambda step, _: _state(step),
-    "pressure": lambda step, _: step.pressure,
-    "gap": lambda step, _: step.gap,
-    "displacement": lambda step, _: step.displacement,
-    "residual_height": lambda step, heights: heights - step.indentation,
-}
-
-
-def _scalars(step: Step, grid: Grid, periodic: bool) -> dict[str, Any]:
-    """Return the scalars of a step."""
-    contact = step.contact
-    cells = int(np.count_nonzero(contact))
-    edges = int(contact_edges(contact, (periodic, periodic)).sum())
-    return {
-        "closure": step.closure,
-        "normal_force": step.force,
-        "nominal_pressure": step.force / grid.nominal_area,
-        "contact_area": cells * grid.cell_area,
-        "contact_fraction": cells / contact.size,
-        "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
-        "mean_gap": step.mean_gap,
-        "elastic_energy": step.elastic_energy,
-        "plastic_work": step.plastic_work,
-        "iterations": step.solution.iterations,
-        "transforms": step.solution.transforms,
-        "residual": step.solution.residual,
-        "converged": step.solution.reason == "converged",
-        "stop_reason": STOP_REASONS[step.solution.reason],
-        "run_time": step.run_time,
-    }
-
-
-class Further:
-    """The results in `also`, step by step."""
-
-    def __init__(self, names: Sequence[str], grid: Grid, contact_modulus: float) -> None:
-        self.names, self.grid, self.modulus = names, grid, contact_modulus
-        self.latest: Step | None = None
-
-    def of(self, step: Step) -> dict[str, Any]:
-        """Return them for a step."""
-        found: dict[str, Any] = {}
-        if "stiffness" in self.names:
-            found["contact_stiffness"] = stiffness = self.stiffness(step)
-            found["relative_conductance"] = stiffness / self.modulus
-        if "pressure_distribution" in self.names:
-            found |= _pressure_distribution(step.pressure)
-        return found
-
-    def stiffness(self, step: Step) -> float:
-        """Return the derivative of the nominal pressure by the closure, Pa/m; NaN where it has no bound."""
-        before, self.latest = self.latest, step
-        if not step.force > 0:
-            return 0.0 if step.force == 0 else np.nan
-        guess = None
-        if before is not None:  # roughly the derivative of the pressure
-            change = np.abs(step.solution.pressure - before.solution.pressure)
-            guess = np.where(step.contact, change, 0.0)
-        punch = press_punch(step, guess, tolerance=PUNCH_TOLERANCE)
-        stiffness = np.inf if punch is None else stiffness_of(punch) / self.grid.nominal_area
-        return float(stiffness) if np.isfinite(stiffness) else np.nan
-
-
-def _pressure_distribution(pressure: Array) -> dict[str, Any]:
-    """Return the greatest pressure (Pa), and the shares of area and load in each class of pressures.
-
-    The area is that of the whole extent, the open part of which is in no class.
-    """
-    greatest = float(pressure.max())
-    if not greatest > 0:
-        none = np.full(PRESSURE_CLASSES, 0.0 if greatest == 0 else np.nan)
-        return {"maximum_pressure": greatest, "area_share": none, "load_share": none}
-    relative = pressure[pressure > 0] / greatest
-    number = np.minimum((relative * PRESSURE_CLASSES).astype(np.int64), PRESSURE_CLASSES - 1)
-    area = np.bincount(number, minlength=PRESSURE_CLASSES) / pressure.size
-    load = np.bincount(number, relative, minlength=PRESSURE_CLASSES)
-    return {"maximum_pressure": greatest, "area_share": area, "load_share": load / load.sum()}
-
-
-def _dataset(surface: xr.DataArray, grid: Grid, planes: Sequence[PressedPlane]) -> xr.Dataset:
-    """Return the Dataset over all planes and steps, made at once: to add a variable later takes 0.3 ms."""
-    leading, lengths, path = surface.dims[:-2], surface.shape[:-2], planes[0].path
-    columns: dict[str, Any] = {}
-    steps = [step for plane in planes for step in plane.scalars]
-    for name in steps[0]:
-        values = np.array([step[name] for step in steps])
-        dims = ("step", "pressure_class")[: values.ndim]
-        columns[name] = ((*leading, *dims), values.reshape(*lengths, len(path.values), *values.shape[1:]))
-    imposed = ("closure",) if path.control == "closure" else ("normal_force", "nominal_pressure")
-    columns |= {name: ("step", columns[name][1].reshape(-1, len(path.values))[0]) for name in imposed}
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, (*columns, "step")))
-    coords |= {name: columns.pop(name) for name in CONTROLS}
-    coords["step"] = np.arange(len(path.values))
-    if "area_share" in columns:
+def _dataset(
+    surface: xr.DataArray,
+    grid: Grid,
+    contact_modulus: float,
+    load: LoadPath,
+    planes: Sequence[Pressed],
+    slopes: Sequence[float],
+) -> xr.Dataset:
+    """Return the Dataset over all planes and steps."""
+    leading, lengths, steps = surface.dims[:-2], surface.shape[:-2], len(load.values)
+    variables: dict[str, Any] = {}
+    for name in planes[0].columns:
+        values = np.stack([plane.columns[name] for plane in planes])
+        dims = ("step", "pressure_class")[: values.ndim - 1]
+        variables[name] = ((*leading, *dims), values.reshape(*lengths, *values.shape[1:]))
+    imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
+    variables |= {name: ("step", planes[0].columns[name]) for name in imposed}
+    coords: dict[str, Any] = dict(leading_coords(surface, leading, (*variables, "step")))
+    coords |= {name: variables.pop(name) for name in CONTROLS}
+    coords[load.control] = ("step", np.array(load.values))  # as given, without rounding
+    coords["step"] = np.arange(steps)
+    if "area_share" in variables:
         coords["pressure_class"] = (np.arange(PRESSURE_CLASSES) + 0.5) / PRESSURE_CLASSES
-    variables: dict[str, Any] = dict(columns)
     variables["nominal_area"] = grid.nominal_area
-    variables["contact_modulus"] = path.units.modulus
-    variables["rms_slope"] = (leading, np.array([plane.slope for plane in planes]).reshape(lengths))
-    if not np.isfinite(path.hardness):
-        del variables["plastic_work"]
-    if path.body.influence == "disc":
-        variables["disc_radius"] = path.body.radius * path.units.length
+    variables["contact_modulus"] = contact_modulus
+    variables["rms_slope"] = (leading, np.array(slopes).reshape(lengths))
+    if planes[0].disc_radius is not None:
+        variables["disc_radius"] = planes[0].disc_radius
     for name in planes[0].maps:
-        every = [one for plane in planes for one in plane.maps[name]]
-        maps = every[0] if len(every) == 1 else np.stack(every)
-        shape = (*lengths, len(path.values), *grid.shape)
-        variables[name] = ((*leading, "step", "y", "x"), maps.reshape(shape))
+        maps = planes[0].maps[name] if len(planes) == 1 else np.stack([plane.maps[name] for plane in planes])
+        variables[name] = ((*leading, "step", "y", "x"), maps.reshape(*lengths, steps, *grid.shape))
     if planes[0].maps:
         coords |= {dim: surface.coords.variables[dim] for dim in ("y", "x")}
-    return make_dataset(variables, coords)
+    return xr.Dataset(variables, coords)
 
 
 def _add_reasons(result: xr.Dataset) -> None:

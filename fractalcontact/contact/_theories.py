@@ -16,7 +16,7 @@ from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.polynomial import detrended, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.contact._options import LoadPath, check_scale
+from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -33,8 +33,13 @@ LAW = (
     "asperities deform independently"
 )
 SMOOTH = 1e-3  # rms distance of a surface from a paraboloid, over its range: beyond, Hertz does not hold
+# curvature along a summit over that across it: the fit of a cylinder leaves 1e-16 of it, and the ratio of the
+# axes, found between 0 and 1 - 1e-12, holds up to 7e10
+CYLINDER = 1e-9
 ROUND = 1e-6  # squared eccentricity below which an ellipse is a circle to rounding
-PARABOLOID = "hertz holds on one smooth summit without periods, while the contact is inside the surface"
+PARABOLOID = (
+    "hertz holds on one smooth summit (no cylinder) without periods, while the contact is inside the surface"
+)
 NONE = "NaN where a theory gives none: bush_gibson_thomas gives the area only, and hertz no gap"
 REASONS = {
     "contact_fraction": f"NaN where a theory does not hold: {LAW}; {PARABOLOID}",
@@ -53,7 +58,8 @@ def _check(
     load = problems.construct(LoadPath.from_keywords, nominal_pressure=nominal_pressure)
     if surface_is_valid and modulus_is_valid and load is not None and not problems.messages:
         height_range = float(surface.values.max()) - float(surface.values.min())
-        check_scale(problems, read_grid(surface), height_range, float(contact_modulus), None, load)
+        elastic = ContactOptions()
+        check_scale(problems, read_grid(surface), height_range, float(contact_modulus), elastic, load)
 
 
 @public_result(
@@ -323,7 +329,7 @@ def _paraboloid(heights: Array, grid: Grid) -> tuple[float, float, float] | None
     _, slope_x, slope_y, xx, xy, yy = coefficients
     curvature = -np.array([[xx, 0.5 * xy], [0.5 * xy, yy]])
     least, most = np.linalg.eigvalsh(curvature)
-    if least <= 0:
+    if least <= CYLINDER * most:
         return None
     summit = 0.5 * np.linalg.solve(curvature, [slope_x, slope_y])
     reach = float(min(x.max() - abs(summit[0]), y.max() - abs(summit[1]))) * half

@@ -7,9 +7,7 @@ hurst_map         exponent in windows that move over the surface
 waves             single waves, such as marks of machining
 scaling           exponent by octave of wavelength, and the window that has one exponent
 spectrum          power spectral density, averaged over directions
-variogram         half the mean square increment against the lag
-madogram          half the mean absolute increment against the lag
-second_variogram  mean square second difference against the lag
+variogram         half the mean square increment against the lag; madogram, second differences
 roughness_length  rms height in windows against their edge
 variation         range of the heights over segments or squares against their length
 higuchi           length of profiles by increments against the lag

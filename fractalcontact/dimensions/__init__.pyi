@@ -4,16 +4,14 @@ from ._detrended_fluctuation import detrended_fluctuation as detrended_fluctuati
 from ._directions import directions as directions
 from ._divider import divider as divider
 from ._estimate import estimate as estimate
+from ._exponent_by_scale import scaling as scaling
 from ._height_lacunarity import height_lacunarity as height_lacunarity
 from ._higuchi import higuchi as higuchi
 from ._hurst_map import hurst_map as hurst_map
 from ._methods import methods as methods
-from ._octave_exponents import scaling as scaling
 from ._roughness_length import roughness_length as roughness_length
 from ._spectrum import spectrum as spectrum
 from ._variation import variation as variation
-from ._variogram import madogram as madogram
-from ._variogram import second_variogram as second_variogram
 from ._variogram import variogram as variogram
 from ._waves import waves as waves
 
@@ -27,11 +25,9 @@ __all__ = [
     "height_lacunarity",
     "higuchi",
     "hurst_map",
-    "madogram",
     "methods",
     "roughness_length",
     "scaling",
-    "second_variogram",
     "spectrum",
     "variation",
     "variogram",

@@ -9,10 +9,10 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._windows import edge_lengths, window_edges
+from fractalcontact.dimensions._surface_input import Scales, Surface, check_surface
+from fractalcontact.dimensions._windows import square_windows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -73,16 +73,14 @@ def covering(surface: xr.DataArray, *, vertical_scale: float = 1.0) -> xr.Datase
     >>> (fc.dimensions.covering(zigzag).covering_length[:2] / 65.0).round(3).values
     array([1.414, 1.   ])
     """
-    surfaces = read_surfaces(surface)
-    curves = [covering_curve(single, float(vertical_scale)) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
-    name = _NAMES[surfaces[0].axes]
-    return curve_dataset(surface, surfaces, "cube_size", curves, slopes, value=name)
+    factor = float(vertical_scale)
+    name = _NAMES[2 if "y" in surface.dims else 1]
+    return curve_dataset(surface, lambda single: covering_curve(single, None, factor), "cube_size", name)
 
 
-def covering_curve(surface: Surface, vertical_scale: float = 1.0) -> Curve:
+def covering_curve(surface: Surface, window: Scales = None, vertical_scale: float = 1.0) -> Curve:
     """Return the area of one triangulated surface."""
-    edges = window_edges(surface.shape, surface.spacing)
+    edges, lengths = square_windows(surface, window)
     longest = max(surface.spacing)
     # only slopes matter, and they are formed in scaled lengths
     spacing = (surface.spacing[0] / longest, surface.spacing[1] / longest)
@@ -90,7 +88,7 @@ def covering_curve(surface: Surface, vertical_scale: float = 1.0) -> Curve:
     limited = min(factor, _STEEP)  # beyond it an area is proportional to the heights
     ratios = _area_ratios(surface.heights * limited, edges, spacing) * (factor / limited)
     areas = ratios * surface.grid.nominal_area
-    return Curve(edge_lengths(surface, edges), areas, np.ones(len(edges), dtype=np.int64), vertical_scale)
+    return Curve(lengths, areas, np.ones(len(edges), dtype=np.int64), vertical_scale)
 
 
 def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> Array:

@@ -9,10 +9,10 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
+from fractalcontact.dimensions._surface_input import Scales, Surface, check_surface
+from fractalcontact.dimensions._windows import running_range, square_windows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -80,17 +80,15 @@ def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range")
     >>> fc.dimensions.cube_counts(flat).cube_count.values
     array([1024.,  256.,   64.,   16.,    4.])
     """
-    surfaces = read_surfaces(surface)
-    scale = vertical_scale if isinstance(vertical_scale, str) else float(vertical_scale)
-    curves = [cube_count_curve(single, scale) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
-    return curve_dataset(surface, surfaces, "cube_size", curves, slopes, value="cube_count")
+    factor = vertical_scale if isinstance(vertical_scale, str) else float(vertical_scale)
+    return curve_dataset(
+        surface, lambda single: cube_count_curve(single, None, factor), "cube_size", "cube_count"
+    )
 
 
-def cube_count_curve(surface: Surface, vertical_scale: float | str = "range") -> Curve:
+def cube_count_curve(surface: Surface, window: Scales = None, vertical_scale: float | str = "range") -> Curve:
     """Return the mean number of cubes that meet one surface."""
-    edges = window_edges(surface.shape, surface.spacing)
-    lengths = edge_lengths(surface, edges)
+    edges, lengths = square_windows(surface, window)
     grid = surface.grid
     area = float(np.prod([(n - 1) * spacing for n, spacing in zip(grid.shape, grid.spacing, strict=True)]))
     heights = surface.heights

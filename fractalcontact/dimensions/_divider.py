@@ -8,27 +8,18 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._curve import Curve, curve_dataset, surface_check
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
-_SHARE = 0.125  # longest divider over the profile
-_MOST = 1e15  # steps that are counted
-
-
-def _check(problems: Problems, *, surface: Any) -> None:
-    reserved = ("divider_length", "divider", "pair_count", *ALWAYS)
-    check_surface(problems, surface, smallest=5, squares=True, reserved=reserved)
 
 
 @public_result(
     title="Divider lengths of a profile",
     references=METHODS["divider"].references,
     achieved_error="exact to rounding for straight lines between the points",
-    check=_check,
+    check=surface_check("divider_length", "divider", smallest=5),
 )
 def divider(surface: xr.DataArray) -> xr.Dataset:
     """Return the length of a profile measured with dividers against their opening (compass method).
@@ -68,24 +59,20 @@ def divider(surface: xr.DataArray) -> xr.Dataset:
     >>> fc.dimensions.divider(ramp).divider_length.values.round(9).tolist()
     [40.0, 40.0, 40.0]
     """
-    surfaces = read_surfaces(surface)
-    curves = [divider_curve(single) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
-    return curve_dataset(
-        surface, surfaces, "divider", curves, slopes, value="divider_length", count="pair_count"
-    )
+    return curve_dataset(surface, divider_curve, "divider", "divider_length", count="pair_count")
 
 
-def divider_curve(surface: Surface) -> Curve:
+def divider_curve(surface: Surface, window: Scales = None) -> Curve:
     """Return the mean length of the rows and columns of one surface."""
     from fractalcontact.dimensions._kernels import walk
 
     axes = [axis for axis in (0, 1) if surface.shape[axis] > 1]
     coarse = max(surface.spacing[axis] for axis in axes)
     shortest = min((surface.shape[axis] - 1) * surface.spacing[axis] for axis in axes)
-    number = max(2, int(np.log2(_SHARE * shortest / coarse) + 1e-9) + 1)
+    number = max(2, int(np.log2(shortest / 8.0 / coarse) + 1e-9) + 1)
     openings = coarse * 2.0 ** np.arange(number)
-    lengths, steps = np.zeros(number), np.zeros(number, dtype=np.int64)
+    openings = openings[between(openings, window)]
+    lengths, steps = np.zeros(openings.size), np.zeros(openings.size, dtype=np.int64)
     lines = 0
     for axis in axes:
         heights = np.moveaxis(surface.heights, axis, -1) * surface.unit
@@ -94,5 +81,5 @@ def divider_curve(surface: Surface) -> Curve:
         for k, opening in enumerate(openings):
             total, count = walk(heights, surface.spacing[axis], float(opening))
             lengths[k] += total
-            steps[k] += int(min(count, _MOST))
-    return Curve(openings, lengths / lines if lines else np.full(number, np.nan), steps)
+            steps[k] += int(min(count, 1e15))  # more cannot be counted in a number of 53 bits
+    return Curve(openings, lengths / lines if lines else np.full(openings.size, np.nan), steps)

@@ -1,316 +1,219 @@
-"""Fit of an exponent to the modes of an octave of wavelength, or of a run of octaves."""
+"""Hurst exponent octave by octave of wavelength, beside that of the whole surface."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from fractalcontact.dimensions import _blur_fit, _cosine_modes, _mode_blocks
-from fractalcontact.dimensions._blur_fit import CORRELATION
-from fractalcontact.dimensions._mode_blocks import HIGHEST, LOWEST, Frame, node_weights
-from fractalcontact.dimensions._records import NORMAL, Estimate
-from fractalcontact.dimensions._restored_power import restored_power
-from fractalcontact.dimensions._surface_input import Scales, Surface, between
-from fractalcontact.dimensions._transfer_functions import BEFORE, FILTER, TRANSFER, Window
+from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
+from fractalcontact.dimensions._likelihood import fitted_modes, likelihood
+from fractalcontact.dimensions._records import NORMAL
+from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD, tail
+from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_LEAST = 12  # modes of an octave
-_FIRST_GUESS = 0.5  # exponent of the modes beside gaps
-_STEPS, _LONGEST_STEP = 60, 0.5
-_LEAST_HURST = 0.02  # white noise has an exponent of 0 at the shortest waves, where it is aliased
-_FALSE_ALARM = 0.003  # probability that a run of one exponent is rejected
-_WITHOUT_ALIASES = 10.0  # decrease of the deviance from which a surface has no aliases
-_BLURS = (BEFORE, 0.05), (TRANSFER, 0.1), (FILTER, 0.15)  # forms of a blur, and where their fits start
-_RUN_WINDOW = "the longest run of octaves of wavelength that one exponent fits"
+_MOST_MISSING = 0.5  # share of the heights
+_LEAST_MODES, _LEAST_BINS = 12, 2  # of an octave
+_EXPONENTS = np.linspace(-2.0, 4.0, 1201)  # that are compared: between them chi square is a parabola
+_NAMES = (
+    "hurst",
+    "ci_low",
+    "ci_high",
+    "mode_count",
+    "in_window",
+    "wavelength",
+    "window_hurst",
+    "window_ci_low",
+    "window_ci_high",
+    "scale_min",
+    "scale_max",
+    "run_time",
+)
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """Mean squares of blocks of modes, and their expected power.
+def _check(problems: Problems, *, surface: Any) -> None:
+    is_valid = check_surface(problems, surface, smallest=16, squares=True, reserved=_NAMES)
+    if is_valid and not is_lazy(surface):
+        most = float(surface.isnull().mean([dim for dim in ("y", "x") if dim in surface.dims]).max())
+        problems.require(most <= _MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")
 
-    Attributes
+
+@public_result(
+    title="Hurst exponent against scale",
+    references="Whittle (1957), J. R. Stat. Soc. B 19",
+    check=_check,
+    memory=195.0,
+)
+def scaling(surface: xr.DataArray) -> xr.Dataset:
+    """Return the Hurst exponent of every octave of wavelength, beside that of the whole surface.
+
+    Parameters
     ----------
-    power, count, wavelength : ndarray, shape (blocks,)
-        The wavelength is in spacings of x.
-    frame : Frame, optional
-        Table of the expected power with free edges; None for a periodic surface, whose power law is exact.
-    axes : int
+    surface : DataArray
+        Heights in m, dims (..., y, x), or (..., x) for a profile, at least 16 points along each axis. NaN
+        marks missing points, at most half of them.
+
+    Returns
+    -------
+    Dataset over `wavelength` (m, the middle of an octave)
+        `hurst` of the waves of the octave, with its 95 % interval `ci_low`, `ci_high`, and `mode_count`.
+        The exponents are not limited: long waves of white noise have -1 (a profile -0.5), waves as short as
+        the blur of an instrument more than 1. NaN where an octave has fewer than 12 modes.
+        `window_hurst`, `window_ci_low`, `window_ci_high`, `scale_min` and `scale_max` (m) are the exponent of
+        `estimate` and the waves that its model describes, with blur and noise; `in_window` marks their
+        octaves. The attribute `reason` states why there is no interval.
+
+    Raises
+    ------
+    InvalidInput
+        More heights are missing, an axis is not uniform, or an axis has fewer than 16 points.
+
+    Notes
+    -----
+    Bins of modes and their expected power are those of `estimate`; the octaves count without blur and noise,
+    which they are there to show.
+
+    References
+    ----------
+    Whittle (1957), J. R. Stat. Soc. B 19.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    >>> result = fc.dimensions.scaling(surface)
+    >>> bool(result.in_window[:4].all()), round(float(result.window_hurst), 1)
+    (True, 0.7)
     """
+    surfaces = read_surfaces(surface)
+    first = surfaces[0]
+    octaves = _Octaves.of(first)
+    records = [_record(single, octaves) for single in surfaces]
+    leading = surface.dims[: surface.ndim - first.axes]
+    sizes = [surface.sizes[dim] for dim in leading]
 
-    power: Array
-    count: Array
-    wavelength: Array
-    frame: Frame | None
-    axes: int
+    def stacked(values: Sequence[Any], *dims: str) -> tuple[tuple[Any, ...], Array]:
+        array = np.asarray(values)
+        return (*leading, *dims), array.reshape((*sizes, *array.shape[1:]))
 
-    def logs(self, hurst: float) -> tuple[Array, Array]:
-        """Return the logarithm of the expected power, and its derivative by H.
-
-        Beyond the table the slope of the logarithm at its end is that of a power law.
-        """
-        slope = 2.0 * np.log(self.wavelength)
-        if self.frame is None:
-            return (0.5 * self.axes + hurst) * slope, slope
-        inside = float(np.clip(hurst, LOWEST, HIGHEST))
-        weights, slopes = node_weights(inside)
-        logs = weights @ self.frame.logs
-        if inside != hurst:
-            return logs + (hurst - inside) * slope, slope
-        return logs, slopes @ self.frame.logs
-
-
-@dataclass(frozen=True)
-class PowerLaw:
-    """Exponent of some blocks with its interval; the deviance is that at the best amplitude."""
-
-    hurst: float
-    low: float
-    high: float
-    modes: float
-    deviance: float
-
-
-@dataclass(frozen=True)
-class Octave:
-    """Blocks of one octave: wavelengths in spacings, a mask of the blocks, and their fit."""
-
-    low: float
-    high: float
-    inside: Array
-    fit: PowerLaw
-    blocks: Blocks
-
-
-@dataclass(frozen=True)
-class Run:
-    """Successive octaves `first` to `last` - 1 that one exponent fits; wavelengths in spacings."""
-
-    first: int
-    last: int
-    low: float
-    high: float
-    fit: PowerLaw
-
-
-def blocks_of(surface: Surface) -> Blocks:
-    """Return the blocks of a surface or a complete profile; a periodic surface with gaps counts as free."""
-    if all(surface.grid.periodic) and surface.is_complete:
-        power, count, wavelength = _periodic(surface)
-        return Blocks(power, count, wavelength, None, surface.axes)
-    if surface.axes == 1:
-        return free_blocks(surface.heights[0], (1.0,))
-    return free_blocks(surface.heights, surface.plane_spacing)
-
-
-def free_blocks(heights: Array, spacing: tuple[float, ...]) -> Blocks:
-    """Return the blocks of heights with free edges, (ny, nx), or (n,) without gaps."""
-    frame = _mode_blocks.frame(heights.shape, spacing)
-    if np.isnan(heights).any():
-        lattice = _cosine_modes.Lattice.of((heights.shape[0], heights.shape[1]), (spacing[0], spacing[1]))
-        power, share = restored_power(heights, lattice, _FIRST_GUESS)
-        frame = frame.weakened(share)
-        return frame_blocks(frame.mean(power), frame)
-    power = (
-        _cosine_modes.mode_power(heights) if heights.ndim == 2 else _mode_blocks.profile_modes(heights) ** 2
-    )
-    return frame_blocks(frame.mean(power), frame)
-
-
-def frame_blocks(means: Array, frame: Frame) -> Blocks:
-    """Return the blocks of a frame with the mean squares of their modes."""
-    return Blocks(means, frame.count, 2.0 * np.pi / np.sqrt(frame.squares), frame, frame.axes)
-
-
-def with_or_without_aliases(blocks: Blocks) -> Blocks:
-    """Return blocks without aliases where the two shortest octaves have one exponent only then.
-
-    So it is in crops of periodic surfaces, which have no waves beyond the sampling. A blur with aliases must
-    not explain those octaves better.
-    """
-    if blocks.frame is None:
-        return blocks
-    unaliased = frame_blocks(blocks.power, blocks.frame.unaliased)
-    shortest = octaves(unaliased)[:2]
-    if len(shortest) < 2:
-        return blocks
-    inside = shortest[0].inside | shortest[1].inside
-    fit = fit_power_law(unaliased, inside)
-    if fit.deviance > fit_power_law(blocks, inside).deviance - _WITHOUT_ALIASES or fit.hurst < _LEAST_HURST:
-        return blocks
-    window = Window(blocks.frame, inside, blocks.power)
-    blurred = min(
-        _blur_fit.fit(window, _blur_fit.Fit(form, 0.5, square)).penalised for form, square in _BLURS
-    )
-    is_likelier = fit.deviance + 2.0 < blurred  # one parameter beside the amplitude
-    return unaliased if is_likelier and has_one_exponent(shortest, fit) else blocks
-
-
-def window_of(blocks: Blocks, inside: Array) -> Run | None:
-    """Return the exponent of some blocks, of one or several octaves; None if no one fits them."""
-    run, fit = _octaves_within(blocks, inside), fit_power_law(blocks, inside)
-    if not run or not has_one_exponent(run, fit):
-        return None
-    wavelength = blocks.wavelength[inside]
-    return Run(0, len(run), float(wavelength.min()), float(wavelength.max()), fit)
-
-
-def exponents_within(surface: Surface, scales: Scales) -> tuple[float, float]:
-    """Return the range of the exponents of short and long waves of a window; (inf, -inf) if it has one.
-
-    They change at an edge of an octave.
-    """
-    from scipy.special import chdtrc
-
-    blocks = with_or_without_aliases(blocks_of(surface))
-    inside = between(blocks.wavelength * surface.spacing[1], scales)
-    edges = [octave.high for octave in _octaves_within(blocks, inside)[:-1]]
-    if not edges:
-        return np.inf, -np.inf
-    splits = [
-        [
-            fit_power_law(blocks, inside & part)
-            for part in (blocks.wavelength < edge, blocks.wavelength >= edge)
-        ]
-        for edge in edges
-    ]
-    best = min(splits, key=lambda pair: pair[0].deviance + pair[1].deviance)
-    gain = fit_power_law(blocks, inside).deviance - sum(fit.deviance for fit in best)
-    if len(splits) * chdtrc(2, max(gain / CORRELATION, 0.0)) > _FALSE_ALARM:
-        return np.inf, -np.inf
-    return min(fit.low for fit in best), max(fit.high for fit in best)
-
-
-def _octaves_within(blocks: Blocks, inside: Array) -> list[Octave]:
-    """Return the parts of the octaves in a window that have enough modes, each fitted alone."""
-    parts = [replace(octave, inside=octave.inside & inside) for octave in octaves(blocks)]
-    parts = [part for part in parts if blocks.count[part.inside].sum() >= _LEAST]
-    return [replace(part, fit=fit_power_law(blocks, part.inside)) for part in parts]
-
-
-def _periodic(surface: Surface) -> tuple[Array, Array, Array]:
-    """Return the mean power, the number of modes and the wavelength of every ring of a periodic surface."""
-    from fractalcontact.dimensions._periodic_modes import PeriodicModes
-
-    heights = surface.heights if surface.axes == 2 else surface.heights[0]
-    modes = PeriodicModes.of(heights, surface.relative_spacing)
-    ring = np.unique(np.rint(32.0 * np.log2(modes.wavenumber)), return_inverse=True)[1]
-    count = np.bincount(ring, modes.weights)
-    mean = np.bincount(ring, modes.weights * modes.power) / count
-    radius = np.exp(np.bincount(ring, modes.weights * np.log(modes.wavenumber)) / count)
-    unit = max(surface.grid.extent) / surface.spacing[1]
-    return mean, count, unit / radius
-
-
-def octaves(blocks: Blocks) -> list[Octave]:
-    """Fit every octave of wavelength, the shortest first; the longest holds all waves that are left."""
-    shortest = 2.0
-    result: list[Octave] = []
-    low = 0.0  # waves along a diagonal are shorter than two spacings
-    while blocks.count[blocks.wavelength >= low * (1 - 1e-9)].sum() >= _LEAST:
-        high = 2.0 * max(low, shortest)
-        if blocks.count[blocks.wavelength >= high * (1 - 1e-9)].sum() < _LEAST:
-            high = float(blocks.wavelength.max()) * (1 + 1e-6)
-        inside = (blocks.wavelength >= low * (1 - 1e-9)) & (blocks.wavelength < high * (1 - 1e-9))
-        if blocks.count[inside].sum() >= _LEAST:
-            bottom = float(blocks.wavelength[inside].min()) if low == 0.0 else low
-            result.append(Octave(bottom, high, inside, fit_power_law(blocks, inside), blocks))
-        low = high
+    data = {
+        name: stacked([[getattr(fit, field) for fit in record.fits] for record in records], "wavelength")
+        for name, field in (("hurst", "hurst"), ("ci_low", "low"), ("ci_high", "high"))
+    }
+    data["mode_count"] = stacked([record.modes for record in records], "wavelength")
+    data["in_window"] = stacked([record.in_window for record in records], "wavelength")
+    for name, field in (("window_hurst", "hurst"), ("window_ci_low", "low"), ("window_ci_high", "high")):
+        data[name] = stacked([getattr(record.window, field) for record in records])
+    for end, name in enumerate(("scale_min", "scale_max")):
+        data[name] = stacked([record.scales[end] for record in records])
+    coords = {**leading_coords(surface, leading, _NAMES), "wavelength": octaves.middle * first.spacing[1]}
+    result = xr.Dataset(data, coords=coords)
+    if reasons := dict.fromkeys(record.reason for record in records if record.reason):
+        for name in ("window_ci_low", "window_ci_high"):
+            result[name].attrs["reason"] = "; ".join(reasons)
     return result
 
 
-def fit_power_law(blocks: Blocks, inside: Array) -> PowerLaw:
-    """Fit exponent and amplitude to some blocks by scoring."""
-    part = Blocks(blocks.power[inside], blocks.count[inside], blocks.wavelength[inside], None, blocks.axes)
-    hurst, error, modes = 0.5, np.nan, float(part.count.sum())
-    for _ in range(_STEPS):
-        logs, slope = (values[inside] for values in blocks.logs(hurst))
-        ratio = np.log(np.maximum(part.power, 1e-300)) - logs
-        ratio = np.exp(ratio - ratio.max())
-        mean = float(np.sum(part.count * ratio) / modes)
-        slope = slope - np.average(slope, weights=part.count)
-        information = 0.5 * float(np.sum(part.count * slope * slope))
-        if not information > 0.0:
-            break
-        step = 0.5 * float(np.sum(part.count * slope * (ratio / mean - 1.0))) / information
-        error = float(np.sqrt(CORRELATION / information))
-        hurst += float(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
-        if abs(step) < 1e-6:
-            break
-    logs = blocks.logs(hurst)[0][inside]
-    top = np.log(np.maximum(part.power, 1e-300)) - logs
-    level = float(top.max() + np.log(np.sum(part.count * np.exp(top - top.max())) / modes))
-    deviance = float(np.sum(part.count * logs) + modes * level)
-    return PowerLaw(hurst, hurst - NORMAL * error, hurst + NORMAL * error, modes, deviance)
+@dataclass(frozen=True)
+class _PowerLaw:
+    """Exponent of some bins, and its 95 % interval."""
+
+    hurst: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
 
 
-def longest_run(record: Sequence[Octave]) -> Run:
-    """Return the longest run of octaves that one exponent of a fractal fits; of equal ones the surest."""
-    best, width = None, 0
-    for first in range(len(record)):
-        for last in range(first + 1, len(record) + 1):
-            run = record[first:last]
-            if len(run) < max(width, min(2, len(record))):
-                continue
-            fit = _joint_fit(run)
-            is_fractal = fit.hurst > _LEAST_HURST and fit.low < 1.0
-            if not is_fractal or not has_one_exponent(run, fit):
-                continue
-            if best is None or len(run) > width or fit.modes > best.fit.modes:
-                best, width = Run(first, last, run[0].low, run[-1].high, fit), len(run)
-    if best is None:
-        return Run(0, 0, np.nan, np.nan, PowerLaw(np.nan, np.nan, np.nan, 0.0, np.nan))
-    return best
+@dataclass(frozen=True)
+class _Octaves:
+    """Octaves of wavelength from two spacings on, the first with all shorter waves; lengths in x spacings."""
+
+    shortest: float
+    number: int
+
+    @classmethod
+    def of(cls, surface: Surface) -> _Octaves:
+        """Return the octaves of the modes of a surface."""
+        lattice = Lattice(surface.shape, surface.plane_spacing)
+        shortest = 2.0 * max(lattice.spacing)
+        return cls(shortest, int(math.log2(2.0 * lattice.longest / shortest)) + 1)
+
+    def index(self, lnq: Array) -> Array:
+        """Return the octave of waves with a logarithm of the wavenumber."""
+        octave = (math.log(2.0 * np.pi / self.shortest) - lnq) / math.log(2.0)
+        return np.clip(np.floor(octave + 1e-9), 0, self.number - 1).astype(np.int64)
+
+    @property
+    def middle(self) -> Array:
+        return np.asarray(self.shortest * 2.0 ** (np.arange(self.number) + 0.5))
 
 
-def has_one_exponent(run: Sequence[Octave], fit: PowerLaw) -> bool:
-    """Return whether the joint fit of some octaves is not rejected against their own exponents."""
-    from scipy.special import chdtrc
+@dataclass(frozen=True)
+class _Record:
+    """Exponents of the octaves of one surface, and of the whole."""
 
-    ratio = (fit.deviance - sum(octave.fit.deviance for octave in run)) / CORRELATION
-    return len(run) == 1 or bool(chdtrc(2 * (len(run) - 1), max(ratio, 0.0)) > _FALSE_ALARM)
+    fits: list[_PowerLaw]
+    modes: Array
+    window: _PowerLaw
+    in_window: Array
+    scales: tuple[float, float]
+    reason: str
 
 
-def is_smooth(record: Sequence[Octave]) -> bool:
-    """Return whether the shortest waves are weaker than those of any fractal."""
-    return record[0].fit.low > 1.0
+def _record(surface: Surface, octaves: _Octaves) -> _Record:
+    """Fit the octaves of one surface."""
+    none = np.zeros(octaves.number, dtype=np.int64)
+    undefined = [_PowerLaw()] * octaves.number
+    fit = None if surface.is_constant or surface.is_plane else fitted_modes(surface)
+    if fit is None or not fit.keep.any():
+        return _Record(undefined, none, _PowerLaw(), none > 0, (math.nan, math.nan), "")
+    bins = fit.bins()
+    owner, mode_owner = octaves.index(bins.lnq), octaves.index(np.log(fit.lattice.q[fit.keep]))
+    modes = np.bincount(mode_owner, minlength=octaves.number)
+    is_there = (modes >= _LEAST_MODES) & (np.bincount(owner, minlength=octaves.number) >= _LEAST_BINS)
+    logs = _log_power(bins, fit.form if fit.theta[SPREAD] == 0.0 else ALIASED)
+    fits = [_fitted(bins, logs, owner == k) if is_there[k] else _PowerLaw() for k in range(octaves.number)]
+    whole = likelihood(surface, None, None).limited()
+    lengths = octaves.middle * surface.spacing[1]
+    in_window = (lengths >= whole.scale_min / 2.0**0.5) & (lengths <= whole.scale_max * 2.0**0.5)
+    window = _PowerLaw(whole.hurst, whole.ci_low, whole.ci_high)
+    return _Record(fits, modes, window, in_window, (whole.scale_min, whole.scale_max), whole.reason)
 
 
-def interval_of_run(run: Run, record: Sequence[Octave]) -> tuple[float, float]:
-    """Return the interval of a run; beside other octaves it holds that of the run without its octave there.
+def _log_power(bins: Bins, form: int) -> Array:
+    """Return the logarithm of the expected power of the bins for each exponent, shape (exponents, bins).
 
-    A blur ends gradually: the octave next to it is bent by less than chance, and has the most modes.
+    Beyond those of fractals it is continued as a power law.
     """
-    low, high = run.fit.low, run.fit.high
-    shorter = record[run.first + 1 : run.last] if run.first > 0 else []
-    longer = record[run.first : run.last - 1] if run.last < len(record) else []
-    for part in (shorter, longer):
-        if part:
-            fit = _joint_fit(part)
-            low, high = min(low, fit.low), max(high, fit.high)
-    return low, high
+    logs = np.empty((_EXPONENTS.size, bins.level.size))
+    for row, hurst in zip(logs, _EXPONENTS, strict=True):
+        inside = min(max(float(hurst), LOWEST), HIGHEST)
+        weight = weights(inside, bins.t)
+        weight[-1] *= tail(inside, bins.t[-1], 0.0, form, bins.axes)
+        row[:] = np.log(bins.tables[form, 0] @ weight) - 2.0 * (hurst - inside) * bins.lnq
+    return logs
 
 
-def _joint_fit(run: Sequence[Octave]) -> PowerLaw:
-    """Fit one exponent to successive octaves."""
-    return fit_power_law(run[0].blocks, np.logical_or.reduce([octave.inside for octave in run]))
-
-
-def run_estimate(run: Run, surface: Surface) -> Estimate:
-    """Return the estimate of the window of scales that has one exponent."""
-    dx = surface.spacing[1]
-    low, high = run.low * dx, run.high * dx
-    return Estimate(
-        run.fit.hurst,
-        0.5 * (run.fit.high - run.fit.low) / NORMAL,
-        run.fit.low,
-        run.fit.high,
-        scale_min=low,
-        scale_max=high,
-        window=_RUN_WINDOW,
-        note=f"no single exponent holds at all scales: {run.fit.hurst:.2f} is that of waves from {low:.3g} "
-        f"to {high:.3g} m, the longest run of octaves that one exponent fits (see `scaling`)",
-    )
+def _fitted(bins: Bins, logs: Array, chosen: Array) -> _PowerLaw:
+    """Return the exponent of some bins: chi square of each exponent, at its best amplitude."""
+    weight = 1.0 / bins.variance[chosen]
+    residual = bins.level[chosen] - logs[:, chosen]
+    residual -= (residual @ weight / weight.sum())[:, None]
+    chi_square = np.square(residual) @ weight
+    k = int(np.clip(np.argmin(chi_square), 1, _EXPONENTS.size - 2))
+    step = _EXPONENTS[1] - _EXPONENTS[0]
+    before, here, after = chi_square[k - 1 : k + 2]
+    shift = 0.5 * (before - after) / max(before - 2.0 * here + after, 1e-300)
+    limit = here + NORMAL**2
+    low = float(np.interp(-limit, -chi_square[: k + 1], _EXPONENTS[: k + 1]))
+    high = float(np.interp(limit, chi_square[k:], _EXPONENTS[k:]))
+    hurst = float(_EXPONENTS[k] + step * np.clip(shift, -1.0, 1.0))
+    return _PowerLaw(hurst, low, high)

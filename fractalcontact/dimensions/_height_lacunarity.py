@@ -9,9 +9,9 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset, window_slope
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
+from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset
+from fractalcontact.dimensions._surface_input import Surface, check_surface
+from fractalcontact.dimensions._windows import running_range, square_windows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -69,18 +69,18 @@ def height_lacunarity(surface: xr.DataArray, *, mass: str = "range") -> xr.Datas
     >>> fc.dimensions.height_lacunarity(ramp).lacunarity.values.tolist()
     [1.0, 1.0]
     """
-    surfaces = read_surfaces(surface)
-    curves = [lacunarity_curve(single, mass) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
     return curve_dataset(
-        surface, surfaces, "window_size", curves, slopes, value="lacunarity", count="pair_count"
+        surface,
+        lambda single: lacunarity_curve(single, mass),
+        "window_size",
+        "lacunarity",
+        count="pair_count",
     )
 
 
 def lacunarity_curve(surface: Surface, mass: str) -> Curve:
     """Return the lacunarity of one surface; the edges of windows are in points."""
-    smallest = 2.0 if mass == "range" else 1.0
-    edges = window_edges(surface.shape, surface.spacing, smallest=smallest, share=0.5)
+    edges, lengths = square_windows(surface, smallest=(2.0 if mass == "range" else 1.0,))
     values, counts = np.full(len(edges), np.nan), np.zeros(len(edges), dtype=np.int64)
     for k, (ey, ex) in enumerate(edges):
         size = (max(int(ey), 1), int(ex))
@@ -91,7 +91,7 @@ def lacunarity_curve(surface: Surface, mass: str) -> Curve:
         if mean > 0.0:
             ratio = masses / mean
             values[k] = float(np.mean(ratio * ratio))
-    return Curve(edge_lengths(surface, edges), values, counts)
+    return Curve(lengths, values, counts)
 
 
 def _sums(heights: Array, size_y: int, size_x: int) -> Array:

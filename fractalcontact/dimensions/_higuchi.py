@@ -8,27 +8,18 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._curve import EXACT_MEAN, Curve, curve_dataset, no_profile, surface_check
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
-_PER_OCTAVE = 2  # lags in an octave
-_SHARE = 0.25  # longest lag over the profile
-
-
-def _check(problems: Problems, *, surface: Any) -> None:
-    reserved = ("higuchi_length", "lag", "pair_count", *ALWAYS)
-    check_surface(problems, surface, smallest=5, squares=True, reserved=reserved)
 
 
 @public_result(
     title="Higuchi lengths of a profile",
     references=METHODS["higuchi"].references,
     achieved_error=EXACT_MEAN,
-    check=_check,
+    check=surface_check("higuchi_length", "lag", smallest=5),
 )
 def higuchi(surface: xr.DataArray) -> xr.Dataset:
     """Return the length of a profile by Higuchi's method against the lag.
@@ -63,18 +54,18 @@ def higuchi(surface: xr.DataArray) -> xr.Dataset:
     >>> curve.higuchi_length.values[:3].tolist(), round(float(curve.local_slope[1]), 6)
     ([16.0, 8.0, 5.333333333333333], -1.0)
     """
-    surfaces = read_surfaces(surface)
-    curves = [higuchi_curve(single) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
-    return curve_dataset(surface, surfaces, "lag", curves, slopes, value="higuchi_length", count="pair_count")
+    return curve_dataset(surface, higuchi_curve, "lag", "higuchi_length", count="pair_count")
 
 
-def higuchi_curve(surface: Surface) -> Curve:
+def higuchi_curve(surface: Surface, window: Scales = None) -> Curve:
     """Return the mean Higuchi length of the rows and columns of one surface."""
     axes = [axis for axis in (0, 1) if surface.shape[axis] > 1]
     shortest = min(surface.shape[axis] for axis in axes)
-    lags = higuchi_lags(shortest)
     coarse = max(surface.spacing[axis] for axis in axes)
+    most = max(2, int(0.25 * (shortest - 1)))
+    lags = np.rint(2.0 ** (np.arange(int(2.0 * np.log2(most) + 1e-9) + 1) / 2.0)).astype(np.int64)
+    lags = np.unique(np.append(lags[lags <= most], [1, 2]))
+    lags = lags[between(lags * coarse, window)]
     sums, counts = np.zeros(lags.size), np.zeros(lags.size, dtype=np.int64)
     for axis in axes:
         lines = np.moveaxis(surface.heights, axis, -1)
@@ -90,20 +81,17 @@ def higuchi_curve(surface: Surface) -> Curve:
     return Curve(lags * coarse, mean * surface.unit * (shortest - 1) / lags.astype(float) ** 2, counts)
 
 
-def higuchi_lags(points: int) -> Array:
-    """Return the lags in points of a profile."""
-    most = max(2, int(_SHARE * (points - 1)))
-    number = int(_PER_OCTAVE * np.log2(most) + 1e-9) + 1
-    lags = np.rint(2.0 ** (np.arange(number) / _PER_OCTAVE)).astype(np.int64)
-    return np.unique(np.append(lags[lags <= most], [1, 2]))
-
-
-def mean_increment_covariance(lags: Array, points: int, hurst: float) -> Array:
-    """Return the covariance of the logarithms of mean absolute increments of a fractional Brownian profile.
+def higuchi_covariance(surface: Surface, curve: Curve, hurst: float) -> Array | str:
+    """Return the covariance of the logarithms of the lengths of a fractional Brownian profile, or a reason.
 
     The covariance of the absolute values of two normal variables of correlation r and unit variance is
     (2 / pi) (sqrt(1 - r^2) + r arcsin r - 1); it is summed over all pairs of increments.
     """
+    if reason := no_profile(surface):
+        return reason
+    if hurst > 0.75:  # the limit of Guyon and Leon (1989), Annales de l'IHP 25
+        return "above H = 0.75 mean increments are not normally distributed, however long the profile"
+    lags, points = np.rint(curve.scale / surface.spacing[1]).astype(np.int64), surface.shape[1]
     result = np.empty((lags.size, lags.size))
     shifts = np.arange(-points, points + 1).astype(float)
     longest = int(lags.max())

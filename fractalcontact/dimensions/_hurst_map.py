@@ -12,11 +12,8 @@ from fractalcontact.base.grid import read_grid
 from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._filled_points import filled_points, with_gaps
-from fractalcontact.dimensions._height_gaps import without_height_gaps
 from fractalcontact.dimensions._increments import increments
-from fractalcontact.dimensions._likelihood import likelihood
-from fractalcontact.dimensions._records import SIGNIFICANT, Estimate, joined, undefined
+from fractalcontact.dimensions._records import Estimate, undefined
 from fractalcontact.dimensions._surface_input import (
     Scales,
     check_scales,
@@ -30,8 +27,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along the edge of a window
 FEWEST = 25  # observed points in a window
-_SUSPECTED = 0.7  # |z| of a bend from which on intervals allow for what that of the whole surface does
-_SLIGHT = 2.0  # |z| of a bend that counts where the surface shows blur or noise
+_ALIKE = 2.0  # mean square of the deviations of windows over their errors: 1 where one exponent holds
+_BENT = 2.6  # |z| of the bend of all windows together: one exact surface in a hundred
 _FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
 
 
@@ -111,18 +108,17 @@ def hurst_map(
         index = np.unravel_index(plane, surface.shape[:-2])
         single = surface.isel(dict(zip(leading, map(int, index), strict=True)))
         if not has_blocks(single):
-            whole = read_surfaces(single)[0]
-            without, waves = without_waves(whole)
-            without, filled = with_gaps(without, filled_points(whole))
-            without, limited = without_height_gaps(without)
-            if found := joined(waves, filled, limited):
-                single, notes = single.copy(data=without.heights * without.unit), [*notes, found]
+            without, found = without_waves(read_surfaces(single)[0])
+            if found:
+                heights = (without.heights * without.unit).reshape(single.shape)
+                single, notes = single.copy(data=heights), [*notes, found]
         of_plane = []
         for row in rows:
             band = single.isel(y=slice(int(row), int(row) + edges[0])).compute()
             parts = (band.isel(x=slice(int(start), int(start) + edges[1])) for start in columns)
             of_plane += [_estimated(part, lags) for part in parts]
-        records += _without_bent(of_plane, new, single)
+        whole = 0.0 if has_blocks(single) else increments(read_surfaces(single)[0], lags, None).misfit
+        records += _without_bent(of_plane, new, whole if np.isfinite(whole) else 0.0)
     reasons = "; ".join(dict.fromkeys(record.reason for record in records if record.reason))
     shape = (*surface.shape[:-2], rows.size, columns.size)
     data: dict[str, Any] = {
@@ -144,22 +140,24 @@ def hurst_map(
     return result
 
 
-def _without_bent(records: list[Estimate], new: float, surface: xr.DataArray) -> list[Estimate]:
+def _without_bent(records: list[Estimate], new: float, whole: float) -> list[Estimate]:
     """Return the estimates of a surface, without intervals where the power laws of its windows are bent.
 
     An exponent that differs from place to place bends no power law inside a window. `new` is the share of a
-    window that the one before does not have. A bend that chance might give counts with blur or noise.
+    window that the one before does not have; `whole` is the bend of the whole surface.
     """
-    bends = np.array([record.misfit for record in records if np.isfinite(record.misfit)])
-    z = float(bends.sum() * np.sqrt(new / bends.size)) if bends.size else 0.0
-    is_bent = abs(z) > SIGNIFICANT
-    if not is_bent and abs(z) > _SUSPECTED and not has_blocks(surface):
-        whole = likelihood(read_surfaces(surface)[0], None, False)
-        is_seen = bool(np.isfinite(whole.blur_spread) or np.isfinite(whole.noise_height))
-        is_bent = is_seen and abs(z) > _SLIGHT
-        if not is_bent and np.isfinite(whole.ci_low):
-            records = [record if record.reason else record.allowing(whole).limited() for record in records]
-    if not is_bent:
+    given = [record for record in records if np.isfinite(record.misfit) and record.standard_error > 0.0]
+    if not given:
+        return records
+    bends, exponents, errors = (
+        np.array([getattr(record, name) for record in given])
+        for name in ("misfit", "hurst", "standard_error")
+    )
+    z = float(bends.sum() * np.sqrt(new / bends.size))
+    scatter = np.mean(np.square((exponents - np.average(exponents, weights=errors**-2.0)) / errors))
+    if scatter < _ALIKE:  # then the whole surface has one exponent, whose bend many lags show
+        z = max(z, whole)
+    if abs(z) <= _BENT:
         return records
     reason = (
         f"the exponent changes with the lag inside the windows ({z:+.1f} standard deviations), as with blur, "

@@ -19,7 +19,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 NODES = np.linspace(0.02, 0.98, 25)  # Hurst exponents of the table of complete surfaces
 _STENCILS = {1: (-1.0, 1.0), 2: (1.0, -2.0, 1.0)}
-_EXACT, _GROWTH = 12, 0.2  # shifts summed one by one; relative width of the blocks of shifts beyond
+# shifts summed one by one, and relative width of the blocks of shifts beyond: standard errors are within 5 %
+# of those of dense algebra (test_increments.py)
+_EXACT, _GROWTH = 12, 0.2
 _FAR = 96  # shifts up to which the pattern of missing points matters
 
 
@@ -86,7 +88,7 @@ def gapped_pairs(observed: Array, order: int, axes: int, stride: int) -> PairCou
         near = (np.abs(uy) < far[0]) & (np.abs(ux) < far[1])
         exact = cache[kind, other][np.where(near, uy, 0).astype(int), np.where(near, ux, 0).astype(int)]
         # at large shifts whether one increment is complete does not depend on the other
-        share = sizes[kind] * sizes[other] / (complete.total(kind) * complete.total(other))
+        share = sizes[kind] * sizes[other] / max(complete.total(kind) * complete.total(other), 1.0)
         return np.where(near, exact, share * complete.number(kind, other, uy, ux))
 
     return PairCounts(observed.shape[-axes:], number)

@@ -5,7 +5,6 @@ They are imported inside the functions that call them: a study that needs no loo
 
 from __future__ import annotations
 
-from math import log
 from typing import Any
 
 import numpy as np
@@ -80,69 +79,6 @@ def gapped_increment_sums(
                     total += v * v if is_known else 0.0
                     number += is_known
                 sums[j, block, column + 3], counts[j, block, column + 3] = total, number
-
-
-@kernel
-def whiten(start: int, stop: int, covariances: Array, columns: Array, log_determinants: Array) -> None:
-    """Factor covariances (chunks, n, n) from start up to stop, and solve for their columns (chunks, n, k).
-
-    Both in place: with covariance = U' U, columns become U'^-1 columns. Only the upper triangle is used. The
-    updates run along rows, so that they need no reordered sums. A chunk that is not positive definite gets
-    NaN.
-    """
-    _, n, k = columns.shape
-    for c in range(start, stop):
-        total = 0.0
-        for p in range(n):
-            pivot = covariances[c, p, p]
-            if not pivot > 0.0:
-                total = float("nan")
-                break
-            root = pivot**0.5
-            total += 2.0 * log(root)
-            for j in range(p, n):
-                covariances[c, p, j] /= root
-            for m in range(k):
-                columns[c, p, m] /= root
-            for i in range(p + 1, n):
-                factor = covariances[c, p, i]
-                for j in range(i, n):
-                    covariances[c, i, j] -= factor * covariances[c, p, j]
-                for m in range(k):
-                    columns[c, i, m] -= factor * columns[c, p, m]
-        log_determinants[c] = total
-
-
-@kernel
-def innovations(covariance: Array, columns: Array, log_determinant: Array) -> None:
-    """Do what `whiten` does for one chunk of stationary increments (n, k), given their covariance by lag.
-
-    Durbin and Levinson: the errors of the best prediction from all earlier ones, over their deviation.
-    """
-    n, k = columns.shape
-    weights, earlier, heights = np.zeros(n), np.zeros(n), columns.copy()
-    variance, total = covariance[0], 0.0
-    for t in range(n):
-        if t > 0:
-            reflection = covariance[t]
-            for j in range(1, t):
-                reflection -= weights[j] * covariance[t - j]
-            reflection /= variance
-            earlier[:t] = weights[:t]
-            for j in range(1, t):
-                weights[j] -= reflection * earlier[t - j]
-            weights[t] = reflection
-            variance *= 1.0 - reflection * reflection
-        if not variance > 0.0:
-            total = float("nan")
-            break
-        total += log(variance)
-        for j in range(1, t + 1):
-            for m in range(k):
-                columns[t, m] -= weights[j] * heights[t - j, m]
-        for m in range(k):
-            columns[t, m] /= variance**0.5
-    log_determinant[0] = total
 
 
 @kernel
@@ -240,40 +176,51 @@ def roughness_sums(
     size_x: int,
     rows: Array,
     columns: Array,
+    is_square: bool,
     sums: Array,
     counts: Array,
 ) -> None:
-    """Sum the rms deviation from its own plane over windows that start at `rows` and `columns`.
+    """Sum the rms deviation from its own plane, or its square, over windows at `rows` and `columns`.
 
     From rows[start] up to rows[stop]. `sums` and `counts` are (rows.size,); a window with a NaN in it is left
-    out.
+    out. The rows of a band of windows are added up first: heights, their squares and moments about y.
     """
-    squares_x = size_y * size_x * (size_x * size_x - 1.0) / 12.0
-    squares_y = size_x * size_y * (size_y * size_y - 1.0) / 12.0
+    nx = heights.shape[1]
     number = size_y * size_x
+    squares_x = number * (size_x * size_x - 1.0) / 12.0
+    squares_y = number * (size_y * size_y - 1.0) / 12.0
+    line, square, moment = np.empty(nx), np.empty(nx), np.empty(nx)
     for r in range(start, stop):
+        line[:] = 0.0
+        square[:] = 0.0
+        moment[:] = 0.0
+        total, known = 0.0, 0
+        for i in range(nx):
+            if heights[rows[r], i] == heights[rows[r], i]:
+                total += heights[rows[r], i]
+                known += 1
+        level = total / known if known else 0.0  # squares about it lose few digits
+        for j in range(rows[r], rows[r] + size_y):
+            y = j - rows[r] - 0.5 * (size_y - 1)
+            for i in range(nx):
+                v = heights[j, i] - level
+                line[i] += v
+                square[i] += v * v
+                moment[i] += y * v
         for c in range(columns.size):
-            j0, i0 = rows[r], columns[c]
-            mean = 0.0
-            for j in range(j0, j0 + size_y):
-                for i in range(i0, i0 + size_x):
-                    mean += heights[j, i]
-            mean /= number
-            square = along_x = along_y = 0.0
-            for j in range(j0, j0 + size_y):
-                y = j - j0 - 0.5 * (size_y - 1)
-                line = 0.0
-                for i in range(i0, i0 + size_x):
-                    v = heights[j, i] - mean
-                    square += v * v
-                    line += v
-                    along_x += v * (i - i0 - 0.5 * (size_x - 1))
-                along_y += y * line
-            square -= along_x * along_x / squares_x
+            mean = rest = along_x = along_y = 0.0
+            for i in range(size_x):
+                v = line[columns[c] + i]
+                mean += v
+                rest += square[columns[c] + i]
+                along_x += v * (i - 0.5 * (size_x - 1))
+                along_y += moment[columns[c] + i]
+            rest -= mean * mean / number + along_x * along_x / squares_x
             if size_y > 1:
-                square -= along_y * along_y / squares_y
-            if square == square:
-                sums[r] += (max(square, 0.0) / number) ** 0.5
+                rest -= along_y * along_y / squares_y
+            if rest == rest:
+                rest = max(rest, 0.0) / number
+                sums[r] += rest if is_square else rest**0.5
                 counts[r] += 1
 
 
@@ -314,70 +261,3 @@ def walk(heights: Array, spacing: float, opening: float) -> tuple[float, float]:
                 k += 1
         total += np.hypot((n - 1) * spacing / opening - at_x, z[n - 1] / opening - at_z)
     return total * opening, count
-
-
-@kernel
-def aggregate_gradients(
-    right: Array, starts: Array, operator: tuple[Array, ...], tolerance: float, most: int
-) -> Array:
-    """Solve diagonal x - couplings x = right by conjugate gradients with a cycle over levels of aggregates.
-
-    Unknowns of all levels are numbered together, those of level l from starts[l] up to starts[l + 1]; `right`
-    is that of the first level. Of the eight arrays of `operator`, the first four number the neighbours, 0 for
-    none; then come the couplings with those above and after, the diagonal, and the aggregate on the next
-    level. The cycle is symmetric: one Gauss-Seidel sweep forwards from zero, one backwards.
-    """
-    above, after, below, before, vertical, along, diagonal, aggregate = operator
-    levels, m = starts.size - 1, right.size
-    inverse = 1.0 / diagonal
-    x, b = np.zeros(diagonal.size), np.zeros(diagonal.size)  # of the cycle, all levels
-    solution, direction, product = np.zeros(m), np.zeros(m + 1), np.zeros(m)
-    square, old = 0.0, 1.0
-    for k in range(m):
-        b[k + 1] = right[k]
-        square += right[k] * right[k]
-    limit = tolerance * tolerance * square
-    for step in range(most):
-        if square <= limit:
-            break
-        for level in range(levels):
-            first, last = starts[level], starts[level + 1]
-            for k in range(first, last):
-                i, j = below[k], before[k]
-                x[k] = (b[k] + vertical[i] * x[i] + along[j] * x[j]) * inverse[k]
-            if level + 1 < levels:
-                b[last : starts[level + 2]] = 0.0
-                for k in range(first, last):
-                    b[aggregate[k]] += vertical[k] * x[above[k]] + along[k] * x[after[k]]
-        new = 0.0
-        for level in range(levels - 1, -1, -1):
-            first, last = starts[level], starts[level + 1]
-            if level + 1 < levels:
-                for k in range(first, last):
-                    x[k] += 1.8 * x[aggregate[k]]  # aggregates are too stiff by two for long waves
-            new = 0.0
-            for k in range(last - 1, first - 1, -1):
-                i, j = below[k], before[k]
-                around = vertical[k] * x[above[k]] + along[k] * x[after[k]]
-                around += vertical[i] * x[i] + along[j] * x[j]
-                x[k] = (b[k] + around) * inverse[k]
-                new += b[k] * x[k]
-        share = 0.0 if step == 0 else new / old
-        for k in range(1, m + 1):
-            direction[k] = x[k] + share * direction[k]
-        bend = 0.0
-        for k in range(1, m + 1):
-            i, j = below[k], before[k]
-            value = diagonal[k] * direction[k] - vertical[k] * direction[above[k]]
-            value -= along[k] * direction[after[k]] + vertical[i] * direction[i] + along[j] * direction[j]
-            product[k - 1] = value
-            bend += direction[k] * value
-        length = new / bend
-        square = 0.0
-        for k in range(m):
-            solution[k] += length * direction[k + 1]
-            rest = b[k + 1] - length * product[k]
-            b[k + 1] = rest
-            square += rest * rest
-        old = new
-    return solution

@@ -1,94 +1,344 @@
-"""Maximum likelihood estimate of H, for the family that the surface belongs to (method "likelihood").
+"""Hurst exponent of a measured surface: one model, one fit, one interval (method "likelihood").
 
-Surfaces with free edges: fractional Brownian heights, by their cosine modes. Periodic surfaces: a power-law
-spectrum between cut-offs. Profiles with free ends: the exact likelihood of their increments.
+1. A first fit to the modes of the tapered surface gives a pilot: the expected power of each cosine mode.
+2. Modes that the edges, a filter or single waves dominate are left out; the lay is divided out; gaps are
+filled and
+   their effect on the power is corrected.
+3. The bins of the modes that are left have one posterior (`_spectral_posterior`): its median is the
+estimate, its
+   2.5 and 97.5 % quantiles are the interval.
+
+Whole periodic surfaces have Fourier modes; profiles are the case of one axis.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._exponent_by_scale import exponents_within
-from fractalcontact.dimensions._filled_points import filled_points, with_gaps
-from fractalcontact.dimensions._height_gaps import without_height_gaps
-from fractalcontact.dimensions._periodic_modes import periodic_likelihood
-from fractalcontact.dimensions._profile_increments import gapped_profile
-from fractalcontact.dimensions._profile_likelihood import profile_likelihood
-from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, undefined
+from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.units import quantity_text
+from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, unevenness
+from fractalcontact.dimensions._filled_modes import fill, filling_ratio
+from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
+from fractalcontact.dimensions._mode_bins import (
+    LEAST,
+    clear_modes,
+    expected_power,
+    lay,
+    make_bins,
+    single_waves,
+    whitened,
+)
+from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
+from fractalcontact.dimensions._spectral_posterior import (
+    CORNER,
+    HURST,
+    LONG_HURST,
+    LOWEST,
+    NOISE,
+    SPREAD,
+    Posterior,
+    bin_power,
+    posterior,
+)
 from fractalcontact.dimensions._surface_input import Scales, Surface
-from fractalcontact.dimensions._surface_likelihood import surface_likelihood
-from fractalcontact.dimensions._waves import MOST_REPEATED, without_waves
+from fractalcontact.dimensions._waves import without_waves
 
-_INTERPOLATED = 0.01  # share of heights on a line with their neighbours
-_LINEAR = (
-    "many heights lie exactly on lines between their neighbours: they were interpolated, and the short waves "
-    "are those of the interpolation; grid the points with fractalcontact.surfaces.from_points, or give "
-    "`scales` from eight distances of the points on"
-)
-_RESOLVED_WINDOW = "all wavelengths that the points of the gridded surface resolve"
-_REPEATED = (
-    "many rows or columns repeat their neighbours: the surface was enlarged, and the short waves are those "
-    "of its blocks; remove the repeated ones, or give `scales` from eight blocks on"
-)
+Array = np.ndarray[Any, np.dtype[Any]]
+
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "
     "another kind of surface; see fractalcontact.surfaces.fill"
 )
+_NO_MODES = (
+    "too few modes that vary along both axes: give more points, or a profile where heights vary along one"
+)
+_WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
+_SEEN = 0.8  # probability from which on a nuisance is named
+_DOUBLE = 2.0**-52  # relative step of the numbers themselves
+_NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
+_EMPTY = (
+    1e-14  # power over the pilot of modes that hold nothing but rounding, as beyond the band of a synthesis
+)
+_GAP_ROUNDS = 2  # corrections for gaps: each starts from the exponent of the one before
+_LEAST_BINS = 3
 
 
-def likelihood(surface: Surface, scales: Scales, noise: bool, psf: float | None = None) -> Estimate:
-    """Fit the periodic family where every axis is periodic, otherwise fractional Brownian heights.
+@dataclass(frozen=True)
+class ModeFit:
+    """Modes of a surface and their first fit.
 
-    Single waves are removed first. `psf` is the spread of a known point spread function in m.
+    Attributes
+    ----------
+    lattice : Lattice
+    scale : float
+        Rms increment over one x spacing, in scaled heights: unit of the modes.
+    power : ndarray
+        Squared modes, corrected for gaps and for the lay.
+    pilot : ndarray
+        Expected power of the first fit.
+    keep : ndarray of bool
+        Modes that count.
+    waves : ndarray of bool
+        Modes of single waves, which do not.
+    ratio : ndarray
+        Power over pilot, half octave by half octave as expected of Gaussian heights.
+    information : float or ndarray
+    lay : ndarray
+    theta : ndarray
+    form : int
+    """
+
+    lattice: Lattice
+    scale: float
+    power: Array
+    pilot: Array
+    keep: Array
+    waves: Array
+    ratio: Array
+    information: Array | float
+    lay: Array
+    theta: Array
+    form: int
+
+    def bins(self, keep: Array | None = None) -> Bins:
+        """Return the bins of the modes that count, or of some of them."""
+        chosen = self.keep if keep is None else keep
+        return make_bins(self.lattice, self.power, self.pilot, chosen, information=self.information)
+
+
+def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float | None = None) -> Estimate:
+    """Estimate the exponent of one surface.
+
+    `noise`: rms height of white noise in m; None: estimated. `psf`: spread of a known point spread function
+    in m.
     """
     if surface.is_constant:
         return undefined(CONSTANT)
     if surface.is_plane:
         return plane()
-    made = ""
-    if scales is None and not surface.finest_scale:
-        made = _LINEAR if surface.linear_share > _INTERPOLATED else ""
-        made = _REPEATED if surface.repeated_share > MOST_REPEATED else made
-    filled = None if made else filled_points(surface)
-    surface, wave_note = without_waves(surface)
-    surface, gap_note = with_gaps(surface, filled)
-    surface, limit_note = without_height_gaps(surface)
-    estimate = _fitted(surface, scales, noise, psf)
-    if scales is not None and not noise and psf is None:
-        estimate = _within_scales(estimate, surface, scales)
-    estimate = replace(estimate, note=joined(wave_note, gap_note, limit_note, estimate.note))
-    if made and not estimate.reason:
-        return replace(estimate.without_interval(made), note=joined(made, estimate.note))
-    return estimate
-
-
-def _within_scales(estimate: Estimate, surface: Surface, scales: Scales) -> Estimate:
-    """Return an estimate whose interval holds both exponents of a given window that has more than one."""
-    if not surface.is_complete or surface.finest_scale or np.isfinite(estimate.blur_spread):
-        return estimate
-    low, high = exponents_within(surface, scales)
-    if low > high:
-        return estimate
-    note = (
-        "the exponent changes within the scales asked for (see `scaling`): the interval holds those of the "
-        "shorter and of the longer waves"
-    )
-    return estimate.holding(low, high, note)
-
-
-def _fitted(surface: Surface, scales: Scales, noise: bool, psf: float | None) -> Estimate:
-    """Fit the family of a surface without single waves."""
-    if all(surface.grid.periodic) and surface.is_complete:
-        return periodic_likelihood(surface, scales, noise)
-    if surface.finest_scale and scales is None:
-        resolved = _fitted(surface, surface.resolved(scales), noise, psf)
-        return replace(resolved, window=_RESOLVED_WINDOW)
+    surface, marks = without_waves(surface)
+    window = surface.resolved(scales)
+    if window is not None:  # the exponent of these waves as they are
+        psf, noise = psf or 0.0, noise or 0.0
     spread = None if psf is None else psf / surface.spacing[1]
-    of_profile = profile_likelihood if surface.is_complete else gapped_profile
-    family = of_profile if surface.axes == 1 else surface_likelihood
-    estimate = family(surface, scales, noise, spread)
-    if not any(surface.grid.periodic) or estimate.reason:
-        return estimate
-    return estimate.without_interval(_PERIODIC_GAPS)
+    fit = fitted_modes(surface, spread)
+    if fit is None:
+        return undefined(_NO_MODES)
+    wavelength = 2.0 * np.pi / fit.lattice.q * surface.spacing[1]
+    keep = fit.keep
+    if window is not None:
+        keep = keep & (wavelength >= window[0] * (1.0 - 1e-9)) & (wavelength <= window[1] * (1.0 + 1e-9))
+    number = int(np.count_nonzero(keep))
+    if number < LEAST * _LEAST_BINS and window is None and keep.size > 4 * LEAST * _LEAST_BINS:
+        return smooth()
+    if number < LEAST * _LEAST_BINS:
+        what = (
+            "in the window of scales"
+            if window is not None
+            else "that the edges of the surface do not dominate"
+        )
+        return undefined(f"{number} modes {what}, at least {LEAST * _LEAST_BINS} are needed")
+    unit = fit.scale * surface.unit
+    background = math.hypot(rounding_step(surface) / math.sqrt(12.0), _DOUBLE) / fit.scale
+    bins = fit.bins(keep)
+    options: dict[str, Any] = {"spread": spread, "background": background, "is_window": window is not None}
+    options["pilot_spread"] = float(fit.theta[SPREAD]) if spread is None else 0.0
+    found = posterior(bins, **options)
+    # the model counts noise in increments of the fractal without its blur, whose amplitude is fitted
+    for _ in range(0 if noise is None else _NOISE_ROUNDS):
+        relative = (noise or 0.0) / unit / math.sqrt(_amplitude(bins, found))
+        found = posterior(bins, noise=relative, **options)
+    estimate = _estimate(surface, fit, bins, found, window, unit, noise, psf)
+    return replace(estimate, note=joined(marks, estimate.note))
+
+
+def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | None:
+    """Return the modes of a surface and their first fit; None if it has too few.
+
+    `spread` is that of a known blur, in spacings.
+    """
+    heights = _without_rim(surface.heights)
+    observed = np.isfinite(heights)
+    is_complete = bool(observed.all())
+    is_periodic = all(surface.grid.periodic) and is_complete
+    lattice = Lattice((heights.shape[0], heights.shape[1]), surface.plane_spacing, is_periodic)
+    if min(heights.shape[-surface.axes :]) < 4:
+        return None
+    heights = heights - heights[observed].mean() if is_periodic else _without_plane(heights)
+    heights[~observed] = np.nan
+    scale = _rms_increment(heights)
+    heights /= scale
+    filled = fill(heights)
+    theta, form = _first_fit(filled, lattice, spread)
+    if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
+        return None
+    modes = lattice.power(filled)
+    correction: Array | float = 1.0
+    information: Array | float = 1.0
+    for rounds in range(0 if is_complete else _GAP_ROUNDS, -1, -1):
+        pilot, clean = expected_power(lattice, theta, form)
+        sharp = theta.copy()
+        sharp[SPREAD] = 0.0
+        keep = clear_modes(pilot, clean, expected_power(lattice, sharp, form)[1])
+        if not is_complete:
+            correction = filling_ratio(lattice, pilot, observed)
+            information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
+        power = modes / correction
+        keep &= power > _EMPTY * pilot
+        if not keep.any():
+            return None
+        ratio = whitened(lattice, power, pilot, keep)
+        waves = single_waves(lattice, ratio, keep)
+        keep &= ~waves
+        if rounds and np.count_nonzero(keep) >= LEAST * _LEAST_BINS:
+            bins = make_bins(lattice, power, pilot, keep, information=information)
+            hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
+            form = hypothesis.form
+    information = information / unevenness(heights)
+    level = lay(lattice, ratio, keep)
+    return ModeFit(
+        lattice, scale, power / level, pilot, keep, waves, ratio / level, information, level, theta, form
+    )
+
+
+def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[Array, int]:
+    """Return theta and form from the modes of the tapered surface: its edges do not leak into short waves."""
+    torus = Lattice(lattice.shape, lattice.spacing, True)
+    if lattice.axes == 2 and not lattice.periodic:  # offsets of rows and columns are in none of the modes
+        heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
+    tapers = [np.ones(1) if n == 1 else np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in lattice.shape]
+    if lattice.periodic:
+        tapers = [np.ones(n) for n in lattice.shape]
+    power = (
+        torus.power(heights * tapers[0][:, None] * tapers[1])
+        / np.mean(tapers[0] ** 2)
+        / np.mean(tapers[1] ** 2)
+    )
+    pilot = torus.q ** (-1.0 - torus.axes)
+    inside = power > _EMPTY * float(np.max(power / pilot)) * pilot
+    keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
+    if np.count_nonzero(keep) < LEAST * _LEAST_BINS:
+        keep = inside if np.count_nonzero(inside) >= LEAST * _LEAST_BINS else np.ones(keep.shape, dtype=bool)
+    bins = make_bins(torus, power, pilot, keep, is_tapered=not lattice.periodic)
+    hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
+    return theta, hypothesis.form
+
+
+def _without_plane(heights: Array) -> Array:
+    """Return heights less their plane, or those of a profile less their line."""
+    if heights.shape[0] == 1:
+        return detrended(heights[0], 1)[0][None]
+    return detrended(heights, 1)[0]
+
+
+def _without_rim(heights: Array) -> Array:
+    """Return heights without the outer rows and columns of which nothing was observed."""
+    observed = np.isfinite(heights)
+    rows, columns = np.flatnonzero(observed.any(axis=1)), np.flatnonzero(observed.any(axis=0))
+    return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def _rms_increment(heights: Array) -> float:
+    """Return the rms increment over one spacing along x, or along y if there is none."""
+    for axis in (1, 0):
+        steps = np.diff(heights, axis=axis)
+        square = float(np.nanvar(steps)) if np.isfinite(steps).any() else 0.0
+        if square > 0.0:
+            return math.sqrt(square)
+    return 1.0
+
+
+def _estimate(
+    surface: Surface,
+    fit: ModeFit,
+    bins: Bins,
+    found: Posterior,
+    window: Scales,
+    unit: float,
+    noise: float | None,
+    psf: float | None,
+) -> Estimate:
+    """Return the record of a posterior, with what was found in words."""
+    low, middle, high = (found.quantile(share) for share in (0.025, 0.5, 0.975))
+    discrepancy = found.most_probable[1]
+    dx = surface.spacing[1]
+    inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
+    amplitude = math.sqrt(max(_amplitude(bins, found), 0.0))
+    is_noisy = noise is None and found.probability("is_noisy") > _SEEN
+    is_blurred = psf is None and found.probability("is_blurred") > _SEEN
+    spread = found.mean(SPREAD, "is_blurred") * dx if is_blurred else math.nan
+    height = amplitude * unit * found.mean(NOISE, "is_noisy") if is_noisy else math.nan
+    estimate = Estimate(
+        hurst=middle,
+        standard_error=(high - low) / 3.92,
+        ci_low=low,
+        ci_high=high,
+        scale_min=float(inside.min()),
+        scale_max=float(inside.max()),
+        rms_increment=amplitude * unit,
+        noise_height=height if noise is None else noise,
+        blur_spread=spread if psf is None else psf,
+        misfit=_misfit(bins, found),
+        window="asked for" if window is not None else "all wavelengths that one model describes",
+        note=joined(*_findings(found, bins, dx, spread, height)),
+    )
+    reason = diagnose(surface)
+    if any(surface.grid.periodic) and not fit.lattice.periodic:
+        reason = _PERIODIC_GAPS
+    if not reason and high - low > _WIDEST:
+        reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"
+    return estimate if not reason else estimate.without_interval(reason)
+
+
+def _findings(found: Posterior, bins: Bins, dx: float, spread: float, height: float) -> list[str]:
+    """Return in words what the surface has beside an exponent."""
+    _, discrepancy, theta = found.most_probable
+    notes = []
+    if np.isfinite(spread):
+        notes.append(f"blur with a spread of {quantity_text(spread, 'm')}")
+    if np.isfinite(height):
+        notes.append(f"white noise with an rms height of {quantity_text(height, 'm')}")
+    if theta[CORNER] > 0.0 and found.probability("is_bent") > _SEEN:
+        length = quantity_text(2.0 * np.pi / theta[CORNER] * dx, "m")
+        notes.append(f"waves longer than about {length} have another exponent, {theta[LONG_HURST]:.2f}")
+    if not discrepancy.inside.all():
+        lengths = 2.0 * np.pi * dx * np.exp(-bins.lnq[discrepancy.inside])
+        ends = quantity_text(float(lengths.min()), "m"), quantity_text(float(lengths.max()), "m")
+        notes.append(f"one exponent describes the waves from {ends[0]} to {ends[1]} only")
+    elif discrepancy.scatter.max() > 0.0:
+        share = 100.0 * float(discrepancy.scatter.max())
+        notes.append(f"the spectrum differs from the model by about {share:.0f} %, which widens the interval")
+    return notes
+
+
+def _residuals(bins: Bins, found: Posterior) -> Array:
+    """Return logarithms of the power over the model of the most probable hypothesis."""
+    hypothesis, _, theta = found.most_probable
+    model = np.empty(bins.level.size)
+    table = bins.tables[hypothesis.form]
+    bin_power(theta, hypothesis.form, bins.axes, table, bins.nodes, bins.t, bins.white, bins.lnq, model)
+    return bins.level - model
+
+
+def _amplitude(bins: Bins, found: Posterior) -> float:
+    """Return the square of the rms increment of the fractal over one spacing, over that of the heights."""
+    inside = found.most_probable[1].inside
+    residuals, weights = _residuals(bins, found)[inside], 1.0 / bins.variance[inside]
+    return math.exp(float(weights @ residuals / weights.sum()))
+
+
+def _misfit(bins: Bins, found: Posterior) -> float:
+    """Return z of chi square of the bins about the most probable spectrum, octave by octave and azimuth."""
+    hypothesis, discrepancy, _ = found.most_probable
+    residuals = _residuals(bins, found)[discrepancy.inside]
+    weights = 1.0 / bins.variance[discrepancy.inside]
+    residuals = residuals - weights @ residuals / weights.sum()
+    freedom = residuals.size - 1 - sum(math.isnan(value) for value in hypothesis.theta)
+    if freedom < 1:
+        return math.nan
+    return float((weights @ np.square(residuals) - freedom) / math.sqrt(2.0 * freedom))

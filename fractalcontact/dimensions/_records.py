@@ -11,10 +11,8 @@ from fractalcontact.base.units import quantity_text
 SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
 ASKED = "asked for"  # the window of scales
 CONSTANT = "a constant height has no Hurst exponent"
-UNSEEN = "a profile has too few waves to show every blur and noise, which it allows for"
 NORMAL = 1.959963984540054  # 97.5 % quantile of the normal distribution
 GRIDDING = 0.035  # largest error of H from the finest scale of a gridded surface on, as measured
-_DIFFERENT = 2.5  # standard errors between two methods beyond which an interval holds both
 _ROUNDING = 1e-9  # rounding of a slope
 
 
@@ -62,45 +60,6 @@ class Estimate:
     def without_interval(self, reason: str) -> Estimate:
         """Return the estimate without its standard error and interval."""
         return replace(self, standard_error=np.nan, ci_low=np.nan, ci_high=np.nan, reason=reason)
-
-    def holding(self, low: float, high: float, note: str = "") -> Estimate:
-        """Widen the interval until it holds another one, for the reason in the note."""
-        low, high = min(self.ci_low, low), max(self.ci_high, high)
-        return replace(self, ci_low=low, ci_high=high, note=joined(self.note, note))
-
-    def found_beside(self, hurst: float, error: float) -> str:
-        """Return what this estimate, of the modes, finds beside another: empty if they agree."""
-        if self.note:
-            return self.note
-        differ = abs(hurst - self.hurst) > _DIFFERENT * float(np.hypot(error, self.standard_error))
-        return f"{self.hurst:.2f}, which offsets of rows or columns do not change" if differ else ""
-
-    def beside_modes(self, by_modes: Estimate, found: str) -> Estimate:
-        """Widen an interval for fractional Brownian heights where the modes show others, or may hide them."""
-        if not np.isfinite(self.ci_low):
-            return self
-        if not found:
-            return self.allowing(by_modes)
-        if not np.isfinite(by_modes.ci_low):
-            return self.without_interval(f"`likelihood` gives no interval: {found}")
-        note = (
-            f"the interval assumes fractional Brownian heights, and also holds that of `likelihood`: {found}"
-        )
-        return self.holding(by_modes.ci_low, by_modes.ci_high, note)
-
-    def allowing(self, by_modes: Estimate) -> Estimate:
-        """Widen an interval by what another holds beyond its own scatter, as for noise that is not seen."""
-        low, high = normal_interval(by_modes.hurst, by_modes.standard_error)
-        below, above = max(low - by_modes.ci_low, 0.0), max(by_modes.ci_high - high, 0.0)
-        return replace(self, ci_low=self.ci_low - below, ci_high=self.ci_high + above)
-
-    def averaged(self, other: Estimate, share: float, note: str) -> Estimate:
-        """Return the mean with another estimate, of the weight `share`; the interval holds both."""
-        hurst = (1.0 - share) * self.hurst + share * other.hurst
-        square = (1.0 - share) * self.standard_error**2 + share * other.standard_error**2
-        square += share * (1.0 - share) * (self.hurst - other.hurst) ** 2
-        held = self.holding(other.ci_low, other.ci_high, joined(other.note, note))
-        return replace(held, hurst=hurst, standard_error=float(np.sqrt(square)))
 
     def gridded(self, finest: float) -> Estimate:
         """Widen the interval by what gridding may have done to the power of the window.
@@ -166,6 +125,12 @@ def undefined(reason: str) -> Estimate:
 def plane() -> Estimate:
     """Return the estimate for a plane, the limit H = 1."""
     reason = "a plane: the limit H = 1, without scatter to make an interval from"
+    return Estimate(1.0, reason=reason, note=reason)
+
+
+def smooth() -> Estimate:
+    """Return the estimate for a surface without short waves, the limit H = 1."""
+    reason = "smoother than a fractal surface: the edges hold most of the power of its waves; the limit H = 1"
     return Estimate(1.0, reason=reason, note=reason)
 
 

@@ -24,7 +24,6 @@ from fractalcontact.dimensions._anisotropy import (
     metric_of,
     squared_length,
 )
-from fractalcontact.dimensions._periodic_modes import PeriodicModes
 from fractalcontact.dimensions._second_differences import DIRECTIONS
 from fractalcontact.dimensions._spectrum import without_trend
 
@@ -32,6 +31,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 WIDEST = 90.0 / DIRECTIONS  # half the angle of a sector, degrees
 LEAST = 100  # modes needed to estimate the harmonics of their directions
+LEAST_OF_LAW = 24  # real numbers in the modes of a power law
+_DIFFERENT = 1.2  # ratio of the lengths of its waves
 _LEAST_TAPERED = 600  # the same in the whole plane of a tapered surface
 _LONGEST, _SHORTEST = 3.5, 6.0  # wavenumber steps and spacings that limit the waves of a tapered surface
 _TAPER_REACH = 2  # modes on either side that the taper correlates with one
@@ -45,6 +46,15 @@ _LIMITS = (
     [-0.99, -LARGEST_LOG_RATIO, -LARGEST_LOG_RATIO],
     [3.0, LARGEST_LOG_RATIO, LARGEST_LOG_RATIO],
 )  # of H and of the components of the log ratio
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """Exponent of some waves, its standard error, and z of the curvature of their spectrum."""
+
+    hurst: float
+    error: float
+    curvature_z: float
 
 
 @dataclass(frozen=True)
@@ -85,17 +95,37 @@ class PlaneModes:
         low, high = low * (1 - 1e-9), high * (1 + 1e-9)
         return self._part((radius >= low) & (radius <= high) & (self.power > _ROUNDING * self.power.max()))
 
-    def sector(self, azimuth: float, half_width: float) -> PeriodicModes:
+    def sector(self, azimuth: float, half_width: float) -> PlaneModes:
         """Return the waves whose direction is within `half_width` degrees of an azimuth."""
         angle = np.degrees(np.arctan2(*self.wavevectors.T))
         # an edge belongs to the sector that begins with it
         from_edge = (angle - azimuth + half_width) % 180.0
-        return self._part(np.round(from_edge, 9) < 2.0 * half_width).modes
+        return self._part(np.round(from_edge, 9) < 2.0 * half_width)
 
-    @property
-    def modes(self) -> PeriodicModes:
-        """The same modes by their wavenumber alone."""
-        return PeriodicModes(self.power, np.hypot(*self.wavevectors.T), self.weights, 2)
+    def power_law(self) -> PowerLaw:
+        """Fit a power law by Whittle's likelihood; NaN where the waves are few, or of nearly one length."""
+        radius = np.hypot(*self.wavevectors.T)
+        if self.weights.sum() < LEAST_OF_LAW or not radius.max() > _DIFFERENT * radius.min():
+            return PowerLaw(np.nan, np.nan, np.nan)
+        logs = np.log(radius)
+        information = 0.5 * self.weights
+        logs -= information @ logs / information.sum()
+        slope = 0.0
+        for _ in range(_ROUNDS):  # Fisher scoring, at the best amplitude
+            ratio = self.power * np.exp(slope * logs)
+            ratio /= information @ ratio / information.sum()
+            step = -float(information @ (logs * (ratio - 1.0)) / (information @ np.square(logs)))
+            slope += float(np.clip(step, -1.0, 1.0))
+            if abs(step) < 1e-9:
+                break
+        error = 0.5 / np.sqrt(information @ np.square(logs))
+        curve = np.square(logs)
+        design = np.stack([np.ones(logs.size), logs], axis=1)
+        curve -= design @ np.linalg.solve(
+            (information[:, None] * design).T @ design, design.T @ (information * curve)
+        )
+        scores = information * curve * (ratio - 1.0)  # of the modes; a lay lets them scatter more
+        return PowerLaw(0.5 * slope - 1.0, float(error), float(scores.sum() / np.sqrt(scores @ scores)))
 
     def _part(self, chosen: Array) -> PlaneModes:
         return PlaneModes(self.power[chosen], self.wavevectors[chosen], self.weights[chosen], self.extent)

@@ -12,11 +12,14 @@ from fractalcontact.base import spectra
 from fractalcontact.base.power_law import logarithm
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, Curve, curve_dataset
+from fractalcontact.dimensions._curve import ALWAYS, PERIODIC, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._surface_input import Scales, Surface, between, check_surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
+_ROUNDING = (
+    2.0**-100
+)  # of the largest power: the square of the rounding of a height, 2^-53, with a margin of 64
 _NAMES = {2: "power_spectral_density", 1: "profile_power_spectral_density"}  # by number of axes
 
 
@@ -86,19 +89,19 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     >>> round(-(slope + 2) / 2, 1)
     0.7
     """
-    surfaces = read_surfaces(surface)
     taper = "none" if window is None else window
-    curves = [spectrum_curve(single, taper, tile) for single in surfaces]
-    slopes = [_local_slope(curve.scale, curve.value, curve.count) for curve in curves]
-    name = _NAMES[surfaces[0].axes]
-    wavelength = {"wavelength": ("wavenumber", 2.0 * np.pi / curves[0].scale)}
     return curve_dataset(
-        surface, surfaces, "wavenumber", curves, slopes, value=name, count="mode_count", further=wavelength
+        surface,
+        lambda single: ring_curve(single, taper, tile),
+        "wavenumber",
+        _NAMES[2 if "y" in surface.dims else 1],
+        count="mode_count",
+        slope=_local_slope,
     )
 
 
-def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Curve:
-    """Return the ring averages of the power spectral density of one surface."""
+def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) -> Curve:
+    """Return the ring averages of the power spectral density of one surface; 0 where they are rounding."""
     axes, spacing = surface.axes, surface.grid.spacing
     shape = surface.grid.shape if tile is None else (tile,) * axes
     periodic = surface.grid.periodic if tile is None else (False,) * axes
@@ -120,7 +123,8 @@ def spectrum_curve(surface: Surface, window: str, tile: int | None = None) -> Cu
     else:
         q, mean = spectra.half_wavenumbers(shape, spacing)[0][1:], power[1:]
         count = spectra.half_weights(shape[0])[1:].astype(np.int64)
-    return Curve(q, mean * (surface.unit**2 if tile is None else 1.0), count)
+    mean = np.where(mean > _ROUNDING * mean.max(), mean, 0.0)
+    return Curve(q, mean * (surface.unit**2 if tile is None else 1.0), count, has_wavenumbers=True)
 
 
 def without_trend(heights: Array, *, plane: bool) -> Array:
@@ -152,8 +156,9 @@ def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:
             yield strip[:, i : i + tile]
 
 
-def _local_slope(scale: Array, value: Array, count: Array) -> Array:
+def _local_slope(curve: Curve) -> Array:
     """Return the slope of a line through the points within a factor of sqrt 2, weighted by counts."""
+    scale, value, count = curve.scale, curve.value, curve.count
     (x, _), (y, _) = logarithm(scale), logarithm(value)
     good = np.isfinite(y)
     weights = np.where(good, count, 0.0)
@@ -173,95 +178,70 @@ def _local_slope(scale: Array, value: Array, count: Array) -> Array:
     return np.where(good & np.isfinite(slope), slope, np.nan)
 
 
-_EXACT_RINGS = 128  # rings whose covariance is summed mode by mode
-_LARGEST = 512  # points along an axis up to which the expectation is summed over all lags
-_TAPER = (1.0, 4.0 / 9.0, 1.0 / 36.0)  # squared correlation of modes 0, 1 and 2 apart under a Hann window
+def band_curve(surface: Surface, window: Scales) -> Curve:
+    """Return the mean power in bands of half an octave between two wavelengths.
 
-
-def expected_spectrum(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
-    """Return the expected ring averages of a fractional Brownian surface under a Hann window, up to a factor.
-
-    The transform of the autocorrelation of the window times the covariance, which is known up to a constant
-    that no mode beyond the first feels. For large surfaces the effect of the window, which depends on the
-    number of waves in the surface, is taken from a smaller one.
+    `parts` of a band are the numbers of its modes by ring, the wavenumbers of the rings come last: (k + 1,
+    rings). Free surfaces leave their power law at the short end first, where most of the modes are: each
+    band has the same weight there, and each mode on periodic ones.
     """
-    factor = -(-max(shape) // _LARGEST)
-    if abs(spacing[0] / spacing[1] - 1.0) > 1e-6:  # the sum over aliases is that of a square grid
-        factor = 1
-    small = shape if factor == 1 else (max(shape[0] // factor, 8), max(shape[1] // factor, 8))
-    exact = spectra.radial_average(_tapered_power(small, spacing, hurst), small, spacing)[1]
-    if factor == 1:
-        return exact
-    window_effect = exact / _ring_power_law(small, spacing, hurst)
-    power = _ring_power_law(shape, spacing, hurst)
-    near = min(power.size, window_effect.size // 2)
-    power[:near] *= window_effect[:near] / window_effect[near - 1]
-    return power
+    rings = ring_curve(surface)
+    rings = rings.part(between(rings.length, window) & (rings.value > 0.0))
+    if not rings.scale.size:
+        return rings
+    octaves = float(np.log2(rings.scale[-1] / rings.scale[0]))
+    number = max(2, round(2.0 * octaves))
+    band = np.log2(rings.scale / rings.scale[0]) * (number / max(octaves, 1e-9))
+    modes = np.where(np.minimum(band.astype(int), number - 1) == np.arange(number)[:, None], rings.count, 0)
+    modes = modes[modes.any(axis=1)]
+    count = modes.sum(axis=1)
+    parts = np.concatenate([modes / count[:, None], np.broadcast_to(rings.scale, modes.shape)], axis=1)
+    power = float(surface.axes) if all(surface.grid.periodic) else 0.0
+    scale = np.exp(parts[:, : rings.scale.size] @ np.log(rings.scale))
+    value = parts[:, : rings.scale.size] @ rings.value
+    return Curve(scale, value, count, parts=parts, power=power, has_wavenumbers=True)
 
 
-def _ring_power_law(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
-    """Return the ring averages of the aliased power law, up to a factor."""
-    y, x = (2.0 * np.pi * np.fft.fftfreq(n) for n in shape)
-    x = x[: shape[1] // 2 + 1]
-    with np.errstate(divide="ignore"):
-        power = spectra.aliased_power_law((y[:, None], x), hurst, images=2)
-    power[0, 0] = 0.0
-    return spectra.radial_average(power, shape, spacing)[1]
+def expected_bands(surface: Surface, curve: Curve, hurst: float) -> Array:
+    """Return the mean power expected in bands, up to a factor.
 
-
-def _tapered_power(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Array:
-    """Return the expected power of the modes of a half-plane."""
-    ratio, lags, weights = spacing[0] / spacing[1], [], []
-    for n in shape:
-        taper = spectra.window_weights(n, "hann")
-        both = np.correlate(taper, taper, "full")
-        # lags 0 ... n - 1, and those n less that have the same phase in every mode
-        lags.append(np.stack([np.arange(n), np.arange(n) - n]).astype(float))
-        weights.append(np.stack([both[n - 1 :], np.append(0.0, both[: n - 1])]))
-    total = np.zeros(shape)
-    for y, of_y in zip(lags[0], weights[0], strict=True):
-        for x, of_x in zip(lags[1], weights[1], strict=True):
-            squares = (y[:, None] * ratio) ** 2 + x**2
-            total -= 0.5 * np.outer(of_y, of_x) * squares**hurst
-    modes = np.fft.rfft2(total).real
-    return np.asarray(np.maximum(modes, 1e-300))
-
-
-def ring_covariance(
-    counts: Array, shape: tuple[int, int], spacing: tuple[float, float], *, is_tapered: bool
-) -> Array:
-    """Return the covariance of the logarithms of all ring averages; `counts` are their numbers of modes.
-
-    Without a window the modes are independent. Under a Hann window those up to two apart are correlated; far
-    rings are so alike that the covariance with their neighbours can be counted as variance.
+    A periodic surface has the power q^-p, p = 2 H plus the number of axes. The spectrum of a free surface is
+    folded by the sampling (`spectra.aliased_power_law`), and seen through the Hann window, whose squared
+    transform has the variance (2 pi / L)^2 / 3 along an axis of length L: to second order it adds half of
+    that times the second derivative.
     """
-    counts = np.maximum(np.asarray(counts, dtype=float), 1.0)
-    if not is_tapered:
-        return np.diag(2.0 / counts)
-    total = (2.0 * sum(_TAPER) - _TAPER[0]) ** 2
-    result = np.diag(2.0 * total / counts)
-    edges = spectra.ring_edges(shape, spacing)
-    rings = min(_EXACT_RINGS, edges.size - 1)
-    lines = []
-    for n, d in zip(shape, spacing, strict=True):
-        step = 2.0 * np.pi / (n * d)
-        reach = int(edges[rings] / step) + 3
-        lines.append(step * np.arange(-reach, reach + 1))
-    radius = np.hypot(lines[0][:, None], lines[1])
-    ring = np.where(radius > 0.0, np.searchsorted(edges, radius, side="right") - 1, -1)
-    held = np.unique(ring[(ring >= 0) & (ring < rings)])  # empty rings have no average
-    number = np.full(edges.size + 1, -1)
-    number[held] = np.arange(held.size)
-    rings = min(held.size, counts.size)
-    ring = number[ring]  # -1 at the mean and beyond
-    inner = ring[2:-2, 2:-2]
-    pairs = np.zeros((held.size**2,))
-    for dy in range(-2, 3):
-        for dx in range(-2, 3):
-            other = ring[2 + dy : ring.shape[0] - 2 + dy, 2 + dx : ring.shape[1] - 2 + dx]
-            both = (inner >= 0) & (other >= 0)
-            index = inner[both] * held.size + other[both]
-            pairs += _TAPER[abs(dy)] * _TAPER[abs(dx)] * np.bincount(index, minlength=pairs.size)
-    exact = 2.0 * pairs.reshape(held.size, held.size)[:rings, :rings]
-    result[:rings, :rings] = exact / np.outer(counts[:rings], counts[:rings])
-    return result
+    assert curve.parts is not None
+    shares, q = np.split(curve.parts, 2, axis=1)
+    q = q[0]
+    if all(surface.grid.periodic):
+        return np.asarray(shares @ q ** (-2.0 * hurst - surface.axes))
+    p = 2.0 * hurst + surface.axes
+    variance = sum((2.0 * np.pi / length) ** 2 / 3.0 for length in surface.grid.extent)
+    if surface.axes == 1:
+        power = spectra.aliased_line_power_law(q * surface.grid.spacing[0], hurst)
+        return np.asarray(shares @ (power * (1.0 + 0.5 * variance * p * (p + 1.0) / q**2)))
+    angle = (np.arange(8) + 0.5) * (np.pi / 16.0)  # the second quarter turn is the same
+    waves = q[:, None] * np.sin(angle), q[:, None] * np.cos(angle)
+    power = spectra.aliased_power_law(waves, hurst, images=2, spacing=surface.spacing).mean(axis=1)
+    return np.asarray(shares @ (power * (1.0 + 0.25 * variance * p * p / q**2)))
+
+
+def band_covariance(surface: Surface, curve: Curve, hurst: float) -> Array | str:
+    """Return the covariance of the logarithms of the mean power in bands.
+
+    The power of an independent mode has a relative variance of 1, and each is counted twice, with its
+    conjugate. Under a Hann window modes 1 and 2 apart along an axis have squared correlations of 4/9 and
+    1/36, so that there are fewer independent ones by a factor of 35/18. Modes on both sides of an edge of a
+    band are correlated, too; counted as variance of the bands this makes standard errors too large, by a
+    tenth at most.
+    """
+    is_periodic = all(surface.grid.periodic)
+    if any(surface.grid.periodic) and not is_periodic:
+        return PERIODIC
+    if not is_periodic and curve.length.max() > 0.25 * min(surface.grid.extent):
+        return "waves longer than a quarter of a free surface are mixed by its window: see `scales`"
+    factor = 1.0 if is_periodic else (35.0 / 18.0) ** surface.axes
+    assert curve.parts is not None
+    shares, q = np.split(curve.parts, 2, axis=1)
+    power = (q[0] / q[0, 0]) ** (-2.0 * hurst - surface.axes)
+    return np.diag(2.0 * factor / curve.count * (shares @ power**2) / (shares @ power) ** 2)

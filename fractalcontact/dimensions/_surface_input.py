@@ -13,7 +13,6 @@ from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._quantisation import quantisation
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Scales = tuple[float, float] | None
@@ -192,18 +191,6 @@ class Surface:
                 apart = np.abs(starts - np.linspace(starts[0], starts[-1], len(starts))).max()
                 share = max(share, (1.0 - len(starts) / (len(lines) - 1)) * float(apart <= 1.0))
         return share
-
-    @property
-    def equal_share(self) -> float:
-        """Share of heights in the middle that equal a neighbour, if most pairs have a value of their own.
-
-        The nearest of other points, or a median, makes them. Rounded or cut heights repeat a few values.
-        """
-        middle = self._middle
-        pairs = [lines[1:][lines[1:] == lines[:-1]] for lines in (middle, middle.T)]
-        equal = np.concatenate(pairs)
-        is_alone = np.unique(equal).size > 0.3 * equal.size and not quantisation(middle)[0]
-        return equal.size / (2.0 * middle.size) if is_alone else 0.0
 
     @property
     def _middle(self) -> Array:

@@ -10,10 +10,10 @@ import xarray as xr
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset, window_slope
+from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._windows import edge_lengths, running_range, window_edges
+from fractalcontact.dimensions._surface_input import Scales, Surface, check_surface
+from fractalcontact.dimensions._windows import edge_lengths, running_range, square_windows
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -97,14 +97,13 @@ def variation(
     >>> fc.dimensions.variation(ramp, [2.0, 5.0], mean="geometric").variation.values.round(9).tolist()
     [1.0, 2.5]
     """
-    surfaces = read_surfaces(surface)
-    edges = None if sizes is None else _edges_of(surfaces[0], np.atleast_1d(np.asarray(sizes, dtype=float)))
-    kind = windows == "squares", mean == "geometric"
-    curves = [variation_curve(single, edges, *kind) for single in surfaces]
-    slopes = [window_slope(curve) for curve in curves]
-    return curve_dataset(
-        surface, surfaces, "window_size", curves, slopes, value="variation", count="pair_count"
-    )
+    lengths = None if sizes is None else np.sort(np.atleast_1d(np.asarray(sizes, dtype=float)))
+
+    def measured(single: Surface) -> Curve:
+        edges = None if lengths is None else _edges_of(single, lengths)
+        return variation_curve(single, None, edges, windows == "squares", mean == "geometric")
+
+    return curve_dataset(surface, measured, "window_size", "variation", count="pair_count")
 
 
 def _edges_of(surface: Surface, sizes: Array) -> Array:
@@ -112,16 +111,20 @@ def _edges_of(surface: Surface, sizes: Array) -> Array:
     edges = np.zeros((sizes.size, 2), dtype=int)
     for axis in range(2 - surface.axes, 2):
         most = surface.shape[axis] - 1
-        edges[:, axis] = np.clip(np.rint(np.sort(sizes) / surface.spacing[axis]), 1, most)
+        edges[:, axis] = np.clip(np.rint(sizes / surface.spacing[axis]), 1, most)
     return np.unique(edges, axis=0)
 
 
 def variation_curve(
-    surface: Surface, edges: Array | None = None, squares: bool = False, geometric: bool = False
+    surface: Surface,
+    window: Scales = None,
+    edges: Array | None = None,
+    squares: bool = False,
+    geometric: bool = False,
 ) -> Curve:
-    """Return the mean range of the heights of one surface."""
+    """Return the mean range of the heights of one surface, by default over segments that double in length."""
     if edges is None:
-        edges = window_edges(surface.shape, surface.spacing)
+        edges = square_windows(surface, window)[0]
     means, numbers = _mean_ranges(surface.heights, edges, squares, geometric)
     return Curve(edge_lengths(surface, edges), means * surface.unit, numbers)
 

@@ -1,8 +1,9 @@
-"""Mean height increments against the lag: variogram, madogram and second variogram."""
+"""Mean height increments against the lag: variogram, madogram and mean square second differences."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,8 @@ _SEPARATE = 4.5  # spacings up to which every distance is a point of the curve
 _NAMES = ("variogram", "madogram", "second_variogram", "lag", "pair_count", *ALWAYS)
 
 
-def _check(problems: Problems, *, surface: Any, max_lag: Any) -> None:
+def _check(problems: Problems, *, surface: Any, increments: Any, max_lag: Any) -> None:
+    problems.choice("increments", increments, ("square", "absolute", "second"))
     is_valid = check_surface(problems, surface, squares=True, reserved=_NAMES)
     if problems.number("max_lag", max_lag, above=0, optional=True) and is_valid and max_lag is not None:
         dims = ("y", "x") if "y" in surface.dims else ("x",)
@@ -43,21 +45,28 @@ def _check(problems: Problems, *, surface: Any, max_lag: Any) -> None:
     in_blocks=True,
     memory=320.0,
 )
-def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
-    """Return the variogram: half the mean square height increment against the lag.
+def variogram(
+    surface: xr.DataArray, *, increments: str = "square", max_lag: float | None = None
+) -> xr.Dataset:
+    """Return the variogram: half the mean square height increment against the lag; or the madogram.
 
     Parameters
     ----------
     surface : DataArray
         Heights in m, dims (..., y, x) or (..., x); NaN where nothing was observed.
+    increments : {"square", "absolute", "second"}
+        "absolute": the madogram, half the mean absolute increment, which outliers change less. "second": the
+        mean square second difference z(s - h) - 2 z(s) + z(s + h), which a tilt does not change, and whose
+        mean converges for every H < 1. Both along rows and columns only.
     max_lag : float, optional
-        Largest lag in m, up to the diagonal. Default: half the shorter extent; four spacings for a surface
-        that is not in memory.
+        Largest lag in m, up to the diagonal. Default: half the shorter extent ("absolute": a quarter,
+        "second": an eighth); four spacings for a surface that is not in memory.
 
     Returns
     -------
     Dataset over `lag` (m)
-        `variogram` (m2), `pair_count` and `local_slope`, which is 2 H for a self-affine surface.
+        `variogram` (m2), `madogram` (m) or `second_variogram` (m2); `pair_count`; and `local_slope`, for a
+        self-affine surface 2 H, H and 2 H.
 
     Raises
     ------
@@ -66,14 +75,16 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
 
     Notes
     -----
-    Pairs of all directions are pooled. Up to 4.5 spacings each distance is a lag of its own; beyond, lags
-    are pooled in rings as wide as the larger spacing. Pairs wrap around periodic axes, where no lag is
-    longer than half the period. Few lags are summed directly in one pass, many by Fourier transforms.
+    Squares: pairs of all directions are pooled. Up to 4.5 spacings each distance is a lag of its own; beyond,
+    lags are pooled in rings as wide as the larger spacing. Few lags are summed directly in one pass, many by
+    Fourier transforms. Along the axes: about five lags per octave. Pairs wrap around periodic axes, where no
+    lag is longer than half the period.
 
     References
     ----------
     Matheron (1963), Economic Geology 58; with transforms and gaps: Marcotte (1996), Computers and
-    Geosciences 22.
+    Geosciences 22; madogram: Gneiting, Sevcikova and Percival (2012), Statistical Science 27; second
+    differences: Chan and Wood (2000), Annals of Statistics 28.
 
     Examples
     --------
@@ -84,110 +95,42 @@ def variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Data
     >>> curve = fc.dimensions.variogram(plane, max_lag=1.0)
     >>> float(curve.variogram[0])
     0.0625
+    >>> fc.dimensions.variogram(plane, increments="absolute", max_lag=1.0).madogram.values
+    array([0.125])
     """
-    return _lag_dataset(surface, max_lag, variogram_curve, "variogram")
-
-
-@public_result(
-    title="Madogram of a surface",
-    references=METHODS["madogram"].references,
-    achieved_error=EXACT_MEAN,
-    check=_check,
-    in_blocks=True,
-)
-def madogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
-    """Return the madogram: half the mean absolute height increment along both axes.
-
-    Parameters
-    ----------
-    surface : DataArray
-        Heights in m, dims (..., y, x) or (..., x); NaN where nothing was observed.
-    max_lag : float, optional
-        Largest lag in m. Default: a quarter of the shorter extent.
-
-    Returns
-    -------
-    Dataset over `lag` (m)
-        `madogram` (m), `pair_count` and `local_slope`, which is H for a self-affine surface. About five
-        lags per octave.
-
-    Raises
-    ------
-    InvalidInput
-        An axis is not uniform, nothing was observed, or the largest lag is below one spacing.
-
-    References
-    ----------
-    Gneiting, Sevcikova and Percival (2012), Statistical Science 27.
-
-    Examples
-    --------
-    >>> import numpy as np, fractalcontact as fc
-    >>> zigzag = fc.surfaces.from_array(np.arange(32.0) % 2, 1.0)
-    >>> fc.dimensions.madogram(zigzag, max_lag=2.0).madogram.values
-    array([0.5, 0. ])
-    """
-    return _lag_dataset(surface, max_lag, madogram_curve, "madogram")
-
-
-@public_result(
-    title="Mean square second differences of a surface",
-    references=METHODS["second_variogram"].references,
-    achieved_error=EXACT_MEAN,
-    check=_check,
-    in_blocks=True,
-)
-def second_variogram(surface: xr.DataArray, *, max_lag: float | None = None) -> xr.Dataset:
-    """Return the mean square second difference of the heights against the lag, along both axes.
-
-    A tilt does not change z(s - h) - 2 z(s) + z(s + h), and its mean square converges for every H < 1,
-    where that of first differences does not.
-
-    Parameters
-    ----------
-    surface : DataArray
-        Heights in m, dims (..., y, x) or (..., x); NaN where nothing was observed.
-    max_lag : float, optional
-        Largest lag h in m. Default: an eighth of the shorter extent.
-
-    Returns
-    -------
-    Dataset over `lag` (m)
-        `second_variogram` (m2), `pair_count` (of triples) and `local_slope`, which is 2 H for a self-affine
-        surface.
-
-    Raises
-    ------
-    InvalidInput
-        An axis is not uniform, nothing was observed, or the largest lag is below one spacing.
-
-    References
-    ----------
-    Chan and Wood (2000), Annals of Statistics 28; Zhu and Stein (2002), J. Agric. Biol. Environ. Stat. 7.
-
-    Examples
-    --------
-    >>> import numpy as np, fractalcontact as fc
-    >>> parabola = fc.surfaces.from_array(np.arange(32.0) ** 2, 1.0)
-    >>> float(fc.dimensions.second_variogram(parabola, max_lag=1.0).second_variogram[0])
-    4.0
-    """
-    return _lag_dataset(surface, max_lag, second_variogram_curve, "second_variogram")
-
-
-def _lag_dataset(
-    surface: xr.DataArray, max_lag: float | None, measure: Callable[..., Curve], name: str
-) -> xr.Dataset:
     surfaces, longest = read_surfaces(surface), None if max_lag is None else float(max_lag)
-    curves = _profile_variograms(surfaces, longest) if measure is variogram_curve else None
+    name, measure = {
+        "square": ("variogram", _square_increments),
+        "absolute": ("madogram", _absolute_increments),
+        "second": ("second_variogram", _second_differences),
+    }[increments]
+    curves = _profile_variograms(surfaces, longest) if increments == "square" else None
     if curves is None:
         curves = [measure(single, longest) for single in surfaces]
-    values = np.stack([curve.value for curve in curves])
-    slopes = list(local_slope(curves[0].scale, values))
-    return curve_dataset(surface, surfaces, "lag", curves, slopes, value=name, count="pair_count")
+    return curve_dataset(
+        surface,
+        curves,
+        "lag",
+        name,
+        count="pair_count",
+        slope=lambda curve: local_slope(curve.scale, curve.value),
+    )
 
 
-def variogram_curve(surface: Surface, longest: float | None = None) -> Curve:
+def variogram_curve(surface: Surface, window: tuple[float, float]) -> Curve:
+    """Return half the mean square increment of one surface over lags in a window.
+
+    Long lags have few independent pairs: points count as lag^-2 in a fit.
+    """
+    return replace(_square_increments(surface, window[1]), power=-2.0)
+
+
+def madogram_curve(surface: Surface, window: tuple[float, float]) -> Curve:
+    """Return half the mean absolute increment of one surface over lags in a window."""
+    return _absolute_increments(surface, window[1])
+
+
+def _square_increments(surface: Surface, longest: float | None) -> Curve:
     """Return half the mean square increment of one surface; `longest` in m."""
     lazy, periodic = surface.is_lazy, surface.periodic
     if longest is None:
@@ -218,7 +161,7 @@ def variogram_curve(surface: Surface, longest: float | None = None) -> Curve:
 def _profile_variograms(surfaces: Sequence[Surface], longest: float | None) -> list[Curve] | None:
     """Return the variograms of complete profiles, all at once; None for others, and for a few lags.
 
-    One line takes some 20 microseconds, a tenth of `variogram_curve`: its lags are those of all lines.
+    One line takes some 20 microseconds, a tenth of `_square_increments`: its lags are those of all lines.
     """
     first = surfaces[0]
     if first.axes == 2 or first.is_lazy:
@@ -251,12 +194,12 @@ def _profile_variograms(surfaces: Sequence[Surface], longest: float | None) -> l
     return curves
 
 
-def madogram_curve(surface: Surface, longest: float | None = None) -> Curve:
+def _absolute_increments(surface: Surface, longest: float | None) -> Curve:
     """Return half the mean absolute increment of one surface; `longest` in m."""
     return _along_axes(surface, longest, ABSOLUTE, 0.5, 0.25)
 
 
-def second_variogram_curve(surface: Surface, longest: float | None = None) -> Curve:
+def _second_differences(surface: Surface, longest: float | None) -> Curve:
     """Return the mean square second difference of one surface; `longest` in m."""
     return _along_axes(surface, longest, SECOND, 1.0, 0.125)
 

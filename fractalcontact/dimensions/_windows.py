@@ -6,41 +6,51 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._surface_input import Surface
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def window_edges(
-    shape: tuple[int, int], spacing: tuple[float, float], *, smallest: float = 1.0, share: float = 0.5
-) -> Array:
+def square_windows(
+    surface: Surface,
+    window: Scales = None,
+    *,
+    smallest: tuple[float, ...] = (1.0,),
+    share: float = 0.5,
+) -> tuple[Array, Array]:
     """Return edges of square windows, doubling from `smallest` coarse spacings to `share` of the surface.
 
     Parameters
     ----------
-    shape : (ny, nx)
-        A profile has ny = 1.
-    spacing : (dy, dx)
+    surface : Surface
+    window : (low, high), optional
+        Leave out edges outside, in m.
+    smallest : tuple of float
+        The edges double from each of these.
 
     Returns
     -------
-    ndarray of int, shape (k, 2)
-        Edges in points along y and x, as nearly square as the grid allows.
+    edges : ndarray of int, shape (k, 2)
+        In points along y (0 for a profile) and x, as nearly square as the grid allows.
+    lengths : ndarray, shape (k,)
+        In m: the geometric mean of those along y and x, which differ on unequal grids.
     """
-    axes = [axis for axis in (0, 1) if shape[axis] > 1]
-    coarse = max(spacing[axis] for axis in axes)
-    largest = share * min((shape[axis] - 1) * spacing[axis] for axis in axes) / coarse
-    if largest < smallest:
-        return np.empty((0, 2), dtype=int)
-    edges = smallest * 2.0 ** np.arange(int(np.log2(largest / smallest) + 1e-9) + 1)
-    points = np.zeros((edges.size, 2), dtype=int)
+    axes = [axis for axis in (0, 1) if surface.shape[axis] > 1]
+    coarse = max(surface.spacing[axis] for axis in axes)
+    largest = share * min((surface.shape[axis] - 1) * surface.spacing[axis] for axis in axes) / coarse
+    numbers = [int(np.log2(largest / first) + 1e-9) + 1 if largest >= first else 0 for first in smallest]
+    edges = [first * 2.0 ** np.arange(number) for first, number in zip(smallest, numbers, strict=True)]
+    sizes = np.sort(np.concatenate(edges))
+    points = np.zeros((sizes.size, 2), dtype=int)
     for axis in axes:
-        points[:, axis] = np.maximum(np.rint(edges * coarse / spacing[axis]), 1)
-    return points
+        points[:, axis] = np.maximum(np.rint(sizes * coarse / surface.spacing[axis]), 1)
+    lengths = edge_lengths(surface, points)
+    inside = between(lengths, window)
+    return points[inside], lengths[inside]
 
 
 def edge_lengths(surface: Surface, edges: Array) -> Array:
-    """Return the edges in m: the geometric mean of those along y and x, which differ on unequal grids."""
+    """Return edges (k, 2) in points as lengths in m."""
     along_x = edges[:, 1] * surface.spacing[1]
     return np.asarray(along_x if surface.axes == 1 else np.sqrt(along_x * edges[:, 0] * surface.spacing[0]))
 

@@ -5,6 +5,7 @@ from ._box_counting import box_dimension as box_dimension
 from ._correlation import correlation_dimension as correlation_dimension
 from ._describe import describe as describe
 from ._evolution import evolution as evolution
+from ._hausdorff_content import hausdorff_content as hausdorff_content
 from ._islands import islands as islands
 from ._lacunarity import lacunarity as lacunarity
 from ._lineage import lineage as lineage
@@ -12,6 +13,7 @@ from ._minkowski import minkowski_dimension as minkowski_dimension
 from ._multifractal import generalised_dimensions as generalised_dimensions
 from ._percolation import percolation as percolation
 from ._read_mask import read_mask as read_mask
+from ._signature import signature as signature
 
 __all__ = [
     "area_dimension",
@@ -22,10 +24,12 @@ __all__ = [
     "describe",
     "evolution",
     "generalised_dimensions",
+    "hausdorff_content",
     "islands",
     "lacunarity",
     "lineage",
     "minkowski_dimension",
     "percolation",
     "read_mask",
+    "signature",
 ]

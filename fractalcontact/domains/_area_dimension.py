@@ -1,4 +1,4 @@
-"""Area dimension: how the area of contact shrinks as the surface is resolved more finely."""
+"""Area dimension: how the area of contact shrinks as the surface is resolved, and which content does not."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.domains._hausdorff_content import SQUARE, shifted_contents
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
@@ -28,6 +29,8 @@ SOURCE = (
     "Borri-Brunetto, Carpinteri and Chiaia, Int. J. Fracture 95:221 (1999); Ciavarella et al., Proc. R. Soc. "
     "A 456:387 (2000); Yastrebov, Anciaux and Molinari, Tribology Int. 114:161 (2017) (correction)"
 )
+EXPONENTS = np.linspace(0.5, 2.0, 61)  # between which that of the stationary content is interpolated linearly
+SHIFTS = 4  # of the grid of squares: four exponents are within .008 of those of 16, with one within .020
 
 
 def _check(problems: Problems, *, masks: Any) -> None:
@@ -59,11 +62,12 @@ def _check_same_extent(problems: Problems, masks: Sequence[xr.DataArray]) -> Non
 
 @public_result(title="Area of a contact domain by resolution", references=SOURCE, check=_check)
 def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) -> xr.Dataset:
-    """Dimension of a contact domain from its area at several resolutions, A ~ s^(2 - D).
+    """Dimension of a contact domain over refinements of the surface: A ~ s^(2 - D), and Hausdorff content.
 
     The masks are solutions of the same contact, each on a surface resolved to another spacing s. This is not
     the box dimension of one mask, which has a single resolution. For elastic contact of self-affine surfaces
-    theory gives 1 + H, at any load.
+    theory gives 1 + H, at any load. The exponent at which the Hausdorff content neither falls nor grows with
+    the resolution is the other end of a bracket of the dimension, from below.
 
     Parameters
     ----------
@@ -80,7 +84,9 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
         Over the leading dims: `area_dimension`, with `ci_low` and `ci_high`, two standard deviations of the
         local slopes to either side (NaN for two resolutions). Over `resolution` (m; the side of a square with
         the area of a cell) too: `contact_fraction`, `corrected_contact_fraction`, and `local_slope`,
-        2 - d ln A / d ln s. NaN where a mask is empty.
+        2 - d ln A / d ln s; `stationary_exponent`, the largest up to which the content (`hausdorff_content`,
+        up to squares of the extent) does not fall with the resolution. NaN where a mask is empty; the
+        exponent also where cells are not square or spacings are not in the ratio of powers of 2.
 
     Raises
     ------
@@ -119,6 +125,7 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
         "contact_fraction": planes.variable(counted, "resolution"),
         "corrected_contact_fraction": planes.variable(improved, "resolution"),
         "local_slope": planes.variable(2.0 - local_slope(resolution, used), "resolution"),
+        "stationary_exponent": planes.variable(stationary_exponents(stacks)),
     }
     coords = {"resolution": ("resolution", resolution)}
     return build_dataset(planes, variables, coords, notes=_notes(slope))
@@ -129,6 +136,39 @@ def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
     cells = float(np.prod(planes.grid.shape))
     sides = contact_edges(planes.cells, planes.grid.periodic).sum(-1)
     return planes.occupied / cells, (planes.occupied - EXCESS_PER_SIDE * sides) / cells
+
+
+def stationary_exponents(stacks: Sequence[Planes]) -> Array:
+    """Return for each plane the largest exponent up to which its content does not fall with the resolution.
+
+    `stacks` are the same domains on finer to coarser grids. At the exponent 2 the content is the area.
+    """
+    sides = np.array([planes.side for planes in stacks])
+    doublings = np.log2(sides / sides[0])
+    are_square = all(abs(dy - dx) <= SQUARE * dx for dy, dx in (planes.grid.spacing for planes in stacks))
+    if not are_square or np.abs(doublings - np.rint(doublings)).max() > SQUARE:
+        return np.full(stacks[0].count, np.nan)
+    levels = int(np.ceil(np.log2(max(stacks[0].grid.shape))))
+    contents = [
+        shifted_contents(planes, EXPONENTS, levels - int(doubling), SHIFTS).mean(1) * planes.side**EXPONENTS
+        for planes, doubling in zip(stacks, np.rint(doublings), strict=True)
+    ]
+    with np.errstate(divide="ignore"):
+        logs = np.log(np.stack(contents, axis=-1))
+    slopes = fit_line(np.log(sides / sides[0]), np.where(np.isfinite(logs), logs, np.nan))[0]
+    return np.array([_last_root(slope) for slope in slopes])
+
+
+def _last_root(slope: Array) -> float:
+    """Return the exponent above which the slope of the content over the spacing is positive."""
+    below = np.flatnonzero(slope <= 0.0)
+    if np.isnan(slope).any() or not below.size:
+        return float("nan")
+    k = int(below[-1])
+    if k == slope.size - 1:
+        return float(EXPONENTS[-1])
+    share = -slope[k] / (slope[k + 1] - slope[k])
+    return float(EXPONENTS[k] + share * (EXPONENTS[k + 1] - EXPONENTS[k]))
 
 
 def _notes(slope: Array) -> dict[str, dict[str, Any]]:

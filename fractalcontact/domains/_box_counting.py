@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _random_null
 from fractalcontact.domains._box_covers import COVERS, Curve, cover_curve
+from fractalcontact.domains._connected_components import label_planes
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
     build_dataset,
     check_box_sizes,
     check_mask,
+    check_window,
     mask_sides,
     read_box_sizes,
     read_planes,
@@ -43,29 +46,30 @@ from fractalcontact.domains._scaling_fit import (
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
 COVER_DIFFERENCE = 0.02  # of the dimensions of two covers, up to which it widens the interval as it is
 BETWEEN_CLUSTERS = 0.06  # of the dimension in a chosen window, which no scatter within one cluster shows
+SATURATED = 0.5  # share of the boxes from which on gaps between islands are bridged
 NO_POWER_LAW = 0.15  # range of the local slopes in a window from which on there is no power law
 MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in the deviation of the null
 
 
-def _check_box_dimension(
-    problems: Problems, *, mask: Any, scales: Any, cover: Any, periodic: Any, valid: Any
-) -> None:
-    _check_boxes(problems, mask, "scales", scales, cover, periodic, valid)
+def _check_box_dimension(problems: Problems, *, window: Any, **arguments: Any) -> None:
+    _check_box_counts(problems, **arguments)
+    if window is None or (isinstance(window, str) and window == "each"):
+        return
+    is_alone = arguments["box_sizes"] is None
+    problems.require(is_alone, "window", "None beside `box_sizes`", window)
+    if isinstance(window, str):
+        problems.choice("window", window, ("each",))
+    else:
+        has_mask = not any(message.startswith(("mask", "valid")) for message in problems.messages)
+        check_window(problems, window, arguments["mask"] if has_mask else None)
 
 
 def _check_box_counts(
-    problems: Problems, *, mask: Any, sizes: Any, cover: Any, periodic: Any, valid: Any
-) -> None:
-    _check_boxes(problems, mask, "sizes", sizes, cover, periodic, valid)
-
-
-def _check_boxes(
-    problems: Problems, mask: Any, argument: str, sizes: Any, cover: Any, periodic: Any, valid: Any
+    problems: Problems, *, mask: Any, box_sizes: Any, cover: Any, periodic: Any, valid: Any
 ) -> None:
     problems.choice("cover", cover, COVERS)
     check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
-    shape = mask_sides(mask)
-    check_box_sizes(problems, argument, sizes, _longest_box(shape, cover))
+    check_box_sizes(problems, "box_sizes", box_sizes, _longest_box(mask_sides(mask), cover))
 
 
 def _longest_box(shape: Sequence[int], cover: Any) -> int:
@@ -77,7 +81,8 @@ def _longest_box(shape: Sequence[int], cover: Any) -> int:
 def box_dimension(
     mask: xr.DataArray,
     *,
-    scales: Any = None,
+    box_sizes: Any = None,
+    window: Any = None,
     cover: str = "minimum",
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
@@ -88,12 +93,15 @@ def box_dimension(
     ----------
     mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
-    scales : sequence of int, optional
+    box_sizes : sequence of int, optional
         Edges of the boxes in cells, for a least-squares slope of ln N over ln s. By default the sizes are
-        products of 2 and 3 up to a quarter of the shorter side (at least to 9), of which each plane uses
-        those to the geometric mean of the cell and the extent, or a window of longer boxes in which its
-        local slopes are steadier by far. The dimension is then the mean local slope over the
-        ratio of sizes, 2 or 3, at which it varies least.
+        products of 2 and 3 up to a quarter of the shorter side (at least to 9), and the dimension is the
+        mean local slope over the ratio of sizes, 2 or 3, at which it varies least.
+    window : None, "each" or (low, high)
+        Which of the default sizes are used. None: one window for all planes, from the cell to the geometric
+        mean of the cell and the extent, or of longer boxes where the local slopes are steadier by far;
+        "each": a window of its own for each plane; (low, high): nine sizes between two lengths in metres, for
+        a least-squares slope. A window chosen for islands ends where half of the boxes meet them.
     cover : {"minimum", "mean", "aligned"}
         The fewest boxes over all offsets of the grid, their mean over all offsets, or the boxes of the one
         grid that starts at the first cell. The default fit combines the first two.
@@ -105,7 +113,9 @@ def box_dimension(
     Returns
     -------
     Dataset
-        Over the leading dims: `box_dimension`, `ci_low`, `ci_high`; `scale_min`, `scale_max` (cells);
+        Over the leading dims: `box_dimension`, `ci_low`, `ci_high`; the window, `scale_min`, `scale_max`
+        (cells), `window_low`, `window_high` (m); `is_saturated`, where more than half of its largest boxes
+        meet a set of islands: the dimension then tells little but the coverage;
         `coverage`; `null_dimension` and `null_spread` of the random null of equal coverage;
         `differs_from_random`; `follows_power_law`, False where the local slopes of the window differ by
         more than 0.15. Over `box_size` (cells; `box_length` in m) too: `box_count`, of whole boxes;
@@ -114,14 +124,14 @@ def box_dimension(
     Raises
     ------
     InvalidInput
-        The mask, a scale, `cover`, `periodic` or `valid` is not as described.
+        The mask, a size, `window`, `cover`, `periodic` or `valid` is not as described.
 
     Notes
     -----
-    0 for one cell, 1 for a row or column that spans the mask, 2 for a full mask (1 of a profile); NaN for an
-    empty one, with the reason in `comment`. Over the full range of scales the counts of any set measure
-    little but its coverage: compare with the null. Fit and interval: see the documentation,
-    "Theory: contact domains".
+    Along a path of load or shear use `signature`. 0 for one cell, 1 for a row or column that spans the mask,
+    2 for a full mask (1 of a profile); NaN for an empty one, with the reason in `comment`. Over the full
+    range of scales the counts of any set measure little but its coverage: compare with the null. Fit and
+    interval: see the documentation, "Theory: contact domains".
 
     Examples
     --------
@@ -130,17 +140,18 @@ def box_dimension(
     >>> for _ in range(6):
     ...     gasket = np.kron([[1, 0], [1, 1]], gasket)
     >>> mask = xr.DataArray(gasket, dims=("y", "x"))
-    >>> result = fc.domains.box_dimension(mask, scales=[1, 2, 4, 8, 16])
+    >>> result = fc.domains.box_dimension(mask, box_sizes=[1, 2, 4, 8, 16])
     >>> round(float(result.box_dimension), 4)  # ln 3 / ln 2
     1.585
     """
-    return analyse(read_planes(mask, valid=valid, periodic=periodic), scales=scales, cover=cover)
+    planes = read_planes(mask, valid=valid, periodic=periodic)
+    return analyse(planes, box_sizes=box_sizes, window=window, cover=cover)
 
 
 @public_result(title="Box counts", references=SOURCE, achieved_error="exact", check=_check_box_counts)
 def box_counts(
     mask: xr.DataArray,
-    sizes: Any = None,
+    box_sizes: Any = None,
     *,
     cover: str = "mean",
     periodic: bool | None = None,
@@ -152,7 +163,7 @@ def box_counts(
     ----------
     mask, cover, periodic, valid
         See `box_dimension`.
-    sizes : sequence of int, optional
+    box_sizes : sequence of int, optional
         Edges of the boxes in cells; by default all from 1 to half the shorter side. With the cover "mean"
         all sizes together cost about as much as one.
 
@@ -176,33 +187,47 @@ def box_counts(
     """
     planes = read_planes(mask, valid=valid, periodic=periodic)
     every = np.arange(1, max(1, min(planes.sides) // 2) + 1)
-    box_sizes = read_box_sizes(sizes, every)
-    curve = cover_curve(planes, box_sizes, cover)
+    sizes = read_box_sizes(box_sizes, every)
+    curve = cover_curve(planes, sizes, cover)
     variables = {
         "box_count": planes.variable(curve.count, "box_size"),
         "box_measure": planes.variable(curve.measure, "box_size"),
-        "local_slope": planes.variable(0.0 - local_slope(box_sizes, curve.measure), "box_size"),
+        "local_slope": planes.variable(0.0 - local_slope(sizes, curve.measure), "box_size"),
     }
-    return build_dataset(planes, variables, _size_coords(box_sizes, planes))
+    return build_dataset(planes, variables, _size_coords(sizes, planes))
 
 
-def analyse(planes: Planes, *, scales: Any = None, cover: str = "minimum") -> xr.Dataset:
+def analyse(
+    planes: Planes, *, box_sizes: Any = None, window: Any = None, cover: str = "minimum"
+) -> xr.Dataset:
     """Return the result of `box_dimension` for planes, without labels."""
     shape = planes.sides
     default = longer_sizes(shape)
-    sizes = read_box_sizes(scales, default[default <= _longest_box(shape, cover)])
-    by_regression = scales is not None
+    if window is not None and not isinstance(window, str):
+        low, high = float_array(window) / planes.side
+        box_sizes = np.unique(np.rint(np.geomspace(low, high, 9)).clip(1, _longest_box(shape, cover)))
+    sizes = read_box_sizes(box_sizes, default[default <= _longest_box(shape, cover)])
+    by_regression = box_sizes is not None
     curve = cover_curve(planes, sizes, cover)
-    fits = _fit(planes, sizes, curve, cover, by_regression=by_regression)
+    limits = _unsaturated_counts(planes, sizes, curve)
+    fits = _fit(
+        planes, sizes, curve, cover, limits, by_regression=by_regression, one_for_all=window != "each"
+    )
     dimension, half_width = (
         np.array([getattr(fit, name) for fit in fits]) for name in ("value", "half_width")
     )
     windows = [fit.window for fit in fits]
     null = _null(planes, sizes, windows, by_regression=by_regression)
     steady = np.array([fit.slope_range <= NO_POWER_LAW for fit in fits])  # False for NaN
+    ends = np.array([sizes[window][[0, -1]] for window in windows]) * planes.side
+    ends = np.where(np.isfinite(dimension)[:, None], ends, np.nan)
+    stops = np.array([window.stop for window in windows])
     variables = {
         **dimension_variables(planes, "box_dimension", dimension, half_width, sizes, windows),
         "coverage": planes.variable(planes.coverage),
+        "window_low": planes.variable(ends[:, 0]),
+        "window_high": planes.variable(ends[:, 1]),
+        "is_saturated": planes.variable(stops > limits),
         "follows_power_law": planes.variable(steady),
         **{name: planes.variable(values) for name, values in null.items() if name != "null_count"},
         "box_count": planes.variable(curve.count, "box_size"),
@@ -236,7 +261,30 @@ class WindowFit:
         return self.slope_high - self.slope_low
 
 
-def _fit(planes: Planes, sizes: Array, curve: Curve, cover: str, *, by_regression: bool) -> list[WindowFit]:
+def _unsaturated_counts(planes: Planes, sizes: Array, curve: Curve) -> Array:
+    """Return for each plane how many of the sizes, from the smallest, leave half of the boxes or more empty.
+
+    Beyond that any set of islands has boxes of slope 2, which scatter least of all. A set of which one island
+    holds most of the cells, as a cluster or a carpet, has no gaps between islands, and no limit.
+    """
+    # the area of a box of a profile is that of a square on it
+    length = sizes.astype(float) if planes.rank == 1 else np.ones(sizes.size)
+    share = curve.area / (np.maximum(planes.observed, 1)[:, None] * length)
+    largest = np.array([plane.sizes.max(initial=0) for plane in label_planes(planes, 2, keep=False)])
+    count = np.logical_and.accumulate(share < SATURATED, axis=-1).sum(-1)
+    return np.asarray(np.where(2 * largest > planes.occupied, sizes.size, count))
+
+
+def _fit(
+    planes: Planes,
+    sizes: Array,
+    curve: Curve,
+    cover: str,
+    limits: Array,
+    *,
+    by_regression: bool,
+    one_for_all: bool,
+) -> list[WindowFit]:
     """Return the dimension, its interval and its window of sizes for every plane."""
     if by_regression:
         regressions = [fit_regression(sizes, measure) for measure in curve.measure]
@@ -248,10 +296,17 @@ def _fit(planes: Planes, sizes: Array, curve: Curve, cover: str, *, by_regressio
         if cover != "aligned" and 2 * sizes.max() <= min(planes.sides):
             other = cover_curve(planes, sizes, "mean" if cover == "minimum" else "minimum")
         steady, mean = (other, curve) if cover == "mean" else (curve, other)
-        pairs, windows = [], []
-        for cells, area, mean_area in zip(planes.cells, steady.area, mean.area, strict=True):
-            window = steadiest_window(sizes, area, _longest_edge(cells) / 4.0, planes.sides)
-            windows.append(window)
+        quarters = np.array([_longest_edge(cells) / 4.0 for cells in planes.cells])
+        groups = [np.flatnonzero(planes.occupied > 0)] if one_for_all else [[k] for k in range(planes.count)]
+        windows = [slice(0, sizes.size)] * planes.count
+        for group in groups:
+            if len(group):
+                window = steadiest_window(
+                    sizes, steady.area[group], quarters[group].min(), planes.sides, limits[group].min()
+                )
+                windows = [window if k in group else other for k, other in enumerate(windows)]
+        pairs = []
+        for window, area, mean_area in zip(windows, steady.area, mean.area, strict=True):
             if cover == "aligned":
                 fit = fit_steady_ratio(sizes[window], area[window])
                 half_width = deviations_of_95_percent(sizes[window]) * fit.spread

@@ -26,6 +26,7 @@ INT64_MAX = np.iinfo(np.int64).max
 
 PLAIN_COLUMNS = ("cells", "area")
 PROFILE_COLUMNS = ("cells", "length", "centroid_x", "x_min", "x_max")
+SHAPE_COLUMNS = ("orientation", "eccentricity", "gyration_radius", "solidity")
 COLUMNS = (*PLAIN_COLUMNS, "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
 
 
@@ -230,8 +231,11 @@ def component_table(
     for name in ("area", "length"):  # that of a cell of a profile is its length
         if name in columns:
             table[name] = size * grid.cell_area
+    shape = {name for name in columns if name in SHAPE_COLUMNS}
+    if shape:
+        table |= _shapes(components, grid, with_hull="solidity" in shape)
     if components.details is None:
-        return table
+        return {name: table[name] for name in columns}
     dy, dx = grid.spacing
     sides = components.details.sides
     table["perimeter"] = components.reduce(sides[:, 0]) * dx + components.reduce(sides[:, 1]) * dy
@@ -262,6 +266,64 @@ def _positions(
         f"{name}_min": first + np.where(wraps, 0, low - turn) * spacing,
         f"{name}_max": first + np.where(wraps, n, high - turn) * spacing,
     }
+
+
+def _shapes(components: Components, grid: Grid, *, with_hull: bool) -> dict[str, Array]:
+    """Return the columns of the shape of every island; NaN where it wraps around a period.
+
+    The ellipse of equal second moments and the hull are those of skimage.measure.regionprops.
+    """
+    parts, count = components.parts, components.count
+    assert parts is not None
+    cells = np.nonzero(parts)
+    part = parts[cells]
+    island = components.number(np.arange(components.cells.size + 1))[part] - 1
+    places = [
+        (cells[axis] + components.part_shift(axis)[part - 1] * grid.shape[axis]) * grid.spacing[axis]
+        for axis in (0, 1)
+    ]
+    size = np.maximum(np.bincount(island, minlength=count), 1)
+    centred = [each - (np.bincount(island, each, count) / size)[island] for each in places]
+    yy, yx, xx = (
+        np.bincount(island, a * b, count) / size
+        for a, b in ((centred[0], centred[0]), (centred[0], centred[1]), (centred[1], centred[1]))
+    )
+    spread = np.hypot((yy - xx) / 2.0, yx)
+    long, short = (yy + xx) / 2.0 + spread, np.maximum((yy + xx) / 2.0 - spread, 0.0)
+    is_equal = np.isclose(yy, xx, rtol=1e-12, atol=0.0)  # rounding: skimage compares exactly
+    angle = np.where(is_equal, np.where(yx > 0, 45.0, -45.0), np.rad2deg(0.5 * np.arctan2(2.0 * yx, yy - xx)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        eccentricity = np.where(long > 0, np.sqrt(1.0 - short / long), 0.0)
+    shapes = {
+        "orientation": angle,
+        "eccentricity": eccentricity,
+        "gyration_radius": np.sqrt(yy + xx),
+    }
+    if with_hull:
+        shapes["solidity"] = _solidity(island, places, grid, count)
+    wraps = components.wraps_by_island.any(1)
+    return {name: np.where(wraps, np.nan, values) for name, values in shapes.items()}
+
+
+def _solidity(island: Array, places: Sequence[Array], grid: Grid, count: int) -> Array:
+    """Return the cells of every island over those of its convex hull."""
+    from skimage.morphology import convex_hull_image
+
+    order = np.argsort(island, kind="stable")
+    rows, columns = (
+        np.rint(each[order] / spacing).astype(np.int64)
+        for each, spacing in zip(places, grid.spacing, strict=True)
+    )
+    ends = np.cumsum(np.bincount(island, minlength=count))
+    solidity = np.ones(count)
+    for k in range(count):
+        here = slice(ends[k - 1] if k else 0, ends[k])
+        y, x = rows[here] - rows[here].min(), columns[here] - columns[here].min()
+        image = np.zeros((y.max() + 1, x.max() + 1), bool)
+        image[y, x] = True
+        if min(image.shape) > 1:  # the hull of a row or a column is full
+            solidity[k] = y.size / np.count_nonzero(convex_hull_image(image))
+    return solidity
 
 
 def euler_number(cells: Array, connectivity: int, periodic: Sequence[bool]) -> int:

@@ -31,17 +31,17 @@ SOURCE = (
 )
 
 
-def _check(problems: Problems, *, mask: Any, scales: Any, periodic: Any, valid: Any) -> None:
+def _check(problems: Problems, *, mask: Any, box_sizes: Any, periodic: Any, valid: Any) -> None:
     check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
     shape = mask_sides(mask)
-    check_box_sizes(problems, "scales", scales, min(shape))
+    check_box_sizes(problems, "box_sizes", box_sizes, min(shape))
 
 
 @public_result(title="Correlation dimension", references=SOURCE, check=_check)
 def correlation_dimension(
     mask: xr.DataArray,
     *,
-    scales: Any = None,
+    box_sizes: Any = None,
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
@@ -56,7 +56,7 @@ def correlation_dimension(
     ----------
     mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
-    scales : sequence of int, optional
+    box_sizes : sequence of int, optional
         Edges of the squares in cells; by default the default sizes of `box_dimension`. A cell on the outline
         of a square of an even number of cells counts by its part inside.
     periodic : bool, optional
@@ -75,7 +75,7 @@ def correlation_dimension(
     Raises
     ------
     InvalidInput
-        The mask, a scale, `periodic` or `valid` is not as described.
+        The mask, a size, `periodic` or `valid` is not as described.
 
     Notes
     -----
@@ -90,12 +90,12 @@ def correlation_dimension(
     >>> round(float(fc.domains.correlation_dimension(mask).correlation_dimension), 6)  # a line
     1.0
     """
-    return analyse(read_planes(mask, valid=valid, periodic=periodic), scales=scales)
+    return analyse(read_planes(mask, valid=valid, periodic=periodic), box_sizes=box_sizes)
 
 
-def analyse(planes: Planes, *, scales: Any = None) -> xr.Dataset:
+def analyse(planes: Planes, *, box_sizes: Any = None) -> xr.Dataset:
     """Return the result of `correlation_dimension` for planes, without labels."""
-    sizes = read_box_sizes(scales, default_sizes(planes.sides))
+    sizes = read_box_sizes(box_sizes, default_sizes(planes.sides))
     # one plane at a time: the transform uses the threads
     mass = np.array([mean_mass(planes, k, sizes) for k in range(planes.count)])
     numbers = zip(planes.occupied, planes.observed, strict=True)
@@ -123,23 +123,59 @@ def mean_mass(planes: Planes, plane: int, sizes: Array) -> Array:
     pair on the outline of a square of an even number of cells counts half. NaN for an empty plane. Pairs of
     a profile have no distance along y.
     """
-    cells, valid = planes.cells[plane], planes.valid_of(plane)
-    mass = int(np.count_nonzero(cells))
+    mass = int(planes.occupied[plane])
     if mass == 0:
         return np.full(sizes.size, np.nan)
     reach = int(sizes.max()) // 2
     reaches = (reach if planes.rank == 2 else 0, reach)
-    observed = np.ones_like(cells) if valid is None else valid
-    pairs, observed_pairs = (_count_pairs(each, planes.grid, reaches) for each in (cells, observed))
+    pairs, observed_pairs = pairs_and_observed(planes, plane, reaches)
     share = np.where(observed_pairs > 0, pairs / np.maximum(observed_pairs, 1.0), 0.0)
-    share = share * (np.count_nonzero(observed) / mass)
+    share = share * (planes.observed[plane] / mass)
     along_y, along_x = (
         np.clip((sizes[:, None] + 1) / 2.0 - np.abs(np.arange(-r, r + 1)), 0.0, 1.0) for r in reaches
     )
     return np.asarray(np.einsum("si,ij,sj->s", along_y, share, along_x))
 
 
-def _count_pairs(plane: Array, grid: Grid, reaches: Sequence[int]) -> Array:
+def pairs_and_observed(planes: Planes, plane: int, reaches: Sequence[int]) -> tuple[Array, Array]:
+    """Return how many pairs of cells of the set, and of observed cells, there are at each distance."""
+    cells, valid = planes.cells[plane], planes.valid_of(plane)
+    pairs = count_pairs(cells, planes.grid, reaches)
+    if valid is not None:
+        return pairs, count_pairs(valid, planes.grid, reaches)
+    along = [
+        np.full(2 * reach + 1, float(n)) if wraps else n - np.abs(np.arange(-reach, reach + 1.0))
+        for n, wraps, reach in zip(cells.shape, planes.grid.periodic, reaches, strict=True)
+    ]
+    return pairs, np.multiply.outer(*along)
+
+
+def pair_correlation_length(planes: Planes, plane: int) -> float:
+    """Return the distance (m) up to which the pair correlation g(r) stays above 2; NaN if it never does.
+
+    g(r) is the share of pairs of observed cells at the distance r that are both in the set, over the square
+    of the coverage, averaged over all directions. It is searched up to a quarter of the extent.
+    """
+    grid = planes.grid
+    side = float(np.sqrt(grid.cell_area))
+    reaches = [int(min(grid.extent) / 4.0 / spacing) for spacing in grid.spacing]
+    pairs, observed = pairs_and_observed(planes, plane, reaches)
+    y, x = (
+        np.arange(-reach, reach + 1) * spacing for reach, spacing in zip(reaches, grid.spacing, strict=True)
+    )
+    ring = np.rint(np.hypot(y[:, None], x) / side).astype(np.int64).ravel()
+    ring_pairs, ring_observed = (np.bincount(ring, values.ravel()) for values in (pairs, observed))
+    longest = int(min(grid.extent) / 4.0 / side)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        g = (ring_pairs / ring_observed)[: longest + 1] / planes.coverage[plane] ** 2
+    below = np.flatnonzero(g[1:] < 2.0) + 1
+    if not below.size or not g[0] >= 2.0:
+        return float("nan")
+    r = int(below[0])
+    return side * (r - 1 + float((g[r - 1] - 2.0) / (g[r - 1] - g[r])))
+
+
+def count_pairs(plane: Array, grid: Grid, reaches: Sequence[int]) -> Array:
     """Count pairs of cells up to `reaches` apart along y and x; 2 reach + 1 distances along each."""
     shape = [
         n if wraps else fft.fast_length(n + reach)

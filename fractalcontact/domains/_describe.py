@@ -12,6 +12,7 @@ from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.missing_numbers import REASONS
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import NOTES
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import (
     _boundary,
@@ -21,6 +22,7 @@ from fractalcontact.domains import (
     _lacunarity,
     _minkowski,
     _percolation,
+    _signature,
 )
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
@@ -33,10 +35,11 @@ ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
     "lacunarity": _lacunarity.analyse,
 }
 MEASURES = ("islands", "percolation", *ANALYSES)
-MEASURES_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension", "lacunarity")
-NOT_COLLECTED = ("scale_min", "scale_max", "run_time")
+DESCRIBED = ("islands", "percolation", *(name for name in ANALYSES if name != "lacunarity"))  # a curve alone
+DESCRIBED_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension")
+NOT_COLLECTED = ("scale_min", "scale_max", "run_time", "integral_range")
+CURVES = ("box_size", "radius", "side")  # the dims of curves, which `describe` leaves out
 OTHER_SIZES = "NaN at sizes of boxes that only the other measures have"
-LACUNARITY_BOX = 8  # cells; the size at which `describe` quotes the lacunarity
 
 _SOURCES = {
     "islands": _islands.SOURCE,
@@ -91,10 +94,9 @@ def describe(
         `islands`); `largest_share` and, over `axis`, `percolates` (see `percolation`); `box_dimension`,
         `null_dimension`, `null_spread`, `differs_from_random` (see `box_dimension`); `minkowski_dimension`,
         `correlation_dimension`, `boundary_dimension`; each dimension with its interval (`_low`, `_high`);
-        `minkowski_null_dimension`, `correlation_null_dimension` of the random null; `boundary_sides`;
-        `lacunarity` and `null_lacunarity` at the `box_size` of 8 cells, or of the shorter side if that is
-        less; `lacunarity_slope`, `lacunarity_area` and those of the null (see `lacunarity`). Of a profile,
-        what is defined on a line: islands by length, box and correlation dimension, lacunarity.
+        `minkowski_null_dimension`, `correlation_null_dimension` of the random null; `boundary_sides`; and
+        the numbers of `signature`, also over `scale`. Of a profile, what is defined on a line: islands by
+        length, box and correlation dimension.
 
     Raises
     ------
@@ -111,17 +113,16 @@ def describe(
     """
     planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
-    wanted = MEASURES if planes.rank == 2 else MEASURES_OF_PROFILES
+    wanted = DESCRIBED if planes.rank == 2 else DESCRIBED_OF_PROFILES
     measurements = measure_planes(planes, wanted, components, connectivity)
-    size = min(LACUNARITY_BOX, *planes.sides)
-    at_size = _lacunarity.analyse(planes, [size]).isel(box_size=0)
-    variables: dict[str, Any] = {
-        **measurements.scalars(),
-        **{name: measurements.variables[name] for name in ("percolates",) if planes.rank == 2},
-        **{name: (planes.dims, at_size[name].values) for name in ("lacunarity", "null_lacunarity")},
+    if planes.rank == 2:
+        measurements.add_dataset(_signature.analyse(planes, components))
+    variables = {
+        name: variable
+        for name, variable in measurements.variables.items()
+        if not set(variable[0]) & set(CURVES)
     }
-    coords = {name: values for name, values in measurements.coords.items() if name == "axis"}
-    coords["box_size"] = ((), np.int64(size))
+    coords = {name: values for name, values in measurements.coords.items() if name in ("axis", "scale")}
     notes = {name: note for name, note in measurements.notes.items() if name in variables}
     return build_dataset(planes, variables, coords, notes=notes)
 
@@ -135,11 +136,16 @@ class Measurements:
         self.coords: dict[str, Any] = {}
         self.notes: dict[str, dict[str, str]] = {}
 
-    def scalars(self) -> dict[str, Variable]:
-        """Return the variables that have one value for each plane."""
-        return {
-            name: variable for name, variable in self.variables.items() if variable[0] == self.planes.dims
-        }
+    def add_dataset(self, dataset: xr.Dataset) -> None:
+        """Add the variables of a result that has names of its own."""
+        for name, variable in dataset.variables.items():
+            if name in dataset.coords and name not in self.planes.coords:
+                self.coords[str(name)] = variable
+            elif name not in dataset.coords and name != "run_time":
+                self.variables[str(name)] = tuple(map(str, variable.dims)), variable.values
+                notes = {key: variable.attrs[key] for key in NOTES if key in variable.attrs}
+                if notes:
+                    self.notes[str(name)] = notes
 
 
 def measure_planes(
@@ -150,8 +156,8 @@ def measure_planes(
     if "islands" in wanted:
         values = _islands.island_scalars(components, planes, connectivity)
         if planes.rank == 2:
-            spacing = planes.grid.spacing if planes.grid.has_coordinates else (np.nan, np.nan)
-            perimeter = contact_edges(planes.cells, planes.grid.periodic) @ np.array([spacing[1], spacing[0]])
+            sides = np.array(planes.grid.spacing[::-1])
+            perimeter = contact_edges(planes.cells, planes.grid.periodic) @ sides
             values = {"total_perimeter": perimeter, **values}
         result.variables.update({name: planes.variable(array) for name, array in values.items()})
     if "percolation" in wanted:

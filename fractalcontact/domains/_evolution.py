@@ -1,4 +1,4 @@
-"""Evolution of a set along a path of load or shear: every measure of each plane, and the changes between."""
+"""Evolution of a set along a path of load or shear: the signature of each state, and the changes between."""
 
 from __future__ import annotations
 
@@ -14,147 +14,184 @@ from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.domains import _signature
 from fractalcontact.domains._connected_components import Components, label_planes
 from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes, sources
-from fractalcontact.domains._lineage import check_path, island_overlaps
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
+from fractalcontact.domains._lineage import Path, check_path
+from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_window, read_planes
 
-SOURCE = "Hausdorff, Mengenlehre (1927)"  # of the changes
-CHANGES = "changes"
-WORDS = (CHANGES, *MEASURES)
-NEED_ISLANDS = (CHANGES, "islands", "percolation")
+SOURCE = joined_references(_signature.SOURCE, "Hausdorff, Mengenlehre (1927)")
 LOADS = ("normal_force", "nominal_pressure", "closure")
-CHANGE_NAMES = ("births", "deaths", "merges", "splits", "overlap", "hausdorff_distance")
+EVENTS = ("births", "deaths", "merges", "splits", "absorbed", "fragments")
+CHANGES = (*EVENTS, "overlap", "chance_overlap", "overlap_beyond_chance", "hausdorff_distance")
 RETURN_NAMES = ("return_step", "hysteresis", "coverage_change")
-SAME_LOAD = 1e-6  # of the largest load
+SAME_LOAD = 1e-6  # of the largest load: rounding of a path that comes back
 
 
-def _check(problems: Problems, *, mask: Any, want: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
-    if want is not None:
-        problems.choices("want", want, WORDS)
-    check_path(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
+def _check(
+    problems: Problems,
+    *,
+    mask: Any,
+    include: Any,
+    along: Any,
+    window: Any,
+    frame: Any,
+    connectivity: Any,
+    periodic: Any,
+    valid: Any,
+) -> None:
+    problems.choices("include", include, MEASURES)
+    count = len(problems.messages)
+    check_path(
+        problems,
+        mask=mask,
+        along=along,
+        frame=frame,
+        connectivity=connectivity,
+        periodic=periodic,
+        valid=valid,
+    )
+    check_window(problems, window, mask if len(problems.messages) == count else None)
 
 
 @public_result(title="Evolution of a set", check=_check)
 def evolution(
     mask: xr.DataArray,
     *,
-    want: Sequence[str] | None = None,
+    include: Sequence[str] = (),
+    along: str | None = None,
+    window: Any = None,
+    frame: str = "upper",
     connectivity: int = 1,
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
-    """How a set changes along a path: all measures of each plane, and the changes between planes.
+    """How a contact domain changes along a path: the signature of each state, and the changes between states.
 
-    Every plane is compared with the one before it along the last leading dim (the steps of a load path, a
-    shear displacement ...); earlier leading dims are separate paths.
+    Every state is compared with the one before it along the path (the steps of a load path, a shear
+    displacement ...); the other leading dims are separate paths. One window of lengths serves all states.
 
     Parameters
     ----------
-    mask : DataArray, dims (..., path, y, x)
+    mask : DataArray, dims (..., y, x)
         Boolean, or integer flags where contact means value > 0.
-    want : sequence of str, optional
-        What to measure, out of "changes", "islands", "percolation", "box_dimension", "minkowski_dimension",
-        "correlation_dimension", "boundary_dimension", "lacunarity"; all by default.
-    connectivity, periodic, valid
-        See `describe`.
+    include : sequence of str
+        Further measures, out of "islands", "percolation", "box_dimension", "minkowski_dimension",
+        "correlation_dimension", "boundary_dimension", "lacunarity".
+    along, frame, connectivity, periodic, valid
+        See `lineage`.
+    window : (low, high), optional
+        See `signature`.
 
     Returns
     -------
     Dataset
-        For "changes": `births`, islands that share no cell with the set before; `deaths`, islands of the set
-        before that share none with this one; `merges`, islands that overlap several before; `splits`, islands
-        before that overlap several now; `overlap`, common over united area; `hausdorff_distance` (m), the
-        largest distance from a cell of one set to the other set. If the path carries a load (`normal_force`,
-        `nominal_pressure` or `closure`) that reverses, the set is compared with that at the same load on the
-        opposite branch before: `return_step`, its index on the path; `hysteresis`, 1 less common over united
-        area; `coverage_change`. Beside `coverage`, the scalars of `describe` and the curves of the functions
-        in `want`, over `box_size` (all their sizes, NaN where a curve has no value) or `radius`.
+        The variables of `signature`, and of each state after the first: `births`, islands that share no cell
+        with the set before; `deaths`, islands of the set before that share none with this one; `merges`,
+        islands that overlap several before, and `absorbed`, how many these are less one each; `splits`,
+        islands before that overlap several now, and `fragments` alike, so that `n_islands` is that before
+        + births - deaths - absorbed + fragments; `overlap`, common over united area; `chance_overlap`, that
+        of two sets placed at random; `overlap_beyond_chance`, the share of the rest; `hausdorff_distance`
+        (m), the largest distance from a cell of one set to the other set. If the path carries a load
+        (`normal_force`, `nominal_pressure` or `closure`) that reverses, the set is compared with that at the
+        same load on the opposite branch before: `return_step`, its index on the path; `hysteresis`, 1 less
+        common over united area; `coverage_change`. And what `include` names, see `describe`.
 
     Raises
     ------
     InvalidInput
-        The mask has no leading dim, `want` holds an unknown word, or another argument is not as described.
+        The mask has no leading dim, `include` holds an unknown word, or another argument is not as described.
 
     Notes
     -----
-    Changes are NaN at the first plane of a path. The overlap of two empty planes is NaN, and so is the
-    distance from or to an empty one, or on a mask without coordinates.
+    Changes are NaN at the first state of a path. Along `shear` the counts of islands are NaN where the block
+    travels further than the larger spot of the two states: islands then overlap by chance. The overlap of
+    two empty states is NaN, and so is the distance from or to an empty one.
 
     Examples
     --------
     >>> import numpy as np, xarray as xr, fractalcontact as fc
     >>> cells = np.array([[[1, 0, 0, 1]], [[1, 1, 1, 1]]])
-    >>> result = fc.domains.evolution(xr.DataArray(cells, dims=("step", "y", "x")), want=["changes"])
+    >>> result = fc.domains.evolution(xr.DataArray(cells, dims=("step", "y", "x")))
     >>> float(result.merges[1]), float(result.overlap[1])
     (1.0, 0.5)
     """
-    wanted = WORDS if want is None else word_tuple(want)
+    wanted = word_tuple(include)
     planes = read_planes(mask, valid=valid, periodic=periodic)
-    components: list[Components] = []
-    if any(word in wanted for word in NEED_ISLANDS):
-        components = label_planes(planes, connectivity, keep=CHANGES in wanted)
+    components = label_planes(planes, connectivity)
+    path = Path.of(planes, along, frame)
     measurements = measure_planes(planes, wanted, components, connectivity)
-    if CHANGES in wanted:
-        _add_changes(measurements, components)
-        _add_returns(measurements)
+    measurements.add_dataset(_signature.analyse(planes, components, window=window, along=along))
+    _add_changes(measurements, components, path)
+    _add_returns(measurements, path)
     result = build_dataset(planes, measurements.variables, measurements.coords, notes=measurements.notes)
-    references = joined_references(*([SOURCE] if CHANGES in wanted else []), sources(wanted))
-    return result.assign_attrs(references=references)
+    return result.assign_attrs(references=joined_references(SOURCE, *([sources(wanted)] if wanted else [])))
 
 
-def _add_changes(measurements: Measurements, components: Sequence[Components]) -> None:
-    """Add how every plane differs from the one before it."""
+def _add_changes(measurements: Measurements, components: Sequence[Components], path: Path) -> None:
+    """Add how every state differs from the one before it along the path."""
     planes = measurements.planes
-    rows = np.full((planes.count, len(CHANGE_NAMES)), np.nan)
-    for plane in range(planes.count):
-        if plane % planes.shape[-1]:
-            rows[plane] = _change(planes, components, plane)
-    comment = f"NaN at the first plane along {planes.dims[-1]}, which has none before it"
-    measurements.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(CHANGE_NAMES)})
-    measurements.notes.update({name: {"comment": comment} for name in CHANGE_NAMES})
-    has_previous = np.isfinite(rows[:, 0])
-    if np.isnan(rows[has_previous, CHANGE_NAMES.index("overlap") :]).any():
-        reasons = {"overlap": "both sets are empty", "hausdorff_distance": "a set is empty"}
-        if not planes.grid.has_coordinates:
-            reasons["hausdorff_distance"] = "the mask has no coordinates"
+    rows = np.full((planes.count, len(CHANGES)), np.nan)
+    for k in np.flatnonzero(path.before >= 0):
+        rows[k] = _change(planes, components, path, int(k))
+    spot = measurements.variables["spot_size"][1].reshape(-1)
+    with np.errstate(invalid="ignore"):
+        too_far = path.travel > np.fmax(spot, spot[path.before])
+    rows[too_far, : len(EVENTS)] = np.nan
+    comment = f"NaN at the first state along {path.dim}, which has none before it"
+    measurements.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(CHANGES)})
+    measurements.notes.update({name: {"comment": comment} for name in CHANGES})
+    if too_far.any():
+        reason = f"{comment}, and where the block travels further than a spot"
+        measurements.notes.update({name: {"comment": reason} for name in EVENTS})
+    if np.isnan(rows[path.before >= 0, len(EVENTS) :]).any():
+        reasons = dict.fromkeys(CHANGES[len(EVENTS) : -1], "both sets are empty")
+        reasons["hausdorff_distance"] = "a set is empty"
         for name, reason in reasons.items():
             measurements.notes[name] = {"comment": f"{comment}, and where {reason}"}
 
 
-def _change(planes: Planes, components: Sequence[Components], plane: int) -> Array:
-    before, after = planes.cells[plane - 1], planes.cells[plane]
-    distance = hausdorff_distance(before, after, planes.grid) if planes.grid.has_coordinates else np.nan
-    events = island_overlaps(components[plane - 1], components[plane]).event_counts
-    return np.array([*events, area_overlap(before, after), distance])
+def _change(planes: Planes, components: Sequence[Components], path: Path, k: int) -> list[float]:
+    """Return the `CHANGES` of the plane k from the one before it."""
+    before, after = planes.cells[path.before[k]], path.moved(planes.cells[k], k)
+    events = path.overlaps(components, k).event_counts
+    overlap, chance = area_overlap(before, after), _chance_overlap(*planes.coverage[[path.before[k], k]])
+    beyond = (overlap - chance) / (1.0 - chance) if chance < 1.0 else np.nan
+    distance = hausdorff_distance(before, after, planes.grid)
+    return [*(float(events[name]) for name in EVENTS), overlap, chance, beyond, distance]
 
 
-def _add_returns(measurements: Measurements) -> None:
+def _chance_overlap(first: float, second: float) -> float:
+    """Return the expected overlap of two sets of these coverages, one of them placed at random."""
+    united = first + second - first * second
+    return float(first * second / united) if united > 0 else float("nan")
+
+
+def _add_returns(measurements: Measurements, path: Path) -> None:
     """Add how every plane differs from that at the same load on the opposite branch before, if any."""
     planes = measurements.planes
-    coords, path = planes.coords, planes.dims[-1]
-    load = next((name for name in LOADS if name in coords and path in coords[name].dims), None)
+    coords = planes.coords
+    load = next((name for name in LOADS if name in coords and path.dim in coords[name].dims), None)
     if load is None:
         return
-    rows = _returns(planes, coords[load])
+    rows = _returns(planes, coords[load], path)
     measurements.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(RETURN_NAMES)})
     reason = f"NaN where the path has not come back to the same {load}, or both sets are empty"
     measurements.notes.update({name: {"comment": reason} for name in RETURN_NAMES})
 
 
-def _returns(planes: Planes, load: xr.Variable) -> Array:
+def _returns(planes: Planes, load: xr.Variable, path: Path) -> Array:
     """Compare each plane with that at the same load on the opposite branch before, (planes, 3)."""
     shape = [planes.shape[k] if dim in load.dims else 1 for k, dim in enumerate(planes.dims)]
     values = load.transpose(*(dim for dim in planes.dims if dim in load.dims)).values.reshape(shape)
     loads = np.broadcast_to(values, planes.shape).reshape(-1)
     rows = np.full((planes.count, len(RETURN_NAMES)), np.nan)
-    length = planes.shape[-1]
-    for start in range(0, planes.count, length):
-        for step, earlier in enumerate(same_load_steps(loads[start : start + length])):
+    for states in path.states:
+        for state, earlier in zip(states, same_load_steps(loads[states]), strict=True):
             if earlier >= 0:
-                before, after = planes.cells[start + earlier], planes.cells[start + step]
-                change = planes.coverage[start + step] - planes.coverage[start + earlier]
-                rows[start + step] = earlier, 1.0 - area_overlap(before, after), change
+                before, after = planes.cells[states[earlier]], planes.cells[state]
+                change = planes.coverage[state] - planes.coverage[states[earlier]]
+                rows[state] = earlier, 1.0 - area_overlap(before, after), change
     return rows
 
 

@@ -14,6 +14,7 @@ from fractalcontact.domains._connected_components import (
     COLUMNS,
     PLAIN_COLUMNS,
     PROFILE_COLUMNS,
+    SHAPE_COLUMNS,
     Components,
     check_connected,
     component_table,
@@ -26,11 +27,12 @@ SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); sci
 
 
 def _check(
-    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, keep: Any, table: Any
+    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, keep: Any, include: Any
 ) -> None:
     problems.choices("keep", keep, ("label",))
-    if table is not None:
-        problems.choices("table", table, PROFILE_COLUMNS if len(mask_sides(mask)) == 1 else COLUMNS)
+    if include is not None:
+        columns = PROFILE_COLUMNS if len(mask_sides(mask)) == 1 else (*COLUMNS, *SHAPE_COLUMNS)
+        problems.choices("include", include, columns)
     check_connected(
         problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid, profiles=True
     )
@@ -44,7 +46,7 @@ def islands(
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
     keep: Sequence[str] = ("label",),
-    table: Sequence[str] | None = None,
+    include: Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Islands of a set of cells: their number, their map, and a table of their sizes.
 
@@ -60,9 +62,9 @@ def islands(
         Observed cells; the others are in no island.
     keep : sequence of str
         Maps to keep: ("label",) or (). Without the map a plane is labelled band by band, in little memory.
-    table : sequence of str, optional
-        Columns of the table; () for no table. By default all of them, but `cells` and `area` alone where a
-        plane has more than 2^22 islands: the full table takes some 200 bytes for each.
+    include : sequence of str, optional
+        Columns of the table; () for no table. By default all but those of the shape; `cells` and
+        `area` alone where a plane has more than 2^22 islands, as the table takes some 200 bytes for each.
 
     Returns
     -------
@@ -72,19 +74,23 @@ def islands(
         `island`, for the islands of all planes: `cells`; `area` (m2); `perimeter` (m), along the sides of
         cells towards open cells inside the extent; `centroid_x`, `centroid_y` (m); the bounding box `x_min`,
         `x_max`, `y_min`, `y_max` (m), which extends over the edge of a periodic plane where the island does;
-        coordinates `island_label`, the number in the map, and `island_<dim>` for every leading dim.
+        coordinates `island_label`, the number in the map, and `island_<dim>` for every leading dim. Of the
+        shape, where named in `include`, by the definitions of skimage.measure.regionprops: `orientation`
+        (degree, from y to the long axis of the ellipse of equal second moments, -90 to 90), its
+        `eccentricity`, `solidity`, the share of the cells of the convex hull in the island; and
+        `gyration_radius` (m), the rms distance of its cells from its centroid.
 
     Raises
     ------
     InvalidInput
-        The mask, `connectivity`, `keep`, `table`, `periodic` or `valid` is not as described.
+        The mask, `connectivity`, `keep`, `include`, `periodic` or `valid` is not as described.
 
     Notes
     -----
     A profile has the variables `largest_length` and `mean_island_length` (m) and the columns `cells`,
-    `length` (m), `centroid_x`, `x_min` and `x_max`. Lengths are NaN for a mask without coordinates, and so is
-    the centroid, along a periodic axis, of an island that wraps around it. The largest and the mean area of
-    an empty plane are NaN too.
+    `length` (m), `centroid_x`, `x_min` and `x_max`. Lengths of a mask without coordinates are in
+    cells. NaN: the centroid, along a periodic axis, of an island that wraps around it, and its shape; the
+    largest and the mean area of an empty plane.
 
     Examples
     --------
@@ -98,10 +104,11 @@ def islands(
     maps = word_tuple(keep)
     planes = read_planes(mask, valid=valid, periodic=periodic)
     every, plain = (COLUMNS, PLAIN_COLUMNS) if planes.rank == 2 else (PROFILE_COLUMNS, PROFILE_COLUMNS[:2])
-    columns = every if table is None else word_tuple(table)
-    detailed = None if table is None else bool(set(columns) - set(plain))
-    components = label_planes(planes, connectivity, keep="label" in maps, detailed=detailed)
-    too_many = table is None and any(plane.details is None for plane in components)
+    columns = every if include is None else word_tuple(include)
+    detailed = None if include is None else bool(set(columns) - {*plain, *SHAPE_COLUMNS})
+    has_map = "label" in maps or bool(set(columns) & set(SHAPE_COLUMNS))
+    components = label_planes(planes, connectivity, keep=has_map, detailed=detailed)
+    too_many = include is None and any(plane.details is None for plane in components)
     columns = plain if too_many else columns
     counts = [plane.count if columns else 0 for plane in components]
     scalars = island_scalars(components, planes, connectivity)
@@ -127,7 +134,7 @@ def _maps(components: Sequence[Components], planes: Planes) -> tuple[tuple[str, 
 def island_scalars(components: Sequence[Components], planes: Planes, connectivity: int) -> dict[str, Array]:
     """Return the numbers of every plane: islands, their sizes, and of planes the Euler number."""
     sizes = [plane.sizes for plane in components]
-    area = planes.grid.cell_area if planes.grid.has_coordinates else np.nan
+    area = planes.grid.cell_area
     largest = np.array([cells.max(initial=0) for cells in sizes], np.int64)
     mean = np.array([cells.mean() if cells.size else np.nan for cells in sizes])
     scalars = {"n_islands": np.array([cells.size for cells in sizes], np.int64), "largest_cells": largest}
@@ -143,18 +150,13 @@ def island_scalars(components: Sequence[Components], planes: Planes, connectivit
 
 
 def _table(components: Sequence[Components], planes: Planes, columns: Sequence[str]) -> dict[str, Array]:
-    """Return the table of all planes; lengths are NaN where the mask has no coordinates."""
+    """Return the table of all planes."""
     if not columns:
         return {}
     axes = planes.plane_coords
     origin = [float(axes[dim].values[0]) if dim in axes else 0.0 for dim in ("y", "x")]
     tables = [component_table(plane, planes.grid, origin, columns) for plane in components]
-    joined = {name: _chain([table.pop(name) for table in tables]) for name in columns}
-    if planes.grid.has_coordinates:
-        return joined
-    return {
-        name: values if name == "cells" else np.full(values.shape, np.nan) for name, values in joined.items()
-    }
+    return {name: _chain([table.pop(name) for table in tables]) for name in columns}
 
 
 def _chain(arrays: Sequence[Array]) -> Array:
@@ -163,16 +165,11 @@ def _chain(arrays: Sequence[Array]) -> Array:
 
 
 def _notes(planes: Planes, *, too_many: bool) -> dict[str, dict[str, str]]:
-    reasons = []
-    if not planes.grid.has_coordinates:
-        reasons.append("the mask has no coordinates")
-    if np.any(planes.occupied == 0):
-        reasons.append("the set is empty")
-    comment = {"comment": "NaN where " + " or where ".join(reasons)}
+    comment = {"comment": "NaN where the set is empty"}
     of_area = ("largest_island", "mean_island_area")
     of_length = ("largest_length", "mean_island_length")
     names = of_area if planes.rank == 2 else of_length
-    notes = dict.fromkeys(names, comment) if reasons else {}
+    notes = dict.fromkeys(names, comment) if np.any(planes.occupied == 0) else {}
     if too_many:
         notes["n_islands"] = {"comment": "too many for the full table: name the columns to have them all"}
     return notes

@@ -16,12 +16,11 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, periodic_axes, read_grid
 from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import float_array
-from fractalcontact.base.schema import CORE_DIMS, QUANTITIES
+from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, in_cells
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import LARGEST_INTEGER, Problems
 
@@ -29,9 +28,11 @@ Array = np.ndarray[Any, np.dtype[Any]]
 S = TypeVar("S")
 R = TypeVar("R")
 
-RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius")  # dims that results add
+# dims that results add
+RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius", "scale", "side")
 CELLS_PER_THREAD = 1 << 18  # a pass over so many takes as long as to start a pool of threads
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
+EXPECTED_MEASURE = f"{EXPECTED}; or finite numbers, none negative"
 PROFILE_DIMS = ("x",)
 PROFILE_FUNCTIONS = "box_dimension, box_counts, correlation_dimension, lacunarity, islands and describe"
 
@@ -95,9 +96,8 @@ class Planes:
 
     @property
     def side(self) -> float:
-        """Edge in metres of a square with the area of one cell, or its length; NaN without coordinates."""
-        edge = np.sqrt(self.grid.cell_area) if self.rank == 2 else self.grid.spacing[1]
-        return float(edge) if self.grid.has_coordinates else float("nan")
+        """Edge of a square with the area of one cell, or its length: in metres, 1 without coordinates."""
+        return float(np.sqrt(self.grid.cell_area) if self.rank == 2 else self.grid.spacing[1])
 
     def valid_of(self, plane: int) -> Array | None:
         """Return the observed cells of one plane, or None if all of them are."""
@@ -130,6 +130,40 @@ def check_mask(
     if is_mask and is_choice and periodic is not None:
         is_choice = problems.periodic("periodic", periodic, mask_grid(mask))
     return is_mask and is_valid and is_choice
+
+
+def check_measure(
+    problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, profiles: bool = False
+) -> Any:
+    """Check a mask, or a measure of finite numbers, none negative; return its support."""
+    if isinstance(mask, xr.DataArray) and mask.dtype.kind == "f":
+        values = mask.values
+        wrong = values.size - int(np.count_nonzero(np.isfinite(values) & (values >= 0)))
+        got = f"{wrong} of {values.size} NaN, infinite or negative"
+        problems.require(wrong == 0, "mask", EXPECTED_MEASURE, got)
+    elif not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biu":
+        problems.add("mask", EXPECTED_MEASURE, mask)
+        mask = None
+    support = support_of(mask)
+    if support is not None:
+        check_mask(problems, support, valid=valid, periodic=periodic, profiles=profiles)
+    else:
+        problems.boolean("periodic", periodic, optional=True)
+        if valid is not None:
+            _check_valid(problems, valid, None)
+    return support
+
+
+def support_of(mask: Any) -> Any:
+    """Return the mask of the cells where a measure is positive; a mask as it is."""
+    return mask > 0 if isinstance(mask, xr.DataArray) and mask.dtype.kind == "f" else mask
+
+
+def measure_of(mask: xr.DataArray, planes: Planes) -> Array | None:
+    """Return a measure as (planes, ny, nx) float64, zero where nothing was observed; None of a mask."""
+    if mask.dtype.kind != "f":
+        return None
+    return np.asarray(mask.values.reshape(planes.cells.shape) * planes.cells, np.float64)
 
 
 def mask_dims(mask: xr.DataArray) -> tuple[str, ...]:
@@ -279,8 +313,11 @@ def build_dataset(
     }
     on_grid = planes.plane_coords if on_plane else {}
     of_rows = _row_coords(planes, *rows) if rows else {}
-    variables = {**variables, "run_time": ((), np.nan)}  # reserved for `public_result`
-    dataset = make_dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
+    dataset = xr.Dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
+    if not planes.grid.has_coordinates:  # lengths and areas are in cells
+        own = [name for name in dataset.variables if name not in leading]
+        for name in own:
+            dataset.variables[name].attrs.update(in_cells(str(name)))
     for name, attributes in (notes or {}).items():
         dataset.variables[name].attrs.update(attributes)
     return dataset
@@ -324,6 +361,29 @@ def parallel_map(function: Callable[[S], R], items: Iterable[S], cells: int) -> 
 def check_box_sizes(problems: Problems, argument: str, sizes: Any, longest: int) -> bool:
     """Check edges of boxes in cells: None, or integers from 1 to `longest`."""
     return problems.numbers(argument, sizes, at_least=1, at_most=longest, integral=True, optional=True)
+
+
+def check_along(problems: Problems, along: Any, mask: Any) -> bool:
+    """Check the leading dim that is the path, or None; of what is no mask, that it is a word."""
+    if along is None:
+        return True
+    if plane_shape(mask)[0] == LARGEST_INTEGER:
+        return problems.require(isinstance(along, str), "along", "a leading dim of the mask", along)
+    return problems.choice("along", along, tuple(str(dim) for dim in mask.dims[:-2]))
+
+
+def check_window(problems: Problems, window: Any, mask: Any) -> None:
+    """Check a window, (low, high) in metres, of which the longest box must fit into half the mask."""
+    if window is None or not problems.numbers("window", window, above=0.0):
+        return
+    values = float_array(window)
+    is_pair = values.shape == (2,) and values[0] < values[-1]
+    if problems.require(is_pair, "window", "two lengths, (low, high)", window) and mask is not None:
+        grid = mask_grid(mask)
+        longest = min(grid.extent) / 2.0
+        expected = f"from a cell, {max(grid.spacing):g} m, to half the extent, {longest:g} m"
+        inside = max(grid.spacing) * (1 - 1e-9) <= values[0] and values[1] <= longest * (1 + 1e-9)
+        problems.require(inside, "window", expected, window)
 
 
 def read_box_sizes(sizes: Any, default: Array) -> Array:

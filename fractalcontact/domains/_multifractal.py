@@ -9,17 +9,17 @@ import xarray as xr
 
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import LARGEST_INTEGER, Problems
+from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
-    EXPECTED,
     Array,
-    Planes,
     build_dataset,
     check_box_sizes,
-    check_mask,
+    check_measure,
+    measure_of,
     plane_shape,
     read_box_sizes,
     read_planes,
+    support_of,
 )
 from fractalcontact.domains._scaling_fit import (
     ROUNDING,
@@ -31,30 +31,16 @@ from fractalcontact.domains._scaling_fit import (
 
 ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)
 LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
-EXPECTED_MEASURE = f"{EXPECTED}; or finite numbers, none negative"
 SOURCE = (
     "Hentschel and Procaccia, Physica D 8:435 (1983); Halsey et al., Phys. Rev. A 33:1141 (1986); "
     "Chhabra and Jensen, Phys. Rev. Lett. 62:1327 (1989)"
 )
 
 
-def _check(problems: Problems, *, mask: Any, q: Any, scales: Any, valid: Any) -> None:
+def _check(problems: Problems, *, mask: Any, q: Any, box_sizes: Any, valid: Any) -> None:
     problems.numbers("q", q, at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
-    if not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biuf":
-        problems.add("mask", EXPECTED_MEASURE, mask)
-        check_box_sizes(problems, "scales", scales, LARGEST_INTEGER)
-        is_mask = valid is None or (isinstance(valid, xr.DataArray) and valid.dtype.kind == "b")
-        problems.require(is_mask, "valid", "a boolean DataArray with dims (y, x)", valid)
-        return
-    if mask.dtype.kind == "f":
-        values = mask.values
-        wrong = values.size - int(np.count_nonzero(np.isfinite(values) & (values >= 0)))
-        problems.require(
-            wrong == 0, "mask", EXPECTED_MEASURE, f"{wrong} of {values.size} NaN, infinite or negative"
-        )
-    check_mask(problems, _support(mask), valid=valid)
-    shape = plane_shape(mask)
-    check_box_sizes(problems, "scales", scales, max(shape))
+    support = check_measure(problems, mask, valid=valid)
+    check_box_sizes(problems, "box_sizes", box_sizes, max(plane_shape(support)))
 
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)
@@ -62,7 +48,7 @@ def generalised_dimensions(
     mask: xr.DataArray,
     q: Any = ORDERS,
     *,
-    scales: Any = None,
+    box_sizes: Any = None,
     valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
     """Generalised (Renyi) dimensions D_q of a set, or of a measure such as the contact pressure.
@@ -79,7 +65,7 @@ def generalised_dimensions(
     q : number or sequence, optional
         Orders of the moment. Negative ones emphasise the emptiest boxes and need a measure that fills its
         boxes well.
-    scales : sequence of int, optional
+    box_sizes : sequence of int, optional
         Edges of the boxes in cells; by default the powers of two up to the geometric mean of the cell and
         the extent (at least to 8). The grid starts at the first cell; boxes cut by the far edges count.
     valid : DataArray of bool, dims (y, x) or those of the mask, optional
@@ -113,15 +99,14 @@ def generalised_dimensions(
     1.737
     """
     orders = float_array(q)
-    planes = read_planes(_support(mask), valid=valid)
+    planes = read_planes(support_of(mask), valid=valid)
+    field = measure_of(mask, planes)
+    measures = planes.cells.astype(float) if field is None else field
     default = 2 ** np.arange(
         default_sizes(planes.grid.shape).max(initial=1).item().bit_length(), dtype=np.int64
     )
-    sizes = read_box_sizes(scales, default)
-    fits = [
-        _fit_moments(measure, planes.valid_of(k), orders, sizes)
-        for k, measure in enumerate(_measure(mask, planes))
-    ]
+    sizes = read_box_sizes(box_sizes, default)
+    fits = [_fit_moments(measure, planes.valid_of(k), orders, sizes) for k, measure in enumerate(measures)]
     has_value = np.array([np.isfinite(fit[0]).any() for fit in fits])
     dimension, half_width, tau, alpha, f = np.moveaxis(np.array(fits), 1, 0)
     variables = {
@@ -136,18 +121,6 @@ def generalised_dimensions(
     }
     coords = {"moment_order": ("moment_order", orders)}
     return build_dataset(planes, variables, coords, notes=_notes(has_value, sizes))
-
-
-def _support(mask: xr.DataArray) -> xr.DataArray:
-    """Return the mask of the cells where a measure is positive."""
-    return mask > 0 if mask.dtype.kind == "f" else mask
-
-
-def _measure(mask: xr.DataArray, planes: Planes) -> Array:
-    """Return the measure, (planes, ny, nx) float64, zero where nothing was observed."""
-    if mask.dtype.kind != "f":
-        return planes.cells.astype(np.float64)
-    return np.asarray(mask.values.reshape(planes.cells.shape) * planes.cells, np.float64)
 
 
 def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Array) -> Array:

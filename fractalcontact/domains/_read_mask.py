@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile
-from fractalcontact.base.grid import plane_coords
+from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
@@ -22,7 +22,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 def _check(problems: Problems, *, path: Any, spacing: Any, threshold: Any) -> None:
     problems.file("path", path)
-    if problems.numbers("spacing", spacing, above=0):
+    if problems.numbers("spacing", spacing, above=0, at_most=10.0**DECADES):
         size = float_array(spacing).size
         problems.require(size in (1, 2), "spacing", "one number or (y, x)", f"{size} numbers")
     problems.number("threshold", threshold, optional=True)

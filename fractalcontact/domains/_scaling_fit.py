@@ -156,36 +156,44 @@ def drift_of(slopes: tuple[Array, Array]) -> float:
     return float(abs(centred @ (y - y.mean())) / (centred @ centred) * np.ptp(x))
 
 
-def steadiest_window(sizes: Array, area: Array, longest: float, shape: Sequence[int]) -> slice:
-    """Return the window of sizes of the fit: the usual one, or a steadier one of longer boxes.
+def steadiest_window(sizes: Array, areas: Array, longest: float, shape: Sequence[int], limit: int) -> slice:
+    """Return the window of sizes of the fit of all planes: the usual one, or a steadier one of longer boxes.
+
+    `areas` is (planes, sizes). No window holds more than the first `limit` sizes, or `LEAST_SIZES` if those
+    are more: further boxes are saturated, and their slopes, all 2, would be the steadiest of all.
 
     The usual window reaches from one cell to the geometric mean of the cell and the extent. The counts of a
     cluster that grew on the lattice rise too slowly at boxes of a few cells. Windows that hold sizes of a
     ratio of at least 8, up to a quarter of the set (`longest`), are compared by the spread of their local
-    slopes over their length in ln s. The best replaces the usual one if it is steadier by far and its
-    dimension is higher: slopes that fall from 2 with the size are those of islands, which are resolved.
+    slopes over their length in ln s, averaged over the planes. The best replaces the usual one if it is
+    steadier by far and its dimension is higher: slopes that fall from 2 with the size are those of islands,
+    which are resolved.
     """
     usual = default_sizes(shape).max()
-    count = int(np.searchsorted(sizes, max(longest, usual), side="right"))
-    chosen = slice(0, int(np.searchsorted(sizes, usual, side="right")))
-    first = fit_steady_ratio(sizes[chosen], area[chosen])
-    if not np.isfinite(first.dimension):
+    most = max(limit, LEAST_SIZES)
+    count = min(most, int(np.searchsorted(sizes, max(longest, usual), side="right")))
+    chosen = slice(0, min(most, int(np.searchsorted(sizes, usual, side="right"))))
+    dimension, unsteadiness = _mean_fit(sizes[chosen], areas[:, chosen])
+    if not np.isfinite(dimension):
         return chosen
-    lowest = STEADIER * _unsteadiness(sizes[chosen], first)
+    lowest = STEADIER * unsteadiness
     for stop in range(chosen.stop, count + 1):
         for start in range(1, stop - LEAST_SIZES + 1):
             part = slice(start, stop)
             if sizes[stop - 1] < LEAST_RATIO * sizes[start]:
                 break
-            fit = fit_steady_ratio(sizes[part], area[part])
-            score = _unsteadiness(sizes[part], fit)
-            if score < lowest and fit.dimension > first.dimension:
+            higher, score = _mean_fit(sizes[part], areas[:, part])
+            if score < lowest and higher > dimension:
                 chosen, lowest = part, score
     return chosen
 
 
-def _unsteadiness(sizes: Array, fit: Fit) -> float:
-    return float(np.hypot(fit.spread, STEADY) / np.log(sizes[-1] / sizes[0])) if sizes.size > 1 else 0.0
+def _mean_fit(sizes: Array, areas: Array) -> tuple[float, float]:
+    """Return the mean dimension of all planes, and the spread of local slopes over the length in ln s."""
+    fits = [fit_steady_ratio(sizes, area) for area in areas]
+    length = np.log(sizes[-1] / sizes[0]) if sizes.size > 1 else np.inf
+    spread = np.mean([np.hypot(fit.spread, STEADY) for fit in fits])
+    return float(np.mean([fit.dimension for fit in fits])), float(spread / length)
 
 
 def dimension_variables(

@@ -17,9 +17,8 @@ uplift                the force of the water in the joint, and its line of actio
 register              two measured faces brought into mated position, before all others
 
 For comparison with practice: the `roughness_coefficient` (JRC) and the `directional_roughness` of a surface,
-the `strength_envelope` by several criteria, the criteria `barton_choubey_strength`, `barton_bandis_scaled`
-and `PARK_PAULAY`, the closure by `bandis_aperture`, `bandis_constants` and `bandis_closure`, the
-`hydraulic_aperture` from the mechanical one, and the size effects `self_weight_strength` and `size_effect`.
+the `strength_envelope` by several criteria and the `shear_curve` of Barton and Bandis, of a surface or of a
+JRC, the closure by `bandis_closure`, the `hydraulic_aperture` from the mechanical one, and the `size_effect`.
 
 Lengths are in metres, forces in N, pressures in Pa and angles in degrees; E is +x and N is +y.
 """

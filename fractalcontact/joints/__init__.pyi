@@ -1,9 +1,6 @@
 from ._area_dimension import area_dimension as area_dimension
+from ._bandis_closure import bandis_closure as bandis_closure
 from ._closure import closure as closure
-from ._closure_criteria import bandis_aperture as bandis_aperture
-from ._closure_criteria import bandis_closure as bandis_closure
-from ._closure_criteria import bandis_constants as bandis_constants
-from ._closure_criteria import hydraulic_aperture as hydraulic_aperture
 from ._closure_laws import closure_laws as closure_laws
 from ._crack import Crack as Crack
 from ._cyclic_shear import cyclic_shear as cyclic_shear
@@ -14,29 +11,21 @@ from ._dilatancy import dilatancy as dilatancy
 from ._direct_shear import direct_shear as direct_shear
 from ._directional_roughness import directional_roughness as directional_roughness
 from ._friction import friction as friction
+from ._hydraulic_aperture import hydraulic_aperture as hydraulic_aperture
 from ._partial_slip import partial_slip as partial_slip
 from ._registration import register as register
 from ._roughness_coefficient import roughness_coefficient as roughness_coefficient
 from ._self_weight import self_weight as self_weight
 from ._shear_curve import shear_curve as shear_curve
-from ._strength_criteria import PARK_PAULAY as PARK_PAULAY
-from ._strength_criteria import barton_bandis_scaled as barton_bandis_scaled
-from ._strength_criteria import barton_choubey_strength as barton_choubey_strength
-from ._strength_criteria import self_weight_strength as self_weight_strength
-from ._strength_criteria import size_effect as size_effect
+from ._size_effect import size_effect as size_effect
 from ._strength_envelope import strength_envelope as strength_envelope
 from ._transmissivity import transmissivity as transmissivity
 from ._uplift import uplift as uplift
 
 __all__ = [
     "Crack",
-    "PARK_PAULAY",
     "area_dimension",
-    "bandis_aperture",
     "bandis_closure",
-    "bandis_constants",
-    "barton_bandis_scaled",
-    "barton_choubey_strength",
     "closure",
     "closure_laws",
     "cyclic_shear",
@@ -52,7 +41,6 @@ __all__ = [
     "register",
     "roughness_coefficient",
     "self_weight",
-    "self_weight_strength",
     "shear_curve",
     "size_effect",
     "strength_envelope",

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-import fractalcontact as fc  # loads `contact` and `domains` on first use
+import fractalcontact as fc
+from fractalcontact.base.compass import checked_direction, read_direction
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._closure import (
+from fractalcontact.joints._crack import Crack, check_sliding
+from fractalcontact.joints._sheared_contact import (
     Pressing,
     check_pressing,
     press_sheared,
+    pressed_dataset,
     pressing_memory,
-    pressing_references,
-    warn_steep,
-    warn_unconverged,
 )
-from fractalcontact.joints._compass import checked_direction, read_direction
-from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.area_dimension"
-LOADS = ("normal_force", "nominal_pressure")
 FEWEST_CELLS = 8  # along an edge of the block, at the coarsest of the default spacings
 DEFAULT_FACTORS = 3  # of them, the finest ones
 
@@ -46,10 +44,8 @@ def _check(
 ) -> None:
     direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
-    load = problems.construct(
-        fc.contact.LoadPath.from_keywords, normal_force=normal_force, nominal_pressure=nominal_pressure
-    )
-    check_pressing(problems, crack, load, "flat_block", (), solver)
+    loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
+    check_pressing(problems, crack, loads, solver)
     are_numbers = factors is None or problems.numbers("factors", factors, at_least=1)
     if are_numbers and isinstance(crack, Crack):
         _check_factors(problems, crack.layout.cells, factors)
@@ -132,41 +128,23 @@ def area_dimension(
     [[[5.0, 6.3, 9.8]]]
     """
     towards, shears = read_direction(direction), float_array(shear)
-    load = fc.contact.LoadPath.from_keywords(normal_force=normal_force, nominal_pressure=nominal_pressure)
-    options = fc.contact.ContactOptions(influence=influence, hardness=hardness, tolerance=tolerance)
-    pressing = Pressing(load, options, "flat_block", ("state",), WHERE)
+    loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
+    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
+    pressing = Pressing.read(crack, WHERE, loads, solver, keep=("state",))
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
-    pressed = [
-        press_sheared(crack, shears, towards, pressing, False, factor=int(factor)) for factor in np.sort(used)
-    ]
-    for columns in pressed:
-        warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
-    warn_steep(pressed, WHERE, stacklevel=4)
-    coords = block_coords(crack)
-    masks = [
-        xr.DataArray(
-            columns["state"] > 0,
-            dims=("shear", "step", "y", "x"),
-            coords={dim: values[:: int(factor)] for dim, values in coords.items()},
-        )
-        for factor, columns in zip(np.sort(used), pressed, strict=True)
-    ]
-    areas = fc.domains.area_dimension(masks)
-    result = areas.drop_vars("run_time").drop_attrs(deep=False)
+    pressed = []
+    for factor in np.sort(used):
+        coarser = replace(pressing, factor=int(factor))
+        columns = press_sheared(coarser, shears, towards, False)
+        pressed.append(pressed_dataset(coarser, shears, [towards], [columns]).isel(direction=0))
+    areas = fc.domains.area_dimension([each["state"] for each in pressed])
+    result = areas.drop_vars(("run_time", "closure")).drop_attrs(deep=False)
     for name in ("interface_closure", "residual", "converged"):
-        values = np.stack([columns[name] for columns in pressed], axis=-1)
+        values = np.stack([each[name].values for each in pressed], axis=-1)
         result[name] = ("shear", "step", "resolution"), values
-    for name in LOADS:
-        result = result.assign_coords({name: ("step", pressed[0][name][0])})
-    result = result.assign_coords(
-        shear=("shear", shears),
-        step=np.arange(result.sizes["step"]),
-        direction=towards.name,
-        azimuth=towards.azimuth,
-    )
     result["nominal_area"] = crack.nominal_area
-    references = joined_references(pressing_references(crack, options), areas.attrs["references"])
-    residual = float(np.max([columns["residual"].max() for columns in pressed]))
+    references = joined_references(pressing.references, areas.attrs["references"])
+    residual = max(each.attrs["achieved_residual"] for each in pressed)
     return result.assign_attrs(achieved_residual=residual, references=references)
 
 

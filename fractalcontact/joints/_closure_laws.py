@@ -124,7 +124,7 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     >>> import numpy as np, xarray as xr
     >>> import fractalcontact as fc
     >>> pressure = np.geomspace(1e5, 1e7, 8)
-    >>> closure = fc.joints.bandis_closure(pressure, initial_stiffness=2e10, greatest_closure=1e-4)
+    >>> closure = pressure * 1e-4 / (2e10 * 1e-4 + pressure)  # Kni = 20 MPa/mm, Vm = 0.1 mm
     >>> joint = xr.Dataset({"interface_closure": ("step", closure), "nominal_pressure": ("step", pressure)})
     >>> laws = fc.joints.closure_laws(joint)
     >>> round(float(laws.greatest_closure) * 1e6, 2)

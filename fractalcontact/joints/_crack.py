@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
-from fractalcontact.base.numbers import float_array
-from fractalcontact.base.provenance import plain
-from fractalcontact.base.tables import html_table
-from fractalcontact.base.units import quantity_text
-from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.joints._compass import (
+from fractalcontact.base.compass import (
     check_direction,
     check_directions,
     read_direction,
     read_directions,
 )
+from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
+from fractalcontact.base.numbers import as_array, float_array
+from fractalcontact.base.provenance import plain
+from fractalcontact.base.tables import html_table
+from fractalcontact.base.units import quantity_text
+from fractalcontact.base.validation import NONE, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Pair = tuple[float, float]
@@ -100,6 +100,7 @@ class Crack:
         is upper - lower. None: the faces match perfectly.
     young : float or pair (lower, upper), optional
         Young's modulus, Pa. One value holds for both bodies; none is needed where nothing elastic is wanted.
+        One body of a pair may be rigid, ``(30e9, numpy.inf)``.
     poisson : float or pair (lower, upper), optional
         Poisson's ratio, above -1 and at most 0.5.
     block : float or pair (y, x), optional
@@ -146,8 +147,8 @@ class Crack:
 
     def __post_init__(self) -> None:
         with Problems(WHERE) as problems:
-            for name, bounds in MATERIAL.items():
-                value = getattr(self, name)
+            for name, value in (("young", _elastic_young(problems, self.young)), ("poisson", self.poisson)):
+                bounds = MATERIAL[name]
                 if problems.numbers(name, value, optional=True, **bounds) and value is not None:
                     problems.require(float_array(value).size <= 2, name, "one value or (lower, upper)", value)
             problems.number("basic_friction_angle", self.basic_friction_angle, at_least=0, below=90)
@@ -237,6 +238,17 @@ class Crack:
         }
 
 
+def _elastic_young(problems: Problems, young: Any) -> Any:
+    """Return Young's modulus with any number for that of a rigid body, and check that one body is elastic."""
+    values = as_array(young)
+    if values is None or values.dtype.kind != "f" or not np.isposinf(values).any():
+        return young
+    is_rigid = np.isposinf(values)
+    expected = "an elastic body, or neither young nor poisson where both are rigid"
+    problems.require(not np.all(is_rigid), "young", expected, young)
+    return np.where(is_rigid, 1.0, values)
+
+
 def _one_or_two(value: Any) -> float | Pair | None:
     """Return a property of both bodies as one number, or as (lower, upper)."""
     if value is None:
@@ -247,7 +259,8 @@ def _one_or_two(value: Any) -> float | Pair | None:
 
 def _words(value: float | Pair, units: str) -> str:
     if isinstance(value, tuple):
-        return f"{quantity_text(value[0], units)} (lower), {quantity_text(value[1], units)} (upper)"
+        lower, upper = ("rigid" if math.isinf(one) else quantity_text(one, units) for one in value)
+        return f"{lower} (lower), {upper} (upper)"
     return quantity_text(value, units)
 
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.joints._compass import check_direction, read_direction
 from fractalcontact.joints._friction import (
     ERROR,
     FORMS,
+    LOCKED_ANGLE,
     REFERENCES,
     check_dilatancy,
     dilatancy_slopes,
@@ -28,7 +29,6 @@ from fractalcontact.joints._friction import (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 STRESSES = ("shear_stress", "frictional_work")
-LIFT = "_lift"  # name for the curve whose slope gives the angle
 
 
 def _check(
@@ -64,7 +64,10 @@ def _check_reach(problems: Problems, dilatancy: xr.Dataset, direction: Any, turn
         dims = dilatancy["azimuth"].dims
         problems.add("dilatancy.azimuth", "one number, or a dim direction", f"dims {dims}")
         return
-    shears = read_dilatancy(dilatancy)[1]
+    name, shears = read_dilatancy(dilatancy)
+    if name == "dilatancy":
+        dims = dilatancy["nominal_pressure"].dims
+        problems.require("step" in dims, "dilatancy.nominal_pressure", "the dim step", f"dims {dims}")
     for sign, azimuth in _side_azimuths(dilatancy, direction, turning_points).items():
         places = _places(dilatancy, azimuth)
         expected = f"the azimuth {azimuth:g}"
@@ -140,59 +143,61 @@ def cyclic_shear(
     """
     name, shears = read_dilatancy(dilatancy)
     turning_points = float_array(path)
-    dilatancy = dilatancy.assign({LIFT: (dilatancy[name].dims, lift_curve(dilatancy, form))})
-    sides = {
-        sign: dilatancy.isel(direction=int(_places(dilatancy, azimuth)[0]))
-        if "direction" in dilatancy.dims
-        else dilatancy
+    curves = dilatancy[[name]].rename({name: "dilatancy"}).drop_attrs()
+    curves["lift"] = dilatancy[name].dims, lift_curve(dilatancy, form)
+    if name == "dilatancy":
+        curves["pressure"] = dilatancy["nominal_pressure"].variable
+    elif nominal_pressure is not None:
+        curves["pressure"] = "step", float_array(nominal_pressure)
+    shear, sense, side = _points_along(turning_points, shears)
+    points = xr.DataArray(np.clip(np.abs(shear), *shears[[0, -1]]), dims="point")
+    along = {
+        sign: _side_curves(curves, dilatancy, azimuth, shears, smoothing).interp(shear=points)
         for sign, azimuth in _side_azimuths(dilatancy, direction, turning_points).items()
     }
-    shear, sense, side = _points_along(turning_points, shears)
-
-    def along(tables: dict[int, Array]) -> Array:
-        return _interpolated(np.abs(shear), side, shears, tables)
-
-    lifts = {sign: _table(dataset[LIFT], shears.size) for sign, dataset in sides.items()}
-    # each side has its own slope at the position 0: that of `friction` in its direction
-    slopes = {sign: dilatancy_slopes(shears, lift, smoothing)[0] for sign, lift in lifts.items()}
-    angle = (sense * side)[:, None] * np.degrees(np.arctan(along(slopes)))
+    here = along[1].where(xr.DataArray(side > 0, dims="point"), along.get(-1, along[1]))
     basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
-    columns = {
-        "dilatancy": along({sign: _table(dataset[name], shears.size) for sign, dataset in sides.items()}),
-        "friction_angle": basic_angle + angle,
-    }
-    pressure = None
-    if name == "dilatancy":
-        pressure = along(
-            {sign: _table(dataset["nominal_pressure"], shears.size) for sign, dataset in sides.items()}
+    senses = xr.DataArray(sense, dims="point")
+    sides = xr.DataArray(side, dims="point")
+    angle = basic_angle + senses * sides * np.degrees(np.arctan(here["slope"]))
+    result = xr.Dataset({"dilatancy": here["dilatancy"], "friction_angle": angle})
+    if "pressure" in here:
+        pressure = here["pressure"].broadcast_like(points).transpose("point", "step")
+        stress = senses * pressure * np.tan(np.radians(angle.where(angle < LOCKED_ANGLE)))
+        result["shear_stress"] = stress.transpose("point", "step")
+        result["frictional_work"] = ("point", "step"), _work(shear, result["shear_stress"].values)
+        result = result.assign_coords(
+            step=np.arange(pressure.sizes["step"]), nominal_pressure=(pressure.dims, pressure.values)
         )
-    elif nominal_pressure is not None:
-        values = float_array(nominal_pressure)
-        pressure = np.broadcast_to(values, (shear.size, values.size))
-    if pressure is not None:
-        columns |= _stresses(shear, sense, columns["friction_angle"], pressure)
-    result = _dataset(shear, sense, columns, pressure, by_step=name == "dilatancy")
-    result["basic_friction_angle"] = basic_angle
+    slip = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(shear)))])
+    result = result.assign(shear=("point", shear), slip=("point", slip), sense=("point", sense))
+    result = result.assign_coords(point=np.arange(shear.size)).assign(basic_friction_angle=basic_angle)
     result["friction_angle"].attrs["comment"] = FORMS[form]
     mark_locked(result, STRESSES)
     return result.assign_attrs(slope_of=name)
 
 
-def _dataset(
-    shear: Array, sense: Array, columns: dict[str, Array], pressure: Array | None, *, by_step: bool
+def _side_curves(
+    curves: xr.Dataset, dilatancy: xr.Dataset, azimuth: float, shears: Array, smoothing: float | None
 ) -> xr.Dataset:
-    """Return the columns (point, step) as a Dataset; without `step` where there is only one and no load."""
-    variables: dict[str, Any] = {}
-    for name, values in columns.items():
-        over_steps = by_step or values.shape[1] > 1 or name in STRESSES
-        variables[name] = (("point", "step"), values) if over_steps else ("point", values[:, 0])
-    slip = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(shear)))])
-    variables |= {"shear": ("point", shear), "slip": ("point", slip), "sense": ("point", sense)}
-    result = xr.Dataset(variables, {"point": np.arange(shear.size)})
-    if pressure is not None:
-        steps = np.arange(pressure.shape[1])
-        result = result.assign_coords(step=steps, nominal_pressure=(("point", "step"), pressure))
-    return result
+    """Return the curves towards an azimuth, with the slope of the lift.
+
+    Each side has its own slope at the position 0: that of `friction` in its direction.
+    """
+    if "direction" in curves.dims:
+        curves = curves.isel(direction=int(_places(dilatancy, azimuth)[0]))
+    curves = curves.drop_vars([each for each in curves.coords if each != "shear"])
+    lift = curves["lift"].transpose("shear", ...)
+    slopes = dilatancy_slopes(shears, lift.values.reshape(shears.size, -1), smoothing)[0]
+    return curves.assign(slope=(lift.dims, slopes.reshape(lift.shape))).drop_vars("lift")
+
+
+def _work(shear: Array, stress: Array) -> Array:
+    """Return the work done against the shear stress, over (point, step)."""
+    # at a turning point the block does not move while the stress changes its sign
+    moved = np.diff(shear)[:, None]
+    steps = np.where(moved == 0, 0.0, 0.5 * (stress[1:] + stress[:-1]) * moved)
+    return np.concatenate([np.zeros((1, stress.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def _azimuths(dilatancy: xr.Dataset) -> Array:
@@ -211,13 +216,6 @@ def _side_azimuths(dilatancy: xr.Dataset, direction: Any, turning_points: Array)
 def _places(dilatancy: xr.Dataset, azimuth: float) -> Array:
     """Return at which places along `direction` the dilatancy has the azimuth."""
     return np.flatnonzero(np.isclose(_azimuths(dilatancy), azimuth, atol=1e-9))
-
-
-def _table(variable: xr.DataArray, size: int) -> Array:
-    """Return a variable over (shear, step)."""
-    if "shear" not in variable.dims:
-        return np.broadcast_to(np.atleast_1d(variable.values), (size, variable.size))
-    return np.asarray(variable.transpose("shear", ...).values, dtype=float).reshape(size, -1)
 
 
 def _points_along(turning_points: Array, shears: Array) -> tuple[Array, Array, Array]:
@@ -239,23 +237,3 @@ def _points_along(turning_points: Array, shears: Array) -> tuple[Array, Array, A
             senses.append(np.full(leg.size, sense, dtype=np.int8))
             sides.append(np.full(leg.size, side, dtype=np.int8))
     return np.concatenate(legs), np.concatenate(senses), np.concatenate(sides)
-
-
-def _interpolated(shear: Array, side: Array, shears: Array, tables: dict[int, Array]) -> Array:
-    """Return a variable over (point, step), linear between the shears, from one table for each side."""
-    values = np.empty((shear.size, tables[1].shape[1]))
-    for sign, table in tables.items():
-        here = side == sign
-        values[here] = np.stack([np.interp(shear[here], shears, column) for column in table.T], axis=1)
-    return values
-
-
-def _stresses(shear: Array, sense: Array, angle: Array, pressure: Array) -> dict[str, Array]:
-    """Return shear stress and the work done against it, over (point, step)."""
-    angle = np.broadcast_to(angle, pressure.shape)
-    stress = sense[:, None] * pressure * np.tan(np.radians(np.where(angle < 90.0, angle, np.nan)))
-    work_step = 0.5 * (stress[1:] + stress[:-1]) * np.diff(shear)[:, None]
-    # at a turning point the block does not move while the stress changes its sign
-    work_step = np.where(np.diff(shear)[:, None] == 0, 0.0, work_step)
-    work = np.concatenate([np.zeros((1, stress.shape[1])), np.cumsum(work_step, axis=0)])
-    return {"shear_stress": stress, "frictional_work": work}

@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import float_array
-from fractalcontact.base.polynomial import detrended
-from fractalcontact.base.references import PAPER
-from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
-from fractalcontact.joints._compass import (
+from fractalcontact.base.compass import (
     COMPASS,
     Direction,
     check_directions,
     direction_coords,
     read_directions,
 )
+from fractalcontact.base.numbers import float_array
+from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.references import PAPER
+from fractalcontact.base.results import public_result
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights
 

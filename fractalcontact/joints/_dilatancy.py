@@ -9,36 +9,29 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import fractalcontact as fc  # loads `contact` on first use: a study of rigid faces needs no solver
+from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
 from fractalcontact.base.memory import Plane
 from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
-from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.joints._closure import (
+from fractalcontact.base.validation import Problems
+from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
+from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
+from fractalcontact.joints._sheared_contact import (
     Pressing,
-    ShearedContact,
     check_pressed,
     check_pressing,
+    press_against_spring,
     press_sheared,
+    pressed_dataset,
     pressing_memory,
-    pressing_references,
-    warn_steep,
-    warn_unconverged,
 )
-from fractalcontact.joints._compass import COMPASS, Direction, direction_coords, read_directions
-from fractalcontact.joints._crack import Block, Crack, Pair, block_coords, check_sliding
-from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Columns = dict[str, Array]
 
 WHERE = "fractalcontact.joints.dilatancy"
-FORCE_ERROR = 1e-7  # relative error of the force that balances a spring
 RIGID_BYTES = 96.0  # of a cell of the block
-MAX_SOLUTIONS = 60  # for one such force
 
 
 def _check(
@@ -63,8 +56,7 @@ def _check(
     one_of = normal_stiffness is None or pressed is None
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`", pressed)
     problems.number("normal_stiffness", normal_stiffness, above=0, optional=True)
-    load = problems.construct(fc.contact.LoadPath, "normal_force", normal_force)
-    check_pressing(problems, crack, load, bulk, keep, solver)
+    check_pressing(problems, crack, {"normal_force": normal_force}, solver, bulk=bulk, keep=keep)
 
 
 def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
@@ -162,28 +154,33 @@ def dilatancy(
     rigid = _rigid_dataset(crack, shears, directions)
     if normal_force is None:
         return rigid
-    options = fc.contact.ContactOptions(
-        influence=influence, disc_radius=disc_radius, hardness=hardness, tolerance=tolerance, method=method
-    )
-    load = fc.contact.LoadPath.from_keywords(normal_force=normal_force)
-    pressing = Pressing(load, options, bulk, word_tuple(keep), WHERE)
+    solver = {
+        "influence": influence,
+        "disc_radius": disc_radius,
+        "hardness": hardness,
+        "tolerance": tolerance,
+        "method": method,
+    }
+    pressing = Pressing.read(crack, WHERE, {"normal_force": normal_force}, solver, bulk=bulk, keep=keep)
     by_direction = []
     for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):
         if normal_stiffness is None:
-            columns = press_sheared(crack, shears, towards, pressing, progress, pressed=pressed)
+            columns = press_sheared(pressing, shears, towards, progress, pressed=pressed)
         else:
             stiffness = normal_stiffness * crack.nominal_area
-            columns = press_against_spring(crack, shears, lifted, towards, pressing, stiffness, progress)
+            columns = press_against_spring(pressing, shears, lifted, towards, stiffness, progress)
         by_direction.append(columns)
-        warn_unconverged(columns, shears, towards, WHERE, stacklevel=4)
-    warn_steep(by_direction, WHERE, stacklevel=4)
-    result = _with_forces(rigid, crack, by_direction, has_spring=normal_stiffness is not None)
-    if normal_stiffness is not None:
+    has_spring = normal_stiffness is not None
+    under_force = pressed_dataset(pressing, shears, directions, by_direction, has_spring=has_spring)
+    under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
+    result = under_force.merge(rigid, compat="override", combine_attrs="override")
+    result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]
+    if normal_stiffness is None:  # the force, and so the bulk part, is the same at every shear
+        result["bulk_closure"] = result["bulk_closure"].isel(direction=0, shear=0, drop=True)
+    else:
         result = result.assign(normal_stiffness=float(normal_stiffness))
         result["initial_force"] = "step", float_array(pressing.load.values)
-    result["bulk_closure"].attrs["comment"] = pressing.bulk_comment
-    residual = float(np.max([columns["residual"].max() for columns in by_direction]))
-    return result.assign_attrs(achieved_residual=residual, references=pressing_references(crack, options))
+    return result
 
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:
@@ -247,95 +244,3 @@ def mean_slopes(face: Array, block: Block) -> Pair:
     """Return the slopes (y, x) of the mean plane of a face without its gaps; zero where an axis wraps."""
     slope_y, slope_x = slopes(face, block.spacing)
     return 0.0 if block.wraps[0] else slope_y, 0.0 if block.wraps[1] else slope_x
-
-
-def _with_forces(
-    rigid: xr.Dataset, crack: Crack, pressed: Sequence[Columns], *, has_spring: bool
-) -> xr.Dataset:
-    """Add what was computed under force: scalars over (direction, shear, step), and maps."""
-    columns = {name: np.stack([each[name] for each in pressed]) for name in pressed[0]}
-    columns["rms_slope"] = columns["rms_slope"][..., 0]
-    dims = ("direction", "shear", "step", "y", "x")
-    by_force: dict[str, Any] = {}
-    for name in ("normal_force", "nominal_pressure", "bulk_closure"):
-        values = columns.pop(name)
-        # constant forces are the same for every direction and shear
-        by_force[name] = (dims[:3], values) if has_spring else ("step", values[0, 0])
-    for name in ("contact_area", "run_time"):
-        del columns[name]
-    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
-    lifted = rigid["rigid_dilatancy"].values[..., None]
-    variables["dilatancy"] = dims[:3], lifted - columns["interface_closure"]
-    variables["bulk_closure"] = by_force.pop("bulk_closure")
-    coords: dict[str, Any] = {"step": np.arange(columns["closure"].shape[-1]), **by_force}
-    if any(values.ndim > 3 for values in columns.values()):
-        coords |= block_coords(crack)
-    return rigid.assign(variables).assign_coords(coords)
-
-
-def press_against_spring(
-    crack: Crack,
-    shears: Array,
-    lifted: Array,
-    towards: Direction,
-    pressing: Pressing,
-    stiffness: float,
-    progress: bool,
-) -> Columns:
-    """Press the crack together at every shear against a spring.
-
-    The force on the block is N = N0 + k A (delta(N, v) - delta(N0, 0)), and never below zero. For every
-    initial force N0 it is bracketed and solved (Brent): the closure grows with the force, so that the
-    difference of the two sides changes its sign once.
-
-    Parameters
-    ----------
-    lifted : ndarray, shape (shear,)
-        Rigid dilatancy, m.
-    stiffness : float
-        k A, N/m.
-
-    Returns
-    -------
-    dict of ndarray
-        As `press_sheared`; normal_force and all that depends on it differ from shear to shear.
-    """
-    at_rest = ShearedContact(crack, 0.0, towards, pressing).press(pressing.load)
-    initial_dilatancy = -at_rest["interface_closure"]
-    results = []
-    for shear, lift in zip(
-        track(shears, progress, f"press, towards {towards.name}", unit="shear"), lifted, strict=True
-    ):
-        contact = ShearedContact(crack, float(shear), towards, pressing)
-        steps = [
-            _press_balanced(contact, float(force), float(lift - initial), stiffness)
-            for force, initial in zip(pressing.load.values, initial_dilatancy, strict=True)
-        ]
-        results.append({name: np.concatenate([step[name] for step in steps]) for name in steps[0]})
-    return {name: np.stack([result[name] for result in results]) for name in results[0]}
-
-
-def _press_balanced(contact: ShearedContact, initial: float, opening: float, stiffness: float) -> Columns:
-    """Press under the force that balances the spring; `opening` is that of the rigid faces, m."""
-    from scipy.optimize import brentq
-
-    def press(force: float, keep: Sequence[str] = ()) -> Columns:
-        return contact.press(fc.contact.LoadPath("normal_force", (force,)), keep)
-
-    def excess(force: float) -> float:
-        interface_closure = press(force)["interface_closure"][0] if force > 0 else 0.0
-        return float(force - initial - stiffness * (opening - interface_closure))
-
-    if initial + stiffness * opening <= 0:  # the faces sink away from the spring
-        return press(0.0, contact.keep)
-    at_initial = excess(initial) if initial > 0 else -stiffness * opening
-    low, high = (initial, initial - at_initial) if at_initial < 0 else (0.0, initial)
-    if abs(at_initial) <= FORCE_ERROR * initial:
-        force = initial
-    elif low > 0:  # the closure is nearly linear in the logarithm of the force
-        ends = np.log(low), np.log(high)
-        log_force = brentq(lambda x: excess(np.exp(x)), *ends, xtol=FORCE_ERROR, maxiter=MAX_SOLUTIONS)
-        force = np.exp(log_force)
-    else:
-        force = brentq(excess, low, high, xtol=FORCE_ERROR * high, maxiter=MAX_SOLUTIONS)
-    return press(float(force), contact.keep)

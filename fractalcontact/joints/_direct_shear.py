@@ -12,21 +12,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import fractalcontact as fc  # loads `contact` on first use
+from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
-from fractalcontact.joints._closure import (
-    check_pressing,
-    pressing_references,
-    warn_steep,
-)
-from fractalcontact.joints._compass import Direction, check_direction, read_direction
 from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
-from fractalcontact.joints._worn_joint import WHERE, WornJoint, balanced_step, shear_stiffness
+from fractalcontact.joints._sheared_contact import Pressing, check_pressing, warn_steep
+from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, balanced_step, shear_stiffness
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -34,7 +29,6 @@ MAPS = ("residual_lower", "residual_upper")
 LARGEST_STEP = 8  # cells along an axis in which the block comes back onto the grid
 SMALLEST, LARGEST = 1e-30, 1e30  # of stresses and stiffnesses: their ratios do not overflow
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
-CRUSHED = "NaN from where the contacts would bear more than the hardness over the whole block"
 
 
 def _check(
@@ -59,17 +53,15 @@ def _check(
     problems.number("distance", distance, above=0, optional=True)
     if keep is not None:
         problems.choices("keep", keep, MAPS)
-    hardness_is_valid, load = problems.number("hardness", hardness, **bounds), None
-    if problems.numbers("nominal_pressure", nominal_pressure, **bounds):
-        load = problems.construct(fc.contact.LoadPath, "nominal_pressure", nominal_pressure)
-        if hardness_is_valid:
-            greatest = float(float_array(nominal_pressure).max())
-            problems.require(
-                greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest
-            )
+    hardness_is_valid = problems.number("hardness", hardness, **bounds)
+    has_load = problems.numbers("nominal_pressure", nominal_pressure, **bounds)
+    if has_load and hardness_is_valid:
+        greatest = float(float_array(nominal_pressure).max())
+        problems.require(greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest)
     check_crack(problems, crack)
     known = {"hardness": hardness} if hardness_is_valid else {}
-    check_pressing(problems, crack, load, "flat_block", (), known | solver)
+    loads = {"nominal_pressure": nominal_pressure} if has_load else None
+    check_pressing(problems, crack, loads, known | solver)
     path_is_valid = problems.numbers("path", path, at_least=-LARGEST, at_most=LARGEST)
     if check_direction(problems, direction) and path_is_valid and isinstance(crack, Crack):
         _check_path(problems, crack, _turning_points(path), read_direction(direction))
@@ -181,14 +173,18 @@ def direct_shear(
     step = _cell_step(crack, towards)
     assert step is not None
     legs = _legs(_turning_points(path), step)
-    options = fc.contact.ContactOptions(
-        influence=influence, disc_radius=disc_radius, hardness=hardness, tolerance=tolerance
-    )
+    solver = {
+        "influence": influence,
+        "disc_radius": disc_radius,
+        "hardness": hardness,
+        "tolerance": tolerance,
+    }
+    pressing = Pressing.read(crack, WHERE, {"nominal_pressure": nominal_pressure}, solver)
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area
     tests = [
-        _test(WornJoint(crack, towards, options), legs, float(pressure) * area, spring, progress)
+        _test(WornJoint(pressing, towards), legs, float(pressure) * area, spring, progress)
         for pressure in pressures
     ]
     length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else float(distance)
@@ -201,13 +197,13 @@ def direct_shear(
             result = result.assign_coords(coords)
     residual = max(test.joint.residual for test in tests)
     _warn([test.joint for test in tests])
-    references = joined_references(PATTON, pressing_references(crack, options))
+    references = joined_references(PATTON, pressing.references)
     return result.assign_attrs(references=references, achieved_residual=residual)
 
 
 def _warn(joints: Sequence[WornJoint]) -> None:
     """Warn of presses that did not converge, and of slopes beyond small strains."""
-    warn_steep([{"rms_slope": np.array([joint.steepest])} for joint in joints], WHERE, stacklevel=5)
+    warn_steep(max(joint.steepest for joint in joints), WHERE, stacklevel=5)
     failed = sum(joint.unconverged for joint in joints)
     if failed:
         message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"
@@ -237,11 +233,15 @@ def _legs(turning_points: Array, step: float) -> list[Array]:
 
 @dataclass
 class ShearTest:
-    """A test of one joint: what is reported of every position, and the elastic shear stiffness, Pa/m."""
+    """A test of one joint: what is reported of every position, and the elastic shear stiffness, Pa/m.
+
+    `reason` says why it ended before the path did.
+    """
 
     joint: WornJoint
     rows: list[dict[str, float]]
     shear_stiffness: float
+    reason: str = ""
 
 
 def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, progress: bool) -> ShearTest:
@@ -253,11 +253,16 @@ def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, 
     test = ShearTest(
         joint, [joint.report(state, first) | _stresses(joint, force, 0.0, math.nan, 1)], math.inf
     )
+
+    def normal_force(height: float) -> float:
+        return max(force + spring * (height - first), SMALLEST_FORCE * force)
+
     total = sum(leg.size - 1 for leg in legs)
     pairs = ((pair, i == 0) for leg in legs for i, pair in enumerate(itertools.pairwise(leg)))
     for (here, there), begins in track(pairs, progress, f"shear under {force:g} N", unit="cell", total=total):
-        step = balanced_step(joint, here, there, load, friction, lambda z: force + spring * (z - first))
-        if step is None:
+        step = balanced_step(joint, here, there, load, friction, normal_force)
+        if isinstance(step, str):
+            test.reason = step
             break
         rise = (step.state.height - state.height) / abs(there - here)
         stresses = _stresses(joint, *step.forces(friction), rise, 1 if there > here else -1)
@@ -315,7 +320,7 @@ def _dataset(
         result[name].attrs["reason"] = "NaN before the first step"
     if np.isnan(columns["shear_stress"]).any():
         for name in (*columns, *peaks, "shear_displacement"):
-            result[name].attrs["reason"] = CRUSHED
+            result[name].attrs["reason"] = "; ".join(sorted({test.reason for test in tests} - {""}))
     if np.isnan(finite).any():
         result["shear_stiffness"].attrs["reason"] = "NaN where the faces have no compliance of their own"
     return result.transpose("point", "nominal_pressure")

@@ -9,16 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.grid import read_grid
-from fractalcontact.base.numbers import float_array
 from fractalcontact.base.polynomial import detrended, slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._compass import LARGEST_AZIMUTH, read_direction
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-AZIMUTHS = tuple(5.0 * i for i in range(72))
+EVERY_5_DEGREES = tuple(5.0 * i for i in range(72))
 THRESHOLDS = 200  # thresholds of dip at which the law is fitted; 100 or 400 change C by less than 0.1 %
 LARGEST_SHAPE = 1e6
 ROUNDING = 64 * np.finfo(np.float64).eps  # smallest slope, over the greatest height over the spacing
@@ -31,8 +30,8 @@ REFERENCES = (
 )
 
 
-def _check(problems: Problems, *, surface: Any, azimuth: Any) -> None:
-    problems.numbers("azimuth", azimuth, at_least=-LARGEST_AZIMUTH, at_most=LARGEST_AZIMUTH)
+def _check(problems: Problems, *, surface: Any, direction: Any) -> None:
+    check_directions(problems, direction)
     if problems.surface("surface", surface, finite=False):
         complete = np.isfinite(surface.values)
         complete = complete[1:, 1:] & complete[1:, :-1] & complete[:-1, 1:] & complete[:-1, :-1]
@@ -46,7 +45,7 @@ def _check(problems: Problems, *, surface: Any, azimuth: Any) -> None:
     check=_check,
 )
 def directional_roughness(
-    surface: xr.DataArray, *, azimuth: float | Sequence[float] = AZIMUTHS
+    surface: xr.DataArray, *, direction: str | float | Sequence[str | float] = EVERY_5_DEGREES
 ) -> xr.Dataset:
     """Return the directional roughness of a surface after Grasselli, from its facets that face the shear.
 
@@ -58,9 +57,9 @@ def directional_roughness(
     ----------
     surface : DataArray, shape (y, x)
         Heights, m; cells beside a missing height (NaN) are left out.
-    azimuth : float or sequence of float
-        Directions in which the block above the surface slides, degree (E = 0, anticlockwise). Default: every
-        5 degrees.
+    direction : str, float, or a sequence of them
+        Directions in which the block above the surface slides: compass words, or degrees anticlockwise from
+        E. Default: every 5 degrees.
 
     Returns
     -------
@@ -72,7 +71,7 @@ def directional_roughness(
     Raises
     ------
     InvalidInput
-        `surface` is no surface or has no four neighbouring heights, or an azimuth is no number.
+        `surface` is no surface or has no four neighbouring heights, or a direction is wrong.
 
     Notes
     -----
@@ -93,19 +92,19 @@ def directional_roughness(
     >>> x = np.arange(401) % 20
     >>> teeth = np.minimum(x, (20 - x) / 3) * np.ones((5, 1))  # rise by 45 degrees, fall by atan(1/3)
     >>> surface = fc.surfaces.from_array(1e-3 * teeth, 1e-3)
-    >>> result = fc.joints.directional_roughness(surface, azimuth=[0, 180])
+    >>> result = fc.joints.directional_roughness(surface, direction=["E", "W"])
     >>> result.roughness_metric.values.round(1).tolist()
     [45.0, 18.4]
     >>> result.area_fraction.values.round(3).tolist()  # 5 sqrt(2) and 15 sqrt(10/9) of each tooth
     [0.309, 0.691]
     """
-    azimuths = float_array(azimuth)
+    directions = read_directions(direction)
     facets = _facets(np.asarray(surface.values, dtype=np.float64), read_grid(surface).spacing)
-    measures = np.array([_facing(facets, read_direction(float(angle)).unit) for angle in azimuths])
+    measures = np.array([_facing(facets, towards.unit) for towards in directions])
     names = ("area_fraction", "theta_max", "shape", "roughness_metric", "mean_dip")
     result = xr.Dataset(
         {name: ("azimuth", values) for name, values in zip(names, measures.T, strict=True)},
-        coords={"azimuth": azimuths},
+        coords={"azimuth": [towards.azimuth for towards in directions]},
     )
     if np.isnan(result["shape"]).any():
         result["shape"].attrs["reason"] = NO_FACET

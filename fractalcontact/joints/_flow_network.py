@@ -10,7 +10,7 @@ single cells.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,12 @@ from fractalcontact.base.coords import check_leading
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+# Of the mean opening: less counts as contact. It carries 1e-9 of the flow of the mean, and is lost in the
+# rounding of greater links beside it. In 600 drawn gaps with openings over 1 to 11 decades the pressures were
+# wrong by up to .003 of their range, against .7 with 1e-4, 6 with 1e-5 and 1e76 with 0. Of rough faces that
+# `press` closed up to where the flow stops, the flow is the same to 7 digits.
+SMALLEST_OPENING = 1e-3
 
 REMEDY = "fill the faces with fractalcontact.surfaces.fill, or close what is unknown with gap.fillna(0)"
 
@@ -36,21 +42,31 @@ def check_gap(problems: Problems, gap: Any, taken: Collection[str]) -> bool:
     return problems.require(below == 0, "gap", expected, f"{below} planes that are below zero everywhere")
 
 
+def narrow_cells(gap: Array) -> Array:
+    """Return which open cells are too narrow to conduct."""
+    mean = np.maximum(gap, 0.0).mean(axis=(-2, -1), keepdims=True)
+    return np.asarray((gap > 0) & (gap < SMALLEST_OPENING * mean))
+
+
+def conducting(gap: Array) -> Array:
+    """Return the opening of the cells that conduct, 0 for all others."""
+    return np.where((gap > 0) & ~narrow_cells(gap), gap, 0.0)
+
+
 @dataclass(frozen=True)
 class Network:
-    """Conductances of the links between cells i and j, and of the first and last column to the two ends.
+    """Conductances of the links between cells i and j, and the axis of each (0 for y).
 
-    `jump` is the pressure drop across a link beyond that of its cells: 1 where the link closes a period along
-    the flow, else 0. `along` tells the links along the flow from those across.
+    `jump` is the pressure drop across a link beyond that of its cells: 1 where a link closes a period along
+    the flow of a plane that repeats, else 0. Links that close a period have `closes`.
     """
 
     i: Array
     j: Array
     conductance: Array
+    axis: Array
+    closes: Array
     jump: Array
-    along: Array
-    inlet: Array
-    outlet: Array
     shape: tuple[int, int]
 
 
@@ -62,47 +78,62 @@ class Held:
     inflow: Array
     energy: Array
 
+    def add(self, place: Any, conductance: Array, pressure: float) -> None:
+        """Hold the cells at a place at a pressure, through a conductance each."""
+        self.conductance[place] += conductance
+        self.inflow[place] += conductance * pressure
+        self.energy[place] += conductance * pressure**2
 
-def held_ends(network: Network) -> Held:
-    """Hold the pressure 1 at the first end and 0 at the last one."""
-    conductance, inflow = np.zeros(network.shape), np.zeros(network.shape)
-    conductance[:, 0] += network.inlet
-    conductance[:, -1] += network.outlet
-    inflow[:, 0] = network.inlet
-    return Held(conductance, inflow, inflow)
+
+def nothing_held(shape: tuple[int, ...]) -> Held:
+    """Return that no pressure is held yet."""
+    return Held(np.zeros(shape), np.zeros(shape), np.zeros(shape))
+
+
+def line_of(axis: int, place: int) -> tuple[Any, Any]:
+    """Return the index of a line of cells across an axis."""
+    return (place, slice(None)) if axis == 0 else (slice(None), place)
+
+
+def edge_conductance(cells: Array, ratio: float, axis: int, place: int) -> Array:
+    """Return the conductances from the cells of an edge line to that edge, half a cell away."""
+    return np.asarray(2.0 * (ratio if axis == 1 else 1.0 / ratio) * cells[line_of(axis, place)])
 
 
 def link_network(cells: Array, ratio: float, wraps: tuple[bool, bool]) -> Network:
-    ny, nx = cells.shape
-    along, across = _link_conductances(cells, wraps)
-    number = np.arange(ny * nx).reshape(ny, nx)
-    right = np.roll(number, -1, axis=1)[:, : along.shape[1]]
-    below = np.roll(number, -1, axis=0)[: across.shape[0]]
-    i = np.concatenate([number[:, : along.shape[1]].ravel(), number[: across.shape[0]].ravel()])
-    j = np.concatenate([right.ravel(), below.ravel()])
-    conductance = np.concatenate([(along * ratio).ravel(), (across / ratio).ravel()])
-    jump = np.zeros(conductance.size)
-    jump[: along.size] = np.broadcast_to(np.arange(along.shape[1]) == nx - 1, along.shape).ravel()
-    is_open = conductance > 0
-    ends = np.zeros((ny, 2)) if wraps[1] else 2.0 * ratio * cells[:, [0, -1]]
-    is_along = np.arange(conductance.size)[is_open] < along.size
-    i, j, conductance, jump = i[is_open], j[is_open], conductance[is_open], jump[is_open]
-    return Network(i, j, conductance, jump, is_along, ends[:, 0], ends[:, 1], (ny, nx))
+    """Return the links of cells of given conductivity; `ratio` is the spacing of y over that of x."""
+    links = []
+    number = np.arange(cells.size).reshape(cells.shape)
+    for axis, conductances in enumerate(_link_conductances(cells, wraps)):
+        n = conductances.shape[axis]
+        closes = np.broadcast_to(_across(np.arange(n) == cells.shape[axis] - 1, axis), conductances.shape)
+        first = np.take(number, np.arange(n), axis)
+        second = np.take(np.roll(number, -1, axis), np.arange(n), axis)
+        scaled = conductances * (ratio if axis == 1 else 1.0 / ratio)
+        links.append([part.ravel()[scaled.ravel() > 0] for part in (first, second, scaled, closes)])
+    axis_of = np.repeat([0, 1], [links[0][0].size, links[1][0].size])
+    i, j, conductance, closes = (np.concatenate(parts) for parts in zip(*links, strict=True))
+    shape = (cells.shape[0], cells.shape[1])
+    return Network(i, j, conductance, axis_of, closes, np.zeros(conductance.size), shape)
+
+
+def _across(values: Array, axis: int) -> Array:
+    return values[:, None] if axis == 0 else values[None, :]
 
 
 def _link_conductances(cells: Array, wraps: tuple[bool, bool]) -> tuple[Array, Array]:
-    """Return the conductances of the links to the next column and to the next row.
+    """Return the conductances of the links to the next row and to the next column.
 
-    There is one link fewer than columns, or rows, unless that axis wraps.
+    There is one link fewer than rows, or columns, unless that axis wraps.
     """
     ny, nx = cells.shape
     padded = np.pad(cells, ((1, 1), (0, 0)), mode="wrap" if wraps[0] else "edge")
     padded = np.pad(padded, ((0, 0), (1, 1)), mode="wrap" if wraps[1] else "edge")
     a, b, c, d = padded[:-1, :-1], padded[:-1, 1:], padded[1:, 1:], padded[1:, :-1]
     gain_x, gain_y = _corner_gain(a, b, c, d), _corner_gain(a, d, c, b)
-    along = _series(padded[1:-1, 1:-1], padded[1:-1, 2:]) * np.maximum(gain_x[:-1, 1:], gain_x[1:, 1:])
-    across = _series(padded[1:-1, 1:-1], padded[2:, 1:-1]) * np.maximum(gain_y[1:, :-1], gain_y[1:, 1:])
-    return along[:, : nx if wraps[1] else nx - 1], across[: ny if wraps[0] and ny > 1 else ny - 1]
+    along_x = _series(padded[1:-1, 1:-1], padded[1:-1, 2:]) * np.maximum(gain_x[:-1, 1:], gain_x[1:, 1:])
+    along_y = _series(padded[1:-1, 1:-1], padded[2:, 1:-1]) * np.maximum(gain_y[1:, :-1], gain_y[1:, 1:])
+    return along_y[: ny if wraps[0] else ny - 1], along_x[:, : nx if wraps[1] else nx - 1]
 
 
 def _series(a: Array, b: Array) -> Array:
@@ -125,7 +156,7 @@ def _corner_gain(a: Array, b: Array, c: Array, d: Array) -> Array:
     return np.where(np.isfinite(gain), np.maximum(gain, 1.0), 1.0)
 
 
-def _clusters(network: Network, chosen: Array) -> Array:
+def _clusters(network: Network, chosen: Array | slice = slice(None)) -> Array:
     """Label the clusters of cells (4 neighbours) that the chosen links join."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -136,16 +167,17 @@ def _clusters(network: Network, chosen: Array) -> Array:
     return np.asarray(connected_components(graph.tocsr(), directed=False)[1])
 
 
-def spanning_cells(network: Network) -> Array:
-    """Return which cells belong to an open cluster that reaches from end to end."""
-    labels = _clusters(network, np.ones(network.i.size, bool)).reshape(network.shape)
-    both = np.intersect1d(labels[network.inlet > 0, 0], labels[network.outlet > 0, -1])
-    return np.isin(labels.ravel(), both)
+def spanning_cells(network: Network, axis: int, ends: Sequence[Array]) -> Array:
+    """Return which cells belong to an open cluster that reaches from end to end along an axis."""
+    labels = _clusters(network)
+    plane = labels.reshape(network.shape)
+    first, last = (plane[line_of(axis, place)][end > 0] for place, end in zip((0, -1), ends, strict=True))
+    return np.isin(labels, np.intersect1d(first, last))
 
 
 def held_cells(network: Network, held: Held) -> Array:
     """Return which cells belong to an open cluster that reaches a cell whose pressure is held."""
-    labels = _clusters(network, np.ones(network.i.size, bool))
+    labels = _clusters(network)
     return np.isin(labels, labels[held.conductance.ravel() > 0])
 
 
@@ -172,32 +204,51 @@ def winding_cells(network: Network) -> Array:
     return np.isin(group[labels], winding)
 
 
-def dissipation(network: Network, pressure: Array, percolating: Array) -> float:
-    """Return the flow under a unit pressure drop, computed as its dissipation.
+def dissipation(network: Network, pressure: Array, inside: Array, held: Held) -> float:
+    """Return the dissipation inside clusters at any pressure.
 
-    The error of the dissipation is of second order in that of the pressure.
+    At the solution under a unit drop it is the flow, with an error of second order in that of the pressure.
     """
-    p = pressure.ravel()
-    inside = percolating[network.i]
-    drop = p[network.i[inside]] - p[network.j[inside]] + network.jump[inside]
-    plane = percolating.reshape(network.shape)
-    power = network.conductance[inside] * drop**2
-    inlet = network.inlet[plane[:, 0]] * (1.0 - pressure[plane[:, 0], 0]) ** 2
-    outlet = network.outlet[plane[:, -1]] * pressure[plane[:, -1], -1] ** 2
-    return float(power.sum() + inlet.sum() + outlet.sum())
-
-
-def cell_flows(network: Network, pressure: Array, inside: Array) -> tuple[Array, Array]:
-    """Return the flow through each cell along and across, the mean of its two faces, for a drop of 1."""
     p, chosen = pressure.ravel(), inside[network.i]
-    drop = p[network.i] - p[network.j] + network.jump
-    half = 0.5 * network.conductance * drop * chosen
-    parts = []
-    for part in (half * network.along, half * ~network.along):
-        flow: Array = np.bincount(network.i, part, p.size) + np.bincount(network.j, part, p.size)
-        parts.append(flow.reshape(network.shape))
-    along, across = parts
+    drop = p[network.i[chosen]] - p[network.j[chosen]] + network.jump[chosen]
+    ends = held.conductance.ravel() * p**2 - 2.0 * held.inflow.ravel() * p + held.energy.ravel()
+    return float((network.conductance[chosen] * drop**2).sum() + ends[inside].sum())
+
+
+def even_gradient(shape: tuple[int, int], axis: int) -> Array:
+    """Return the pressure that falls evenly from 1 to 0 along an axis."""
+    n = shape[axis]
+    return np.broadcast_to(_across(1.0 - (np.arange(n) + 0.5) / n, axis), shape)
+
+
+def least_flow(network: Network, axis: int, inside: Array, ends: Sequence[Array]) -> float:
+    """Return the flow of the lines of cells along an axis side by side, under a unit pressure drop.
+
+    Without the links across, the flow is less: cutting links never raises it (Rayleigh). `ends` are the
+    conductances of each line to its two ends, none of a plane that repeats.
+    """
+    chosen = (network.axis == axis) & inside[network.i]
+    line = np.unravel_index(network.i[chosen], network.shape)[1 - axis]
+    count = network.shape[1 - axis]
+    resistance = np.bincount(line, 1.0 / network.conductance[chosen], count)
+    crosses = np.bincount(line, minlength=count) == network.shape[axis] - (len(ends) > 0)
+    for end in ends:
+        crosses &= end > 0
+        resistance[crosses] += 1.0 / end[crosses]
+    return float((1.0 / resistance[crosses]).sum())
+
+
+def cell_flows(network: Network, pressure: Array, inside: Array, axis: int, ends: Sequence[Array]) -> Array:
+    """Return the flow through each cell along y and x, the mean of its two faces, for a drop of 1."""
+    p, chosen = pressure.ravel(), inside[network.i]
+    half = 0.5 * network.conductance * (p[network.i] - p[network.j] + network.jump) * chosen
+    flows = np.empty((2, *network.shape))
+    for each in (0, 1):
+        part = half * (network.axis == each)
+        through = np.bincount(network.i, part, p.size) + np.bincount(network.j, part, p.size)
+        flows[each] = through.reshape(network.shape)
     plane = inside.reshape(network.shape)
-    along[:, 0] += 0.5 * network.inlet * (1.0 - pressure[:, 0]) * plane[:, 0]
-    along[:, -1] += 0.5 * network.outlet * pressure[:, -1] * plane[:, -1]
-    return along, across
+    for place, end, held in zip((0, -1), ends, (1.0, 0.0), strict=False):
+        line = line_of(axis, place)
+        flows[axis][line] += 0.5 * end * np.abs(held - pressure[line]) * plane[line]
+    return flows

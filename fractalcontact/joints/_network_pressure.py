@@ -2,104 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+import math
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra
-from fractalcontact.base.grid import Grid
-from fractalcontact.base.memory import Plane
-from fractalcontact.joints._flow_network import Held, Network, held_cells, link_network
+from fractalcontact.joints._flow_network import Held, Network, dissipation, even_gradient
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LARGEST_DIRECT = 300_000  # unknowns up to which elimination is faster than multigrid
-FLOW_ERROR = 1e-9  # relative error of the flow, in the norm of the preconditioner, that ends the iteration
-RESIDUAL = 1e-6  # relative residual that must be reached as well
+# Relative error of the flow, in the norm of the preconditioner, that ends the iteration. With 1e-9 pressures
+# behind narrow openings were off by up to .02 in four gaps of 192 x 192 cells, with 1e-12 by .002.
+FLOW_ERROR = 1e-12
+RESIDUAL = 1e-6  # relative residual that must be reached as well, and the same of the range of the pressures
+ERROR = 1e-5  # of a result that is returned: elimination has 1e-7 at most, and a recursion loses a digit
+UNKNOWN = (
+    "NaN where the pressure comes out beyond those at the ends, or the flow beyond its bounds: the openings "
+    "differ by more than the precision of the computer resolves"
+)
 MAX_ITERATIONS = 200
 COARSEST = 400  # unknowns of the coarsest grid, solved directly
 LEAF = 9  # cells of a part that nested dissection leaves as it is
-HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones
 
 
-# bytes of an open cell at the peak: 760, 1430 and 1590 by elimination at n = 128, 256, 512; 320 to 620 by
-# multigrid at n = 800, as the allocator reuses its pages or not
-DIRECT_BYTES, MULTIGRID_BYTES = 1600.0, 450.0
-KEPT_BYTES = 48.0  # of a cell of every plane: its opening, and maps of pressure and flux
-
-
-def flow_memory(plane: Plane, _: Mapping[str, Any]) -> float:
-    """Return the bytes of the flow through one plane after the other, and of what is kept of each."""
-    cells = plane.cells / plane.planes
-    by_multigrid = cells > LARGEST_DIRECT and find_spec("pyamg") is not None
-    return cells * (MULTIGRID_BYTES if by_multigrid else DIRECT_BYTES) + KEPT_BYTES * plane.cells
-
-
-class Side(NamedTuple):
-    """An edge, or a line of cells: the axis that it lies across (0 for y) and its place on it (m)."""
-
-    axis: int
-    place: float
-    is_edge: bool
-
-
-class HeldFlow:
-    """A plane whose pressure is 1 at the upstream side, 0 at the downstream one, and `drained` at drains."""
-
-    def __init__(self, grid: Grid, sides: tuple[Side, Side], is_drain: Array, drained: float) -> None:
-        self.grid, self.sides, self.is_drain, self.drained = grid, sides, is_drain, drained
-        self.ratio = grid.spacing[0] / grid.spacing[1]
-        crossed = {side.axis for side in sides}
-        self.wraps = grid.periodic[0] and 0 not in crossed, grid.periodic[1] and 1 not in crossed
-        self.order = nested_dissection(grid.shape, self.wraps)
-
-    def pressure(self, gap: Array) -> tuple[Array, float]:
-        """Return the pressure, NaN where no water comes, and the relative residual."""
-        dry = np.full(gap.shape, np.nan), 0.0
-        largest = float(gap.max())
-        if not largest > 0:
-            return dry
-        cells = np.maximum(gap / largest, 0.0) ** 3
-        network = link_network(cells, self.ratio, self.wraps)
-        network = replace(network, jump=np.zeros_like(network.jump))  # the pressures are held, not a gradient
-        held = self._held(cells)
-        wet = held_cells(network, held)
-        if not wet.any():
-            return dry
-        pressure, residual = pressures(network, wet, self.order, held)
-        return np.where(wet.reshape(gap.shape), pressure, np.nan), residual
-
-    def _held(self, cells: Array) -> Held:
-        fixed = HELD * (self.ratio + 1.0 / self.ratio) * cells
-        conductance = fixed * self.is_drain
-        inflow, energy = conductance * self.drained, conductance * self.drained**2
-        for side, p in zip(self.sides, (1.0, 0.0), strict=True):
-            n, half = cells.shape[side.axis], 2.0 * (self.ratio if side.axis == 1 else 1.0 / self.ratio)
-            row = min(int(side.place / self.grid.spacing[side.axis]), n - 1)
-            line = (slice(None), row) if side.axis == 1 else (row, slice(None))
-            added = half * cells[line] if side.is_edge else fixed[line]
-            conductance[line] += added
-            inflow[line] += p * added
-            energy[line] += p**2 * added
-        return Held(conductance, inflow, energy)
-
-    @property
-    def sense(self) -> float:
-        """1 where the flow leaves the upstream side towards rising coordinates, else -1."""
-        upstream, downstream = self.sides
-        same_axis = downstream.axis == upstream.axis
-        beyond = downstream.place if same_axis else 0.5 * self.grid.extent[upstream.axis]
-        return 1.0 if beyond > upstream.place else -1.0
-
-    def distances(self, *, both_ends: bool = False) -> Array:
-        """Return the distance (m) of rows of cells, or of both ends of the plane, from the upstream side."""
-        upstream = self.sides[0]
-        spacing, n = self.grid.spacing[upstream.axis], self.grid.shape[upstream.axis]
-        places = np.array([0.0, n]) if both_ends else np.arange(n) + 0.5
-        return self.sense * (places * spacing - upstream.place)
+# Bytes of memory at the peak, for each cell: 320 to 620 by multigrid at n = 800, as the allocator reuses its
+# pages or not. Elimination takes 760, 1430 and 1590 at n = 128, 256 and 512, up to .5 GB beside multigrid.
+FLOW_BYTES = 620.0
 
 
 def nested_dissection(shape: tuple[int, ...], wraps: tuple[bool, bool]) -> Array:
@@ -126,14 +57,17 @@ def _dissected(cells: Array) -> list[Array]:
     return [*_dissected(cells[:, :middle]), *_dissected(cells[:, middle + 1 :]), cells[:, middle]]
 
 
-def pressures(network: Network, inside: Array, order: Array, held: Held) -> tuple[Array, float]:
-    """Return the pressure in every cell, zero outside the chosen clusters, and the relative residual.
+def pressures(
+    network: Network, inside: Array, order: Array, held: Held, axis: int = 1
+) -> tuple[Array, float]:
+    """Return the pressure in every cell, zero outside the chosen clusters, and its error.
 
-    `inside` are whole clusters of open cells, and `order` all cells as elimination takes them.
+    The error is the relative residual, or by how much the pressure leaves the range of those that are held if
+    that is more; where elimination fails, that of an even gradient along `axis`. `inside` are whole clusters
+    of open cells, and `order` all cells as elimination takes them.
     """
     from scipy.sparse import coo_array, diags_array
 
-    ny, nx = network.shape
     number, chosen = np.cumsum(inside) - 1, inside[network.i]
     i, j, conductance = number[network.i[chosen]], number[network.j[chosen]], network.conductance[chosen]
     size = int(inside.sum())
@@ -144,23 +78,58 @@ def pressures(network: Network, inside: Array, order: Array, held: Held) -> tupl
     index = np.int32 if size < 2**29 else np.int64  # a cell has four links
     links = coo_array((conductance, (i.astype(index), j.astype(index))), shape=(size, size)).tocsr()
     matrix = (diags_array(diagonal) - links - links.T).tocsr()
-    p = np.broadcast_to(1.0 - (np.arange(nx) + 0.5) / nx, (ny, nx)).ravel()[inside]
-    scale = float(np.linalg.norm(source)) or 1.0
+    even = even_gradient(network.shape, axis)
+    p = even.ravel()[inside]
+    scale, possible = float(np.linalg.norm(source)) or 1.0, _held_range(inside, held)
     residual = source - matrix @ p
     if np.linalg.norm(residual) > 1e-14 * scale:
         free = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
-        power = _power(network, _on_plane(p, inside, network.shape).ravel(), inside, held)
+        power = dissipation(network, even, inside, held)
         sequence = number[order[inside[order]]]
         sequence = (np.cumsum(free) - 1)[sequence[free[sequence]]]
-        p[free] += _solve(matrix[free][:, free], residual[free], sequence, power, RESIDUAL * scale)
-        residual = source - matrix @ p
-    return _on_plane(p, inside, network.shape), float(np.linalg.norm(residual)) / scale
+        system = System(matrix[free][:, free], residual[free], p[free], power, RESIDUAL * scale, possible)
+        step = _solve(system, sequence)
+        if step is not None:
+            p[free] += step
+            residual = source - matrix @ p
+    error = max(float(np.linalg.norm(residual)) / scale, possible.missed_by(p))
+    pressure = np.zeros(inside.size)
+    pressure[inside] = p
+    return pressure.reshape(network.shape), error
 
 
-def _on_plane(p: Array, percolating: Array, shape: tuple[int, int]) -> Array:
-    pressure = np.zeros(percolating.size)
-    pressure[percolating] = p
-    return pressure.reshape(shape)
+class Range(NamedTuple):
+    """The pressures that are held; all others lie between them."""
+
+    low: float
+    high: float
+
+    def missed_by(self, p: Array) -> float:
+        return float(max(p.max() - self.high, self.low - p.min(), 0.0))
+
+
+def _held_range(inside: Array, held: Held) -> Range:
+    conductance = held.conductance.ravel()[inside]
+    is_held = conductance > 0
+    if not is_held.any():
+        return Range(-math.inf, math.inf)
+    values = held.inflow.ravel()[inside][is_held] / conductance[is_held]
+    return Range(float(values.min()), float(values.max()))
+
+
+class System(NamedTuple):
+    """Equations of the step from pressures p to the solution, and when it is reached.
+
+    `power` is the dissipation at p, `residual` the greatest norm of what is left of b, and `possible` the
+    range of the pressures.
+    """
+
+    matrix: Any
+    b: Array
+    p: Array
+    power: float
+    residual: float
+    possible: Range
 
 
 def _without_reference_cells(matrix: Any) -> Array:
@@ -173,26 +142,24 @@ def _without_reference_cells(matrix: Any) -> Array:
     return free
 
 
-def _solve(matrix: Any, b: Array, order: Array, power: float, residual: float) -> Array:
-    """Solve a large system by multigrid where it is installed, a small one by elimination.
+def _solve(system: System, order: Array) -> Array | None:
+    """Solve a large system by multigrid where it is installed, a small one by elimination in this order.
 
-    `order` is that of the elimination, `power` the dissipation before the correction by the solution.
+    None where the matrix is singular to rounding.
     """
     from scipy.sparse.linalg import splu
 
-    if b.size > LARGEST_DIRECT:
-        try:
-            preconditioner = _multigrid(matrix)
-        except ImportError:
-            pass
-        else:
-            p = _conjugate_gradients(matrix, b, preconditioner, power, residual)
-            if p is not None:
-                return p
+    matrix, b = system.matrix, system.b
+    if b.size > LARGEST_DIRECT and find_spec("pyamg") is not None:
+        step = _conjugate_gradients(system, _multigrid(matrix))
+        if step is not None:
+            return step
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     try:
         ordered = matrix[order][:, order].tocsc()
         factors = splu(ordered, permc_spec="NATURAL", relax=1, panel_size=8, options=options)
+    except RuntimeError:  # a pivot of 0: links to a part of the plane are lost in the rounding of its own
+        return None
     except MemoryError as error:
         raise MissingExtra(f"the flow through {b.size} open cells", "pyamg", "flow") from error
     x = np.empty_like(b)
@@ -230,33 +197,28 @@ def _multigrid(matrix: Any) -> Any:
     return cycle.aspreconditioner()
 
 
-def _conjugate_gradients(
-    matrix: Any, b: Array, preconditioner: Any, power: float, residual: float
-) -> Array | None:
+def _conjugate_gradients(system: System, preconditioner: Any) -> Array | None:
     """Solve A x = b by preconditioned conjugate gradients; None where the tolerance is not reached.
 
     The dissipation of the flow is `power` - b x at the solution. Before it is reached, the dissipation is too
-    high by e A e (e the error of x), which r M r estimates (r the residual, M the preconditioner).
+    high by e A e (e the error of x), which r M r estimates (r the residual, M the preconditioner). Parts that
+    only narrow openings join to the rest hardly dissipate: there the range of the pressures tells.
     """
+    b = system.b
     x, r = np.zeros(b.size), b.copy()
     t, previous = np.zeros(b.size), 1.0
     for _ in range(MAX_ITERATIONS):
         z = preconditioner @ r
         r_z = float(r @ z)
-        if r_z <= FLOW_ERROR * (power - float(b @ x)) and np.linalg.norm(r) <= residual:
+        is_balanced = np.linalg.norm(r) <= system.residual
+        flow = max(system.power - float(b @ x), FLOW_ERROR * system.power)  # none where no path crosses
+        is_balanced &= r_z <= FLOW_ERROR * flow
+        if is_balanced and system.possible.missed_by(system.p + x) <= RESIDUAL:
             return x
         t = z + (r_z / previous) * t
-        a_t = matrix @ t
+        a_t = system.matrix @ t
         tau = r_z / float(t @ a_t)
         x += tau * t
         r -= tau * a_t
         previous = r_z
     return None
-
-
-def _power(network: Network, p: Array, inside: Array, held: Held) -> float:
-    """Return the dissipation at any pressure, to the precision that the tolerance of the solution needs."""
-    chosen = inside[network.i]
-    drop = p[network.i[chosen]] - p[network.j[chosen]] + network.jump[chosen]
-    ends = held.conductance.ravel() * p**2 - 2.0 * held.inflow.ravel() * p + held.energy.ravel()
-    return float((network.conductance[chosen] * drop**2).sum() + ends[inside].sum())

@@ -5,29 +5,29 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-import fractalcontact as fc  # loads `contact` on first use
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
+from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.errors import AnisotropyWarning, ConvergenceWarning
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, float_array, word_tuple
-from fractalcontact.joints._closure import Pressing, ShearedContact, check_pressing
-from fractalcontact.joints._compass import checked_direction, read_direction
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
+from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
+
+if TYPE_CHECKING:
+    from fractalcontact.contact.solver import LoadPath, ShearPath
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.partial_slip"
-METHODS = ("superposition", "full")
-LOADS = ("closure", "normal_force", "nominal_pressure")
 LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient
-ROUNDING = 1e-12
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 BLOCK_ROUNDING = 1e-3  # relative error of the tangential stiffness, and more
 COLUMNS = (
@@ -52,32 +52,40 @@ def _check(
     nominal_pressure: Any,
     **solver: Any,
 ) -> None:
+    from fractalcontact.contact import solver as contact_solver
+
     direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
-    problems.number("friction_coefficient", friction_coefficient, above=0, optional=True)
+    problems.number("friction_coefficient", friction_coefficient, above=0, at_most=1e3, optional=True)
     problems.numbers("tangential_force", tangential_force)
-    problems.choice("method", method, METHODS)
+    problems.choice("method", method, contact_solver.METHODS, optional=True)
     problems.choices("keep", keep, SLIP_MAPS)
     problems.boolean("progress", progress)
-    load = problems.construct(
-        fc.contact.LoadPath.from_keywords,
-        closure=closure,
-        normal_force=normal_force,
-        nominal_pressure=nominal_pressure,
-    )
-    check_pressing(problems, crack, load, "flat_block", None, solver)
+    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
+    load = check_pressing(problems, crack, loads, solver)
     if load is None:
         return
     expected = "one number: the normal load is constant while the tangential force changes"
     problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
     if problems.messages or load.control == "closure":  # under a closure the force is not known yet
         return
-    force = load.values[0] * (crack.nominal_area if load.control == "nominal_pressure" else 1.0)
-    limit = _friction(crack, friction_coefficient) * force
-    problems.require(limit > 0, "basic_friction_angle", "above 0, or a friction_coefficient", 0.0)
-    greatest = float(np.abs(float_array(tangential_force)).max())
-    expected = f"at most friction times normal force, {limit:.8g} N, where sliding begins"
-    problems.require(greatest <= limit * (1 + ROUNDING), "tangential_force", expected, greatest)
+    path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
+    expected = "above 0, or a friction_coefficient"
+    if problems.require(path.friction > 0, "basic_friction_angle", expected, 0.0):
+        contact_solver.check_sliding(problems, path, float(load.solver_values(crack.nominal_area)[1][0]))
+
+
+def _shear_path(
+    crack: Crack, forces: Any, direction: Any, friction_coefficient: Any, method: str | None
+) -> ShearPath:
+    from fractalcontact.contact.solver import ShearPath
+
+    y, x = read_direction(direction).unit
+    friction = friction_coefficient
+    if friction is None:
+        friction = math.tan(math.radians(crack.basic_friction_angle))
+    forces = tuple(float_array(forces).tolist())
+    return ShearPath(forces, (x, y), float(friction), crack.contact_poisson, method)
 
 
 @public_result(title="Partial slip of a joint", references=PAPER, check=_check)
@@ -91,7 +99,7 @@ def partial_slip(
     normal_force: float | None = None,
     nominal_pressure: float | None = None,
     friction_coefficient: float | None = None,
-    method: str = "superposition",
+    method: str | None = None,
     influence: str | None = None,
     disc_radius: str | float = "second_order",
     tolerance: float = 1e-8,
@@ -118,7 +126,7 @@ def partial_slip(
     friction_coefficient : float, optional
         Local friction mu; None: the tangent of the basic friction angle of the crack.
     method, influence, disc_radius, tolerance
-        As for `fractalcontact.contact.partial_slip`.
+        As for `fractalcontact.contact.partial_slip`; None chooses the method at each shear.
     keep : sequence of str
         Maps over (shear, step, y, x): "slip_state", "traction_x", "traction_y", "slip_x", "slip_y".
     progress : bool
@@ -152,130 +160,89 @@ def partial_slip(
     >>> round(float(pushed["sliding_force"][0]), 1)
     70.0
     """
-    towards, forces = read_direction(direction), float_array(tangential_force)
-    friction = _friction(crack, friction_coefficient)
-    load = fc.contact.LoadPath.from_keywords(
-        closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
-    )
-    options = fc.contact.ContactOptions(influence=influence, disc_radius=disc_radius, tolerance=tolerance)
-    names, shears = word_tuple(keep), float_array(shear)
-    pressing = Pressing(load, options, "flat_block", names, WHERE)
-    results = []
-    for value in track(shears, progress, "partial_slip", unit="shear"):
-        contact = ShearedContact(crack, float(value), towards, pressing)
-        results.append(_pushed(crack, contact, load, forces, towards.azimuth, friction, method, names))
-    result = xr.concat([each.expand_dims("shear") for each in results], "shear", join="override")
-    result = result.set_coords(LOADS)
-    poisson = crack.contact_poisson
-    result = result.assign(
-        nominal_area=crack.nominal_area,
-        friction_coefficient=friction,
-        poisson=poisson,
-        stuck_ratio=2 * (1 - poisson) / (2 - poisson),
-    ).assign_coords(shear=("shear", shears), tangential_force=("step", forces), direction=towards.name)
-    if names:
-        result = result.assign_coords(block_coords(crack))
+    towards, shears, names = read_direction(direction), float_array(shear), word_tuple(keep)
+    path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
+    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
+    solver = {"influence": influence, "disc_radius": disc_radius, "tolerance": tolerance}
+    pressing = Pressing.read(crack, WHERE, loads, solver)
+    rows = [
+        _pushed(ShearedContact(pressing, float(value), towards), path, names)
+        for value in track(shears, progress, "partial_slip", unit="shear")
+    ]
+    dims = ("shear", "step", "y", "x")
+    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
+    variables |= {
+        "nominal_area": crack.nominal_area,
+        "friction_coefficient": path.friction,
+        "poisson": path.poisson,
+        "stuck_ratio": 2 * (1 - path.poisson) / (2 - path.poisson),
+    }
+    coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
+    coords |= {"shear": ("shear", shears), "step": np.arange(len(path.forces))}
+    coords |= {"tangential_force": ("step", np.array(path.forces))}
+    coords |= {"direction": towards.name, "azimuth": towards.azimuth}
+    result = xr.Dataset(variables, coords | (block_coords(crack) if names else {}))
     for name in ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio"):
         finite = np.isfinite(result[name])
         if not finite.all():
             result[name] = result[name].where(finite)
             result[name].attrs["reason"] = RIGID
-    _warn(result, shears)
-    return result.assign_attrs(method=method, achieved_residual=float(result["residual"].max()))
+    _warn(result)
+    return result.assign_attrs(achieved_residual=float(result["residual"].max()))
 
 
-def _friction(crack: Crack, friction_coefficient: float | None) -> float:
-    if friction_coefficient is not None:
-        return float(friction_coefficient)
-    return math.tan(math.radians(crack.basic_friction_angle))
-
-
-def _pushed(
-    crack: Crack,
-    contact: ShearedContact,
-    load: fc.contact.LoadPath,
-    forces: Array,
-    azimuth: float,
-    friction: float,
-    method: str,
-    names: Sequence[str],
-) -> xr.Dataset:
+def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> dict[str, Any]:
     """Return the path of tangential forces at one shear, with the normal stiffness at its load."""
-    loads: dict[str, Any] = {load.control: load.values[0]}
-    given = {
-        key: value for key, value in contact.options.keywords().items() if key not in ("hardness", "method")
-    }
-    try:
-        with warnings.catch_warnings():
-            for category in (ConvergenceWarning, SmallStrainWarning):  # one warning follows for all shears
-                warnings.simplefilter("ignore", category)
-            slipped = fc.contact.partial_slip(
-                contact.surface,
-                contact_modulus=contact.modulus,
-                poisson=crack.contact_poisson,
-                friction_coefficient=friction,
-                tangential_force=forces,
-                azimuth=azimuth,
-                method=method,
-                keep=names,
-                **given,
-                **loads,
-            )
-            normal = float(slipped["normal_force"])
-            normal_stiffness = _normal_stiffness(contact, normal, given)
-    except InvalidInput as error:
-        raise InvalidInput(WHERE, [f"{line} ({contact.place})" for line in error.problems]) from error
-    area, block = crack.nominal_area, _block_stiffness(crack, contact, azimuth, method, given)
-    shear_stiffness = _without_block(slipped["tangential_stiffness"].values, block) / area
-    interface_stiffness = float(_without_block(np.array([normal_stiffness]), contact.stiffness)[0]) / area
+    from fractalcontact.contact.solver import METHODS
+
+    pressing = contact.pressing
+    sheared = contact.shear(path, keep)
+    area, normal = pressing.crack.nominal_area, sheared.normal_force
+    block = _block_stiffness(pressing, replace(path, method=sheared.method))
+    shear_stiffness = _without_block(sheared.columns["tangential_stiffness"], block) / area
+    normal_stiffness = np.array(_normal_stiffness(contact, normal))
+    interface_stiffness = _without_block(normal_stiffness, pressing.block_stiffness) / area
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = shear_stiffness / interface_stiffness
-    variables: dict[str, Any] = {name: ("step", slipped[name].values) for name in COLUMNS}
-    variables |= {name: (("step", "y", "x"), slipped[name].values) for name in names}
-    variables |= {
-        "shear_stiffness": ("step", shear_stiffness),
-        "stiffness_ratio": ("step", ratio),
+    columns = {name: sheared.columns[name] for name in COLUMNS} | sheared.maps
+    return columns | {
+        "shear_stiffness": shear_stiffness,
+        "stiffness_ratio": ratio,
         "interface_stiffness": interface_stiffness,
-        "sliding_force": friction * normal,
-        "contact_area": float(slipped["contact_area"]),
+        "sliding_force": path.friction * normal,
+        "contact_area": sheared.contact_area,
+        "slip_method": np.int8(METHODS.index(sheared.method)),
+        "superposition_error": sheared.superposition_error,
+        "closure": sheared.closure,
+        "normal_force": normal,
+        "nominal_pressure": normal / pressing.grid.nominal_area,
     }
-    return xr.Dataset(variables | {name: float(slipped[name]) for name in LOADS})
 
 
-def _block_stiffness(
-    crack: Crack, contact: ShearedContact, azimuth: float, method: str, options: dict[str, Any]
-) -> float:
+def _block_stiffness(pressing: Pressing, path: ShearPath) -> float:
     """Return the tangential stiffness of the flat block, all of which sticks, N/m."""
-    if method == "superposition" or not math.isfinite(contact.stiffness):
-        return contact.stiffness * 2 * (1 - crack.contact_poisson) / (2 - crack.contact_poisson)
-    stuck = fc.contact.partial_slip(
-        contact.surface * 0.0,
-        contact_modulus=contact.modulus,
-        poisson=crack.contact_poisson,
-        friction_coefficient=1.0,
-        normal_force=1.0,
-        tangential_force=0.0,
-        azimuth=azimuth,
-        method=method,
-        keep=(),
-        **options,
-    )
-    return float(stuck["tangential_stiffness"][0])
+    if path.method == "superposition" or not math.isfinite(pressing.block_stiffness):
+        return pressing.block_stiffness * 2 * (1 - path.poisson) / (2 - path.poisson)
+    from fractalcontact.contact.solver import solve_shear
+
+    flat, load = np.zeros(pressing.grid.shape), _forces(pressing, 1.0)
+    problem = (pressing.grid, pressing.modulus, pressing.options, load)
+    stuck = solve_shear(flat, *problem, replace(path, forces=(0.0,), friction=1.0))
+    return float(stuck.columns["tangential_stiffness"][0])
 
 
-def _normal_stiffness(contact: ShearedContact, normal: float, options: dict[str, Any]) -> float:
+def _normal_stiffness(contact: ShearedContact, normal: float) -> float:
     """Return the derivative of the normal force by the closure, N/m."""
     if normal <= 0:
         return 0.0
-    pressed = fc.contact.press(
-        contact.surface,
-        contact_modulus=contact.modulus,
-        normal_force=[normal * (1 - LOAD_CHANGE), normal * (1 + LOAD_CHANGE)],
-        keep=(),
-        **options,
-    )
-    change = float(np.diff(pressed["closure"].values)[0])
+    forces = _forces(contact.pressing, normal * (1 - LOAD_CHANGE), normal * (1 + LOAD_CHANGE))
+    change = float(np.diff(contact.press(forces)["closure"])[0])
     return 2 * LOAD_CHANGE * normal / change if change > 0 else math.inf
+
+
+def _forces(pressing: Pressing, *values: float) -> LoadPath:
+    return replace(pressing.load, control="normal_force", values=values)
 
 
 def _without_block(stiffness: Array, block: float) -> Array:
@@ -286,13 +253,26 @@ def _without_block(stiffness: Array, block: float) -> Array:
         return np.asarray(np.where(is_block, np.inf, 1 / compliance))
 
 
-def _warn(result: xr.Dataset, shears: Array) -> None:
+def _warn(result: xr.Dataset) -> None:
+    """Warn of steps that did not converge, and of contacts with a lay that were solved by superposition."""
+    from fractalcontact.contact.solver import ACCEPTABLE_ERROR, METHODS
+
     failed = np.argwhere(~result["converged"].values)
     if failed.size:
         row, step = failed[0]
         warnings.warn(
             f"{WHERE}: {len(failed)} steps not converged, the first of them step {step} at a shear of "
-            f"{shears[row]:g} m (residual up to {float(result['residual'].max()):.2g})",
+            f"{float(result['shear'][row]):g} m (residual up to {float(result['residual'].max()):.2g})",
             ConvergenceWarning,
+            stacklevel=4,
+        )
+    by_superposition = result["slip_method"].values == METHODS.index("superposition")
+    error = np.where(by_superposition, result["superposition_error"].values, 0.0)
+    worst = int(np.argmax(np.abs(error)))
+    if abs(error[worst]) > ACCEPTABLE_ERROR:
+        warnings.warn(
+            f"{WHERE}: contacts have a lay, and by superposition their displacements are off by up to "
+            f"{error[worst]:+.0%}, at a shear of {float(result['shear'][worst]):g} m: use method='full'",
+            AnisotropyWarning,
             stacklevel=4,
         )

@@ -37,7 +37,14 @@ TILES = 6  # along each axis, left out one by one for the standard errors
 RANK = 1e-9  # relative; below it a shift or rotation does not change the match
 
 
-def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any) -> None:
+# Of the mismatch: a mean aperture below minus this is an overlap. The faces of a joint that touch have a mean
+# aperture of about two mismatches (1.9 of the gneiss pair), swapped ones minus that, and levelled ones none.
+OVERLAPPING = 0.5
+TURNS = {"x": 0, "y": 1}  # axis of the array that is reversed where a body is turned over about x or y
+
+
+def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, turn_upper: Any) -> None:
+    problems.choice("turn_upper", turn_upper, TURNS, optional=True)
     valid = [
         problems.surface(name, face, finite=False, smallest=SMALLEST)
         for name, face in (("lower", lower), ("upper", upper))
@@ -65,7 +72,12 @@ def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any) -> None
     check=_check,
 )
 def register(
-    lower: xr.DataArray, upper: xr.DataArray, *, rotation: bool = True, tilt: bool = True
+    lower: xr.DataArray,
+    upper: xr.DataArray,
+    *,
+    rotation: bool = True,
+    tilt: bool = True,
+    turn_upper: str | None = None,
 ) -> xr.Dataset:
     """Move the upper of two measured faces into mated position over the lower one.
 
@@ -75,11 +87,13 @@ def register(
     Parameters
     ----------
     lower, upper : DataArray, shape (y, x)
-        Heights (m) of two facing faces, positive upwards and seen from above: a scan of the upper body from
-        below must be mirrored and turned over first. Equal spacing; the extents may differ. Missing heights
-        (NaN) are allowed.
+        Heights (m) of two facing faces, positive upwards and seen from above, in one frame: the aperture is
+        upper - lower. Equal spacing; the extents may differ. Missing heights (NaN) are allowed.
     rotation, tilt : bool
         Whether the face may be rotated and tilted.
+    turn_upper : {"x", "y"}, optional
+        The upper body was scanned with its face up: turn it over about x or y, that is, reverse the other
+        axis and the sign of the heights. Its heights then have a zero of their own.
 
     Returns
     -------
@@ -94,7 +108,8 @@ def register(
     ------
     InvalidInput
         The faces are not on grids of equal spacing, have fewer than 16 points along an axis, do not overlap,
-        have no relief that determines their position, or are rotated by more than about 5 degrees.
+        have no relief that determines their position, or are rotated by more than about 5 degrees; the upper
+        one fits only if turned over, or lies below the lower one.
 
     Warns
     -----
@@ -122,14 +137,50 @@ def register(
         for dim, step in zip(("y", "x"), grid.spacing, strict=True)
     ]
     offset = (starts[0], starts[1])
+    if turn_upper is not None:
+        up = turned_over(up, turn_upper)
     pose = find_pose(low, up, offset, rotation, tilt)
+    if turn_upper is None and not pose.is_certain:
+        _refuse_turned_face(low, up, offset, rotation, tilt)
     if not pose.determined:
         expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
     moved = resample(up, source_places(pose, low.shape, offset))
     moved += _tilted_plane(pose, np.isfinite(moved - low))
     _warn(pose)
-    return _dataset(lower, low, moved, pose, grid)
+    result = _dataset(lower, low, moved, pose, grid)
+    if turn_upper is None:
+        _refuse_swapped_faces(result)
+    return result
+
+
+def turned_over(face: Array, axis: str) -> Array:
+    """Return the heights of a body that is turned over about x or y."""
+    return np.asarray(-np.flip(face, TURNS[axis]))
+
+
+def _refuse_turned_face(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> None:
+    """Raise where the upper face, which does not fit, fits once it is turned over."""
+    for axis in TURNS:
+        if find_pose(lower, turned_over(upper, axis), offset, rotates, tilts).is_certain:
+            cure = (
+                f"expected faces seen from above, got one scanned face up: it fits with turn_upper={axis!r}"
+            )
+            raise InvalidInput(WHERE, [f"upper: {cure}"])
+
+
+def _refuse_swapped_faces(result: xr.Dataset) -> None:
+    """Raise where the upper face lies below the lower one, beyond what a tilt lifts it at its edges."""
+    mean, mismatch = float(result["aperture"].mean()), float(result["mismatch"])
+    lift = sum(
+        abs(float(result[f"tilt_{dim}"])) * float(np.ptp(result[dim].values)) / 2 for dim in ("x", "y")
+    )
+    if mean < -OVERLAPPING * mismatch - lift - UNIFORM * float(np.abs(result["height"]).max()):
+        expected = (
+            "an upper face above the lower one (swap lower and upper; if each was scanned with a zero of its "
+            "own, raise upper by the aperture)"
+        )
+        raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got a mean aperture of {mean:.3g} m"])
 
 
 def _warn(pose: Pose) -> None:
@@ -191,6 +242,11 @@ class Pose:
     iterations: int = 0
     converged: bool = False
     determined: bool = True
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the position is known to a point."""
+        return self.determined and self.converged and max(self.errors[:2]) <= UNCERTAIN
 
 
 def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> Pose:

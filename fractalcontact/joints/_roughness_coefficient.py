@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import Direction, check_directions, direction_coords, read_directions
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
-from fractalcontact.joints._compass import Direction, check_directions, direction_coords, read_directions
+from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, scaled_roughness
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -41,8 +42,6 @@ REGRESSIONS = {
     "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
 }
 DEFAULT_LAG = {"tse_cruden": 0.508e-3, "yu_vayssade": 0.5e-3, "tatone_grasselli": 0.5e-3}
-LARGEST_JRC = 20.0
-SAMPLE_LENGTH = 0.1  # m: the length of joint to which the scale of standard profiles refers
 LAG_TOLERANCE = 0.1  # relative; at H = 0.7 it changes the result by 0.4
 FEWEST_PROFILES = 20  # below, the 2.5 % quantile is lower than every profile but one
 BELOW, INSIDE, ABOVE = np.int8(-1), np.int8(0), np.int8(1)
@@ -119,7 +118,7 @@ def roughness_coefficient(
     Returns
     -------
     Dataset over direction
-        roughness_coefficient, the `roughness` of `barton_choubey_strength`; a value outside 0 to 20 is an
+        roughness_coefficient, the JRC of `strength_envelope`; a value outside 0 to 20 is an
         extrapolation, which scale_position reports. roughness_coefficient_low and _high, between which 95 %
         of the single profiles of the surface lie. profile_slope Z2, lag (m) in use, regression_interval (m).
         With `length` scaled_roughness_coefficient.
@@ -185,7 +184,9 @@ def roughness_coefficient(
         "regression_interval": intervals,
     }
     if length is not None:
-        variables["scaled_roughness_coefficient"] = _scaled(coefficient, float(length))
+        variables["scaled_roughness_coefficient"] = scaled_roughness(
+            np.where(coefficient >= 0, coefficient, np.nan), float(length)
+        )
     result = xr.Dataset(
         {name: ("direction", values) for name, values in variables.items()},
         coords=direction_coords(directions),
@@ -209,12 +210,6 @@ def _coefficient(law: Regression, slope: Any) -> Any:
     """Return JRC of a slope or of several; minus infinity for a slope of 0 under a logarithm."""
     with np.errstate(divide="ignore"):
         return law.offset + law.factor * (np.log10(slope) if law.power is None else slope**law.power)
-
-
-def _scaled(coefficient: Array, length: float) -> Array:
-    """Return JRC of a joint of that length after Barton and Bandis; NaN below the scale."""
-    inside = np.where(coefficient >= 0, coefficient, np.nan)
-    return np.asarray(inside * (length / SAMPLE_LENGTH) ** (-0.02 * inside))
 
 
 def _add_notes(result: xr.Dataset) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import COMPASS
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._compass import COMPASS
 from fractalcontact.joints._crack import Crack
 from fractalcontact.joints._dilatancy import dilatancy
 from fractalcontact.joints._friction import LOCKED_ANGLE, mark_locked

@@ -9,21 +9,24 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import checked_direction, read_direction
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
-from fractalcontact.joints._compass import checked_direction, read_direction
-from fractalcontact.joints._roughness_coefficient import LARGEST_JRC, SAMPLE_LENGTH, roughness_coefficient
-from fractalcontact.joints._strength_criteria import scaled_constants
-from fractalcontact.joints._strength_envelope import FITTED_STRESS, LARGEST, LARGEST_ANGLE, SMALLEST
+from fractalcontact.joints import _criteria
+from fractalcontact.joints._criteria import FITTED_STRESS, LARGEST_ANGLE, LARGEST_JRC, SAMPLE_LENGTH
+from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
+from fractalcontact.joints._strength_envelope import OUTSIDE, STRESS
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-# mobilised over peak roughness against displacement over that at the peak; at no displacement the angle is 0
-MOBILISED = ((0.3, 0.0), (0.6, 0.75), (1.0, 1.0), (2.0, 0.85), (4.0, 0.7), (10.0, 0.5), (100.0, 0.0))
-SMALLEST_PEAK = 1e-4  # displacement at the peak over the length: a smooth joint has none of its own
-FEWEST_STEPS = 200  # of the integration of the dilation, up to the last displacement
+LARGEST = STRESS["at_most"]
+SMALLEST_PEAK = (
+    1e-4  # displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
+)
+FEWEST_STEPS = (
+    200  # of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
+)
 SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
-OUTSIDE = "outside the range of the criterion where in_range is False"
 
 
 def _check(
@@ -35,6 +38,7 @@ def _check(
     wall_strength: Any,
     residual_friction_angle: Any,
     direction: Any,
+    roughness_coefficient: Any,
     length: Any,
     damage_coefficient: Any,
     normal_stiffness: Any,
@@ -42,15 +46,22 @@ def _check(
     if problems.numbers("displacement", displacement, at_least=0, at_most=LARGEST):
         ascending = bool((np.diff(float_array(displacement)) > 0).all())
         problems.require(ascending, "displacement", "ascending values", displacement)
-    problems.numbers("nominal_pressure", nominal_pressure, at_least=SMALLEST, at_most=LARGEST)
-    problems.number("wall_strength", wall_strength, at_least=SMALLEST, at_most=LARGEST)
+    problems.numbers("nominal_pressure", nominal_pressure, **STRESS)
+    problems.number("wall_strength", wall_strength, **STRESS)
     problems.number("residual_friction_angle", residual_friction_angle, above=0, below=LARGEST_ANGLE)
     problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST)
     problems.number("damage_coefficient", damage_coefficient, at_least=1, at_most=2, optional=True)
     problems.number("normal_stiffness", normal_stiffness, above=0, at_most=LARGEST, optional=True)
+    problems.number(
+        "roughness_coefficient", roughness_coefficient, at_least=0, at_most=LARGEST_JRC, optional=True
+    )
     direction = checked_direction(problems, direction)
-    with problems.collect():
-        roughness_coefficient.validate(surface, direction=direction)
+    if surface is None:
+        expected = "heights, or a roughness_coefficient in their place"
+        problems.require(roughness_coefficient is not None, "surface", expected, None)
+    else:
+        with problems.collect():
+            measured_coefficient.validate(surface, direction=direction)
 
 
 @public_result(
@@ -63,13 +74,14 @@ def _check(
     check=_check,
 )
 def shear_curve(
-    surface: xr.DataArray,
+    surface: xr.DataArray | None,
     displacement: float | Sequence[float] | Array,
     *,
     nominal_pressure: float | Sequence[float],
     wall_strength: float,
     residual_friction_angle: float,
     direction: str | float = "E",
+    roughness_coefficient: float | None = None,
     length: float = SAMPLE_LENGTH,
     damage_coefficient: float | None = None,
     normal_stiffness: float | None = None,
@@ -81,8 +93,8 @@ def shear_curve(
 
     Parameters
     ----------
-    surface : DataArray, shape (y, x)
-        Heights of one face, m, of which the JRC is taken.
+    surface : DataArray, shape (y, x), optional
+        Heights of one face, m, of which the JRC is taken. None: a joint that is known by its JRC only.
     displacement : float or sequence of float
         Shear displacements, m, ascending, from 0 on.
     nominal_pressure : float or sequence of float
@@ -92,7 +104,9 @@ def shear_curve(
     residual_friction_angle : float
         phi_r, degree.
     direction : str or float
-        Direction in which the block slides: compass word, or azimuth in degrees.
+        Direction in which the block slides: compass word, or degrees anticlockwise from E.
+    roughness_coefficient : float, optional
+        JRC of 0.1 m, 0 to 20. Default: that of the surface.
     length : float
         Length of the joint, m, at least 0.1, for which JRC, JCS and the peak displacement hold.
     damage_coefficient : float, optional
@@ -129,79 +143,53 @@ def shear_curve(
     >>> curve.friction_angle.values[:, 0].round(1).tolist()
     [0.0, 42.8, 35.5]
     """
-    found = roughness_coefficient(surface, direction=direction).roughness_coefficient
-    roughness = float(found.item()) if math.isfinite(found.item()) and found.item() > 0 else 0.0
-    jrc, jcs, peak = scaled_constants(roughness, float(wall_strength), float(length))
-    peak = max(peak, SMALLEST_PEAK * float(length))
+    jrc_of_sample = math.nan if roughness_coefficient is None else float(roughness_coefficient)
+    if surface is not None and roughness_coefficient is None:
+        measured = measured_coefficient(surface, direction=direction)
+        jrc_of_sample = measured["roughness_coefficient"].item()
+    residual, longer = float(residual_friction_angle), float(length)
+    smooth = float(np.fmax(jrc_of_sample, 0.0))
+    jrc = float(_criteria.scaled_roughness(smooth, longer))
+    jcs = _criteria.scaled_wall_strength(float(wall_strength), smooth, longer)
+    peak = max(_criteria.peak_displacement(smooth, longer), SMALLEST_PEAK * longer)
     given, pressures = float_array(displacement), float_array(nominal_pressure)
+
+    def angles(place: float, sigma: Array) -> tuple[Array, Array]:
+        """Return the angles of friction and dilation (radian) at a displacement under a normal stress."""
+        peak_angle = _criteria.roughness_angle(sigma, jrc, jcs, residual)
+        mobilised = _criteria.mobilised_angle(place / peak, peak_angle, residual)
+        damage = damage_coefficient or _criteria.damage_coefficient(sigma, jrc, jcs)
+        return np.radians(residual + mobilised), np.radians(np.clip(mobilised, 0.0, None) / damage)
+
     # the dilation is an integral: steps finer than the displacements in between
-    fine = np.union1d(given, np.linspace(0.0, given[-1], FEWEST_STEPS + 1)) if given[-1] > 0 else given
+    fine = np.union1d(given, np.linspace(0.0, given[-1], FEWEST_STEPS + 1))
     stiffness = 0.0 if normal_stiffness is None else float(normal_stiffness)
-    sigma = np.empty((pressures.size, fine.size))
-    opening, angle, rise = np.zeros_like(sigma), np.empty_like(sigma), np.empty_like(sigma)
-    for j, place in enumerate(fine):
-        sigma[:, j] = pressures if j == 0 else sigma[:, j - 1]
-        for _ in range(2 if j and stiffness else 1):  # the stress at the end of the step, once corrected
-            dilation = _dilation(sigma[:, j], jrc, jcs, float(residual_friction_angle), damage_coefficient)
-            angle[:, j], rise[:, j] = _mobilised(place / peak, float(residual_friction_angle), *dilation)
-            if j:
-                step = 0.5 * (np.tan(rise[:, j]) + np.tan(rise[:, j - 1])) * (place - fine[j - 1])
-                opening[:, j] = opening[:, j - 1] + step
-                sigma[:, j] = pressures + stiffness * opening[:, j]
-    at = np.searchsorted(fine, given)
-    decades = _dilation(pressures, jrc, jcs, float(residual_friction_angle), damage_coefficient)[0]
-    ratio, dims = pressures / jcs, ("nominal_pressure", "shear_displacement")
-    inside = (ratio >= FITTED_STRESS[0]) & (ratio <= FITTED_STRESS[1]) & (0 <= found.item() <= LARGEST_JRC)
-    result = xr.Dataset(
-        {
-            "shear_stress": (dims, (sigma * np.tan(angle))[:, at]),
-            "normal_stress": (dims, sigma[:, at]),
-            "friction_angle": (dims, np.degrees(angle)[:, at]),
-            "dilatancy_angle": (dims, np.degrees(rise)[:, at]),
-            "dilatancy": (dims, opening[:, at]),
-            "peak_shear_strength": (
-                "nominal_pressure",
-                pressures * np.tan(np.radians(float(residual_friction_angle) + decades)),
-            ),
-            "in_range": ("nominal_pressure", inside),
-            "peak_displacement": peak,
-            "roughness_coefficient": jrc,
-        },
-        coords={
-            "nominal_pressure": pressures,
-            "shear_displacement": given,
-            "direction": read_direction(direction).name,
-        },
-    )
+    sigma, opening, rise = pressures, np.zeros_like(pressures), angles(0.0, pressures)[1]
+    rows, last, before = [], 0.0, rise
+    for place in fine:
+        start = opening
+        for _ in range(2):  # the stress at the end of the step, once corrected
+            friction, rise = angles(place, sigma)
+            opening = start + 0.5 * (np.tan(rise) + np.tan(before)) * (place - last)
+            sigma = pressures + stiffness * opening
+        rows.append((sigma * np.tan(friction), sigma, np.degrees(friction), np.degrees(rise), opening))
+        last, before = place, rise
+    columns = np.array(rows)[np.searchsorted(fine, given)].transpose(1, 0, 2)
+    names = ("shear_stress", "normal_stress", "friction_angle", "dilatancy_angle", "dilatancy")
+    dims, ratio = ("shear_displacement", "nominal_pressure"), pressures / jcs
+    inside = (ratio >= FITTED_STRESS[0]) & (ratio <= FITTED_STRESS[1]) & (0 <= jrc_of_sample <= LARGEST_JRC)
+    variables: dict[str, Any] = {name: (dims, values) for name, values in zip(names, columns, strict=True)}
+    at_peak = np.radians(residual + _criteria.roughness_angle(pressures, jrc, jcs, residual))
+    variables["peak_shear_strength"] = "nominal_pressure", pressures * np.tan(at_peak)
+    variables |= {"in_range": ("nominal_pressure", inside), "peak_displacement": peak}
+    variables["roughness_coefficient"] = jrc
+    coords: dict[str, Any] = {"nominal_pressure": pressures, "shear_displacement": given}
+    if surface is not None:
+        coords["direction"] = read_direction(direction).name
+    result = xr.Dataset(variables, coords)
     result["peak_shear_strength"].attrs["long_name"] = "shear strength at the peak, under the first stress"
     if not inside.all():
         result["shear_stress"].attrs["comment"] = OUTSIDE
-    if found.item() < 0 or not math.isfinite(found.item()):
+    if not jrc_of_sample >= 0:
         result["roughness_coefficient"].attrs["comment"] = SMOOTH
-    return result.transpose("shear_displacement", "nominal_pressure")
-
-
-def _dilation(
-    sigma: Array, jrc: float, jcs: float, residual_angle: float, damage: float | None
-) -> tuple[Array, Array]:
-    """Return the angle of the roughness at the peak, degree, and the damage coefficient M."""
-    decades = np.clip(np.log10(jcs) - np.log10(sigma), 0.0, None)
-    roughness_angle = np.minimum(jrc * decades, LARGEST_ANGLE - residual_angle)
-    if damage is not None:
-        return roughness_angle, np.full(sigma.shape, float(damage))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        coefficient = 0.7 + jrc / (12.0 * decades)
-    return roughness_angle, np.clip(np.nan_to_num(coefficient, nan=2.0), 1.0, 2.0)
-
-
-def _mobilised(
-    place: float, residual_angle: float, roughness_angle: Array, damage: Array
-) -> tuple[Array, Array]:
-    """Return friction and dilation angle (radian) at a displacement over that of the peak."""
-    places, shares = np.array([0.0, *(row[0] for row in MOBILISED)]), [row[1] for row in MOBILISED]
-    if place < places[1]:
-        mobilised = np.full(roughness_angle.shape, -residual_angle * (1.0 - place / places[1]))
-    else:
-        mobilised = roughness_angle * float(np.interp(place, places[1:], shares))
-    dilation = np.clip(mobilised, 0.0, None) / damage
-    return np.radians(residual_angle + mobilised), np.radians(dilation)
+    return result

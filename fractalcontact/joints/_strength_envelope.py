@@ -3,55 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.joints._compass import check_direction, read_direction
+from fractalcontact.joints import _criteria
+from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, STRENGTH, STRENGTH_REFERENCES, Joint
 from fractalcontact.joints._directional_roughness import directional_roughness
-from fractalcontact.joints._roughness_coefficient import LARGEST_JRC, SAMPLE_LENGTH, roughness_coefficient
-from fractalcontact.joints._strength_criteria import scaled_constants
+from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.strength_envelope"
-SMALLEST, LARGEST = 1e-30, 1e30  # Pa: ratios and powers of such stresses do not overflow
-LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
-FITTED_STRESS = (0.01, 0.3)  # normal stress over wall strength of the tests of Barton and Choubey
-SHEARED_POWER, DILATION_POWER = 1.5, 4.0  # K1 and K2 of Ladanyi and Archambault
-STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray)
-RIGHT_ANGLE = 90.0  # degree
+STRESS: dict[str, Any] = {"at_least": 1e-30, "at_most": 1e30}  # Pa: ratios and powers do not overflow
+STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray 1981)
+MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
 OUTSIDE = "outside the range of the criterion where in_range is False"
-
-
-class Joint(NamedTuple):
-    """Measures of the surface and its material; stresses in Pa, angles in degrees."""
-
-    roughness: float
-    asperity_angle: float
-    wall_strength: float
-    tensile_strength: float
-    basic_angle: float
-    residual_angle: float
-    cohesion: float
-    length: float
-    area_fraction: float
-    shape: float
-    theta_max: float
-
-
-class Criterion(NamedTuple):
-    """Strength and range of a criterion, the optional argument it needs, and what it assumes."""
-
-    strength: Callable[[Array, Joint], tuple[Array, Array]]
-    needs: str | None
-    assumption: str
 
 
 def _check(
@@ -63,49 +37,61 @@ def _check(
     basic_friction_angle: Any,
     criterion: Any,
     direction: Any,
-    residual_friction_angle: Any,
-    asperity_angle: Any,
     tensile_strength: Any,
-    cohesion: Any,
-    length: Any,
+    **needed: Any,
 ) -> None:
-    problems.numbers("nominal_pressure", nominal_pressure, at_least=SMALLEST, at_most=LARGEST)
-    problems.number("wall_strength", wall_strength, at_least=SMALLEST, at_most=LARGEST)
+    problems.numbers("nominal_pressure", nominal_pressure, **STRESS)
+    problems.number("wall_strength", wall_strength, **STRESS)
     problems.number("basic_friction_angle", basic_friction_angle, above=0, below=90)
-    problems.number("residual_friction_angle", residual_friction_angle, above=0, below=90, optional=True)
-    problems.number("asperity_angle", asperity_angle, at_least=0, below=90, optional=True)
-    problems.number("tensile_strength", tensile_strength, at_least=SMALLEST, at_most=LARGEST, optional=True)
-    problems.number("cohesion", cohesion, at_least=0, at_most=LARGEST, optional=True)
-    problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST, optional=True)
-    if criterion is not None and problems.choices("criterion", criterion, CRITERIA):
-        given = {"cohesion": cohesion, "length": length, "residual_friction_angle": residual_friction_angle}
+    problems.number("tensile_strength", tensile_strength, **STRESS, optional=True)
+    bounds: dict[str, dict[str, Any]] = {
+        "residual_friction_angle": {"above": 0, "below": 90},
+        "asperity_angle": {"at_least": 0, "below": 90},
+        "roughness_coefficient": {"at_least": 0, "at_most": LARGEST_JRC},
+        "cohesion": {"at_least": 0, "at_most": STRESS["at_most"]},
+        "length": {"at_least": SAMPLE_LENGTH, "at_most": STRESS["at_most"]},
+    }
+    for name, value in needed.items():
+        problems.number(name, value, **bounds[name], optional=True)
+    if criterion is None:
+        usable = _usable(surface, needed)
+        expected = "heights, or an asperity_angle or roughness_coefficient in their place"
+        problems.require(bool(usable), "surface", expected, surface)
+    elif problems.choices("criterion", criterion, STRENGTH):
         problems.require(len(word_tuple(criterion)) > 0, "criterion", "at least one", "an empty sequence")
         for name in word_tuple(criterion):
-            needs = CRITERIA[name].needs
-            missing = needs is not None and given[needs] is None
-            problems.require(not missing, str(needs), f"a value, for criterion {name!r}", None)
+            for need in _missing(name, surface, needed):
+                problems.add(need, f"a value, for criterion {name!r}", None)
     has_direction = check_direction(problems, direction)
-    for check, options in (
-        (roughness_coefficient.validate, {"direction": direction} if has_direction else {}),
-        (directional_roughness.validate, {}),
-    ):
-        with problems.collect():
-            check(surface, **options)
+    if surface is not None:
+        options = {"direction": direction} if has_direction else {}
+        for check in (measured_coefficient.validate, directional_roughness.validate):
+            with problems.collect():
+                check(surface, **options)
+
+
+def _missing(criterion: str, surface: Any, needed: dict[str, Any]) -> list[str]:
+    """Return the arguments that a criterion needs and that are not given."""
+    given = needed | {"surface": surface}
+    return [
+        need
+        for need in STRENGTH[criterion].needs
+        if given[need] is None and not (need in MEASURED and surface is not None)
+    ]
+
+
+def _usable(surface: Any, needed: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(name for name in STRENGTH if not _missing(name, surface, needed))
 
 
 @public_result(
     title="strength envelope",
-    references=(
-        "Patton (1966), 1st ISRM Congress 1:509; Ladanyi and Archambault (1970), 11th US Symposium on Rock "
-        "Mechanics; Barton and Choubey (1977), Rock Mechanics 10:1; Barton and Bandis (1982), 23rd US "
-        "Symposium on Rock Mechanics; Grasselli and Egger (2003), Int. J. Rock Mech. Min. Sci. 40:25; Xia, "
-        "Tang, Xiao and Song (2014), Rock Mech. Rock Eng. 47:1423"
-    ),
+    references=STRENGTH_REFERENCES,
     achieved_error="that of the criteria, which are empirical",
     check=_check,
 )
 def strength_envelope(
-    surface: xr.DataArray,
+    surface: xr.DataArray | None = None,
     *,
     nominal_pressure: float | Sequence[float],
     wall_strength: float,
@@ -113,6 +99,7 @@ def strength_envelope(
     criterion: str | Sequence[str] | None = None,
     direction: str | float = "E",
     residual_friction_angle: float | None = None,
+    roughness_coefficient: float | None = None,
     asperity_angle: float | None = None,
     tensile_strength: float | None = None,
     cohesion: float | None = None,
@@ -120,13 +107,13 @@ def strength_envelope(
 ) -> xr.Dataset:
     """Return the peak shear strength of a joint against the normal stress by several empirical criteria.
 
-    The criteria see the surface as a roughness coefficient JRC or as an asperity angle i, and the material as
+    The criteria see the joint as a roughness coefficient JRC or as an asperity angle i, and the material as
     a few numbers. Their spread is the range of what practice would say of the joint.
 
     Parameters
     ----------
-    surface : DataArray, shape (y, x)
-        Heights of one face, m.
+    surface : DataArray, shape (y, x), optional
+        Heights of one face, m. None: a joint that is known by its JRC or its asperity angle only.
     nominal_pressure : float or sequence of float
         Normal stresses sigma, Pa, above 0.
     wall_strength : float
@@ -137,9 +124,11 @@ def strength_envelope(
         Of "patton", "ladanyi_archambault", "barton_choubey", "barton_bandis", "grasselli_egger" and "xia".
         Default: all whose arguments are given.
     direction : str or float
-        Direction in which the block slides: compass word, or azimuth in degrees.
+        Direction in which the block slides: compass word, or degrees anticlockwise from E.
     residual_friction_angle : float, optional
         Degree, of weathered or sheared walls. Default: the basic friction angle; "grasselli_egger" needs it.
+    roughness_coefficient : float, optional
+        JRC of 0.1 m, 0 to 20. Default: that of the surface.
     asperity_angle : float, optional
         i, degree. Default: the mean dip that faces the shear, at the spacing of the surface.
     tensile_strength : float, optional
@@ -154,7 +143,8 @@ def strength_envelope(
     Dataset over (criterion, nominal_pressure)
         shear_strength, Pa; friction_angle, whose tangent is the strength over the normal stress, degree;
         in_range, whether the criterion was made for such values. Over criterion: assumption. Also the
-        roughness_coefficient and the asperity_angle in use.
+        roughness_coefficient and the asperity_angle in use; with a length scaled_roughness_coefficient,
+        scaled_wall_strength (Pa) and peak_displacement (m) after Barton and Bandis.
 
     Raises
     ------
@@ -181,167 +171,91 @@ def strength_envelope(
     ['patton', 'ladanyi_archambault', 'barton_choubey', 'xia']
     >>> bool((result.friction_angle.diff("nominal_pressure") <= 1e-9).all())  # the angle falls with stress
     True
+    >>> tested = fc.joints.strength_envelope(
+    ...     nominal_pressure=1e6, wall_strength=100e6, basic_friction_angle=25, roughness_coefficient=10
+    ... )
+    >>> round(tested.shear_strength.item() / 1e6, 3)  # 1 MPa times tan(25 + 10 * 2 degrees)
+    1.0
     """
     pressure = float_array(nominal_pressure)
-    given = {
-        None: True,
-        "cohesion": cohesion is not None,
-        "length": length is not None,
-        "residual_friction_angle": residual_friction_angle is not None,
+    needed = {
+        "residual_friction_angle": residual_friction_angle,
+        "roughness_coefficient": roughness_coefficient,
+        "asperity_angle": asperity_angle,
+        "cohesion": cohesion,
+        "length": length,
     }
-    usable = tuple(name for name, rule in CRITERIA.items() if given[rule.needs])
-    chosen = usable if criterion is None else word_tuple(criterion)
-    roughness = roughness_coefficient(surface, direction=direction).roughness_coefficient
-    facets = directional_roughness(surface, azimuth=read_direction(direction).azimuth).isel(azimuth=0)
+    chosen = _usable(surface, needed) if criterion is None else word_tuple(criterion)
+    measured = _measured(surface, direction)
+    jrc = measured.pop("roughness_coefficient", xr.DataArray(math.nan))
+    dip = measured.pop("mean_dip", xr.DataArray(math.nan))
     joint = Joint(
-        roughness=roughness.item(),
-        asperity_angle=float(facets.mean_dip if asperity_angle is None else asperity_angle),
+        roughness_coefficient=jrc.item() if roughness_coefficient is None else float(roughness_coefficient),
+        asperity_angle=dip.item() if asperity_angle is None else float(asperity_angle),
         wall_strength=float(wall_strength),
-        tensile_strength=float(
-            wall_strength / STRENGTH_RATIO if tensile_strength is None else tensile_strength
-        ),
+        tensile_strength=float(tensile_strength or wall_strength / STRENGTH_RATIO),
         basic_angle=float(basic_friction_angle),
-        residual_angle=float(
-            basic_friction_angle if residual_friction_angle is None else residual_friction_angle
-        ),
-        cohesion=0.0 if cohesion is None else float(cohesion),
-        length=SAMPLE_LENGTH if length is None else float(length),
-        area_fraction=facets.area_fraction.item(),
-        shape=facets["shape"].item(),
-        theta_max=facets.theta_max.item(),
+        residual_angle=float(residual_friction_angle or basic_friction_angle),
+        cohesion=math.nan if cohesion is None else float(cohesion),
+        length=float(length or SAMPLE_LENGTH),
+        **{name: value.item() for name, value in measured.items()},
     )
     with Problems(WHERE) as problems:
         total = joint.asperity_angle + joint.basic_angle
-        problems.require(
-            total < 90.0, "asperity_angle", "less than 90 degrees with the basic friction angle", f"{total:g}"
-        )
-    strengths, ranges = zip(*(CRITERIA[name].strength(pressure, joint) for name in chosen), strict=True)
+        expected = "less than 90 degrees with the basic friction angle"
+        problems.require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
+    strengths, ranges = zip(*(STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True)
     dims = ("criterion", "nominal_pressure")
-    result = xr.Dataset(
-        {
-            "shear_strength": (dims, np.array(strengths)),
-            "friction_angle": (dims, np.degrees(np.arctan(np.array(strengths) / pressure))),
-            "in_range": (dims, np.array(ranges)),
-            "assumption": ("criterion", np.array([CRITERIA[name].assumption for name in chosen])),
-            "roughness_coefficient": joint.roughness,
-            "asperity_angle": joint.asperity_angle,
-        },
-        coords={
-            "criterion": np.array(chosen),
-            "nominal_pressure": pressure,
-            "direction": read_direction(direction).name,
-        },
-        attrs={"parameters": {"criterion": list(chosen)}},
-    )
-    result["shear_strength"].attrs["long_name"] = "peak shear strength"
-    result["friction_angle"].attrs["long_name"] = "angle whose tangent is the strength over the normal stress"
-    if np.isnan(strengths).any():
-        for name in ("shear_strength", "friction_angle"):
-            result[name].attrs["reason"] = NO_STRENGTH
-    if not np.all(ranges):
-        result["shear_strength"].attrs["comment"] = OUTSIDE
-    if "comment" in roughness.attrs:
-        result["roughness_coefficient"].attrs["comment"] = roughness.attrs["comment"]
-    if not np.isfinite(joint.roughness):
-        result["roughness_coefficient"].attrs["reason"] = "NaN: the profiles are straight lines; taken as 0"
+    variables: dict[str, Any] = {
+        "shear_strength": (dims, np.array(strengths)),
+        "friction_angle": (dims, np.degrees(np.arctan(np.array(strengths) / pressure))),
+        "in_range": (dims, np.array(ranges)),
+        "assumption": ("criterion", np.array([STRENGTH[name].assumption for name in chosen])),
+        "roughness_coefficient": ((), joint.roughness_coefficient, jrc.attrs),
+        "asperity_angle": joint.asperity_angle,
+    }
+    if length is not None:
+        variables |= _scaled(joint)
+    coords: dict[str, Any] = {"criterion": np.array(chosen), "nominal_pressure": pressure}
+    if surface is not None:
+        coords["direction"] = read_direction(direction).name
+    result = xr.Dataset(variables, coords, attrs={"parameters": {"criterion": list(chosen)}})
+    _explain(result, surface is not None)
     return result
 
 
-def _patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return the strength of asperities that are overridden or sheared off, whichever needs less."""
-    overridden = pressure * math.tan(math.radians(joint.basic_angle + joint.asperity_angle))
-    sheared = joint.cohesion + pressure * math.tan(math.radians(joint.residual_angle))
-    return np.minimum(overridden, sheared), np.ones(pressure.shape, dtype=bool)
+def _measured(surface: xr.DataArray | None, direction: Any) -> dict[str, xr.DataArray]:
+    """Return JRC, mean dip and the facets of a surface; nothing without one."""
+    if surface is None:
+        return {}
+    jrc = measured_coefficient(surface, direction=direction)
+    facets = directional_roughness(surface, direction=direction)
+    names = ("mean_dip", "area_fraction", "shape", "theta_max")
+    return {"roughness_coefficient": jrc["roughness_coefficient"]} | {name: facets[name] for name in names}
 
 
-def _ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return the strength where a share of the asperities is sheared off, and the rest is overridden.
-
-    tau = (sigma (1 - a)(v + tan phi) + a s_r)/(1 - (1 - a) v tan phi), with the strength s_r of the material
-    by the parabola of Fairhurst. Above the wall strength the material fails.
-    """
-    relative = pressure / joint.wall_strength
-    remaining = np.clip(1.0 - relative, 0.0, None)
-    sheared = 1.0 - remaining**SHEARED_POWER  # a
-    dilation = remaining**DILATION_POWER * math.tan(math.radians(joint.asperity_angle))  # v
-    friction = math.tan(math.radians(joint.basic_angle))
-    ratio = joint.wall_strength / joint.tensile_strength  # n
-    material = joint.wall_strength * (math.sqrt(1.0 + ratio) - 1.0) / ratio * np.sqrt(1.0 + ratio * relative)
-    overridden = pressure * (1.0 - sheared) * (dilation + friction)
-    strength = (overridden + sheared * material) / (1.0 - (1.0 - sheared) * dilation * friction)
-    return strength, relative <= 1.0
+def _scaled(joint: Joint) -> dict[str, float]:
+    """Return the constants of Barton and Bandis for the length of the joint."""
+    jrc = float(np.fmax(joint.roughness_coefficient, 0.0))
+    return {
+        "scaled_roughness_coefficient": _criteria.scaled_roughness(jrc, joint.length),
+        "scaled_wall_strength": _criteria.scaled_wall_strength(joint.wall_strength, jrc, joint.length),
+        "peak_displacement": _criteria.peak_displacement(jrc, joint.length),
+    }
 
 
-def _barton_choubey(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return sigma tan(phi_r + JRC log10(JCS/sigma)), limited to 70 degrees; no roughness above JCS."""
-    return _barton(pressure, _scale_roughness(joint), joint.wall_strength, joint)
-
-
-def _barton_bandis(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return the strength of Barton and Choubey with JRC and JCS of the length of the joint."""
-    constants = scaled_constants(_scale_roughness(joint), joint.wall_strength, joint.length)
-    return _barton(pressure, constants.roughness, constants.wall_strength, joint)
-
-
-def _scale_roughness(joint: Joint) -> float:
-    """Return JRC, 0 for a negative or missing one."""
-    return max(joint.roughness, 0.0) if math.isfinite(joint.roughness) else 0.0
-
-
-def _barton(pressure: Array, roughness: float, wall_strength: float, joint: Joint) -> tuple[Array, Array]:
-    decades = np.log10(wall_strength) - np.log10(pressure)
-    angle = joint.residual_angle + roughness * np.clip(decades, 0.0, None)
-    limit = max(LARGEST_ANGLE, joint.residual_angle)
-    low, high = FITTED_STRESS
-    inside = (angle <= limit) & (pressure >= low * wall_strength) & (pressure <= high * wall_strength)
-    inside &= 0.0 <= joint.roughness <= LARGEST_JRC
-    return pressure * np.tan(np.radians(np.minimum(angle, limit))), inside
-
-
-def _grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return sigma tan(phi_r') [1 + exp(-theta_max A0 sigma/(9 C sigma_t))], with a fitted angle phi_r'."""
-    decay = joint.theta_max * joint.area_fraction / (9.0 * joint.shape) if joint.shape > 0 else math.inf
-    with np.errstate(under="ignore"):
-        share = np.exp(-decay * pressure / joint.tensile_strength)
-    strength = pressure * math.tan(math.radians(joint.residual_angle)) * (1.0 + share)
-    return strength, _by_facets(pressure, joint)
-
-
-def _xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
-    """Return sigma tan(phi_b + 4 A0 t [1 + exp(-t sigma/(9 A0 sigma_t))]), t = theta_max/(C + 1), degree."""
-    if joint.area_fraction == 0:
-        return pressure * math.tan(math.radians(joint.basic_angle)), _by_facets(pressure, joint)
-    metric = joint.theta_max / (joint.shape + 1.0)
-    with np.errstate(under="ignore"):
-        share = np.exp(-metric / (9.0 * joint.area_fraction) * pressure / joint.tensile_strength)
-    angle = joint.basic_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
-    possible = angle < RIGHT_ANGLE
-    strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
-    return strength, _by_facets(pressure, joint) & possible
-
-
-def _by_facets(pressure: Array, joint: Joint) -> Array:
-    """Return where a criterion of the facets may be used: rough, and sigma up to the tensile strength."""
-    return (pressure <= joint.tensile_strength) & (joint.area_fraction > 0)
-
-
-CRITERIA = {
-    "patton": Criterion(_patton, "cohesion", "asperities of one angle, overridden or sheared off as a whole"),
-    "ladanyi_archambault": Criterion(
-        _ladanyi_archambault, None, "asperities of one angle; the sheared share grows with the normal stress"
-    ),
-    "barton_choubey": Criterion(
-        _barton_choubey, None, "JRC of 0.1 m profiles; normal stress of 0.01 to 0.3 of the wall strength"
-    ),
-    "barton_bandis": Criterion(
-        _barton_bandis, "length", "as barton_choubey, with JRC and wall strength of the length of the joint"
-    ),
-    "grasselli_egger": Criterion(
-        _grasselli_egger,
-        "residual_friction_angle",
-        "fresh tensile fractures; dips of facets, which depend on the spacing; a fitted residual angle",
-    ),
-    "xia": Criterion(
-        _xia, None, "fresh mated fractures; dips of facets, which depend on the spacing of the surface"
-    ),
-}
+def _explain(result: xr.Dataset, has_surface: bool) -> None:
+    """Give the labels of the strength, where it is out of range, and why values are missing."""
+    result["shear_strength"].attrs["long_name"] = "peak shear strength"
+    result["friction_angle"].attrs["long_name"] = "angle whose tangent is the strength over the normal stress"
+    if result["shear_strength"].isnull().any():
+        for name in ("shear_strength", "friction_angle"):
+            result[name].attrs["reason"] = NO_STRENGTH
+    if not result["in_range"].all():
+        result["shear_strength"].attrs["comment"] = OUTSIDE
+    unknown = (
+        "NaN: the profiles are straight lines; taken as 0" if has_surface else "NaN: neither given nor used"
+    )
+    for name in ("roughness_coefficient", "asperity_angle"):
+        if np.isnan(result[name]):
+            result[name].attrs["reason"] = unknown

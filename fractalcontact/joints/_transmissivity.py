@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import periodic_axes, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
@@ -17,13 +20,25 @@ from fractalcontact.joints._flow_network import (
     Network,
     cell_flows,
     check_gap,
+    conducting,
     dissipation,
-    held_ends,
+    edge_conductance,
+    even_gradient,
+    least_flow,
+    line_of,
     link_network,
+    narrow_cells,
+    nothing_held,
     spanning_cells,
     winding_cells,
 )
-from fractalcontact.joints._network_pressure import flow_memory, nested_dissection, pressures
+from fractalcontact.joints._network_pressure import (
+    ERROR,
+    FLOW_BYTES,
+    UNKNOWN,
+    nested_dissection,
+    pressures,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -32,9 +47,12 @@ REFERENCES = (
     "Media 23 (1996); Craster, R. V. and Obnosov, Yu. V., Four-phase checkerboard composites, SIAM Journal "
     "on Applied Mathematics 61 (2001)"
 )
+WHERE = "fractalcontact.joints.transmissivity"
 RESULTS = ("axis", "transmissivity", "hydraulic_aperture", "percolates", "residual", "aperture",
-           "open_fraction", "overlap_fraction", "flow_conductance", "relative_pressure", "flux_x", "flux_y",
-           "run_time")  # fmt: skip
+           "open_fraction", "narrow_fraction", "overlap_fraction", "flow_conductance", "relative_pressure",
+           "flux_x", "flux_y", "run_time")  # fmt: skip
+NARROW = "cells open by less than 0.001 of the mean opening (narrow_fraction) count as closed"
+AXES = ("y", "x")
 MAPS = {"pressure": ("relative_pressure",), "flux": ("flux_x", "flux_y")}  # that can be kept
 ROUNDING = 1e-9  # relative to the largest opening: a smaller overlap is rounding
 
@@ -49,7 +67,7 @@ def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic:
         problems.periodic("periodic", periodic, read_grid(gap))
 
 
-@public_result(title="transmissivity of a joint", references=REFERENCES, check=_check, memory=flow_memory)
+@public_result(title="transmissivity of a joint", references=REFERENCES, check=_check, memory=FLOW_BYTES)
 def transmissivity(
     gap: xr.DataArray,
     *,
@@ -84,11 +102,12 @@ def transmissivity(
     Dataset over (..., axis)
         transmissivity (m3, hydraulic aperture cubed over 12), hydraulic_aperture (m), percolates (whether an
         open path of cells that share edges crosses, on a periodic axis to its own image; without one both
-        are zero), residual (relative, of the linear system); over (...): aperture (mean opening, m),
-        open_fraction, overlap_fraction. With a viscosity also flow_conductance (m3 Pa-1 s-1), flow per width
-        and pressure gradient. run_time (s). Maps over (..., axis, y, x): relative_pressure (1), which falls
-        by 1 along the axis, NaN where nothing flows; flux_x, flux_y (m3), flow per width times viscosity over
-        the mean pressure gradient: their mean along the axis is the transmissivity.
+        are zero), residual (relative, see Notes); over (...): aperture (mean opening, m),
+        open_fraction, narrow_fraction, overlap_fraction. With a viscosity also flow_conductance (m3 Pa-1
+        s-1), flow per width and pressure gradient. run_time (s). Maps over (..., axis, y, x):
+        relative_pressure (1), which falls by 1 along the axis, NaN where nothing flows; flux_x, flux_y (m3),
+        flow per width times viscosity over the mean pressure gradient: their mean along the axis is the
+        transmissivity.
 
     Raises
     ------
@@ -100,7 +119,10 @@ def transmissivity(
     Notes
     -----
     Exact for parallel plates and for layers along and across the flow. Elsewhere the error falls with the
-    spacing, as its square in smooth openings.
+    spacing, as its square in smooth openings. Cells open by less than 0.001 of the mean opening count as
+    closed (narrow_fraction): they would carry 1e-9 of its flow. Before a flow is returned, it is checked that
+    the pressure stays between those at the ends, and the flow between its bounds in series and in parallel;
+    the residual is that of the linear system, or what a bound is missed by if that is more.
 
     References
     ----------
@@ -117,13 +139,18 @@ def transmissivity(
     [1.5, 2.0]
     """
     grid = read_grid(gap)
-    axes = word_tuple(axis)
-    wraps = periodic_axes(periodic, grid)
+    axes, kept = word_tuple(axis), word_tuple(keep)
     values = np.asarray(gap.values, dtype=np.float64)
     leading = tuple(str(dim) for dim in gap.dims[:-2])
     rounding = ROUNDING * np.abs(values).max(axis=(-2, -1), keepdims=True)
-    kept = word_tuple(keep)
-    flows = _flows(values.reshape(-1, *values.shape[-2:]), axes, grid.spacing, wraps, bool(kept))
+    (wraps_y, wraps_x), ratio = periodic_axes(periodic, grid), float(grid.spacing[0] / grid.spacing[1])
+    wraps = wraps_y, wraps_x
+    order = nested_dissection(grid.shape, wraps)
+    flows = [
+        flow
+        for plane in values.reshape(-1, *values.shape[-2:])
+        for flow in plane_flows(plane, ratio, wraps, order, [AXES.index(name) for name in axes])
+    ]
     shape = (*values.shape[:-2], len(axes))
     conductivity = np.reshape([flow.conductivity for flow in flows], shape)
     dims = (*leading, "axis")
@@ -135,6 +162,7 @@ def transmissivity(
             "residual": (dims, np.reshape([flow.residual for flow in flows], shape)),
             "aperture": (leading, np.maximum(values, 0.0).mean(axis=(-2, -1))),
             "open_fraction": (leading, (values > 0).mean(axis=(-2, -1))),
+            "narrow_fraction": (leading, narrow_cells(values).mean(axis=(-2, -1))),
             "overlap_fraction": (leading, (values < -rounding).mean(axis=(-2, -1))),
         },
         coords=leading_coords(gap, leading, taken=RESULTS),
@@ -142,47 +170,35 @@ def transmissivity(
     ).assign_coords(axis=np.array(axes))
     if viscosity is not None:
         result["flow_conductance"] = result["transmissivity"] / viscosity
-    maps = _maps(flows, axes, (*shape, *values.shape[-2:])) if kept else {}
+    _warn(result)
+    maps = {
+        "relative_pressure": [flow.pressure for flow in flows],
+        "flux_x": [flow.flux[1] for flow in flows],
+        "flux_y": [flow.flux[0] for flow in flows],
+    }
     for name in (name for word in kept for name in MAPS[word]):
-        result[name] = ((*dims, "y", "x"), maps[name])
+        result[name] = (*dims, "y", "x"), np.reshape(maps[name], (*shape, *values.shape[-2:]))
     return result.assign_coords(y=gap["y"].variable, x=gap["x"].variable) if kept else result
 
 
-def _maps(flows: list[Flow], axes: Sequence[str], shape: tuple[int, ...]) -> dict[str, Array]:
-    """Return the maps of all planes and axes, with the flow along y turned back."""
-    planes: dict[str, list[Array]] = {"relative_pressure": [], "flux_x": [], "flux_y": []}
-    for number, flow in enumerate(flows):
-        pressure, (along, across) = flow.pressure, flow.flux
-        if axes[number % len(axes)] == "y":
-            pressure, along, across = pressure.T, across.T, along.T
-        for name, plane in zip(planes, (pressure, along, across), strict=True):
-            planes[name].append(plane)
-    return {name: np.reshape(stack, shape) for name, stack in planes.items()}
-
-
-def _flows(planes: Array, axes: Sequence[str], spacing: Any, periodic: Any, maps: bool) -> list[Flow]:
-    """Solve every plane along every axis; planes are transposed so that the flow runs along the last axis."""
-    flows, orders = [], {}
-    for plane in planes:
-        for axis in axes:
-            along = ("y", "x").index(axis)
-            oriented = np.ascontiguousarray(plane if axis == "x" else plane.T)
-            ratio = float(spacing[1 - along] / spacing[along])
-            wraps = bool(periodic[1 - along]), bool(periodic[along])
-            if axis not in orders:  # the same for every plane
-                orders[axis] = nested_dissection(oriented.shape, wraps)
-            flows.append(plane_flow(oriented, ratio, wraps, orders[axis], maps=maps))
-    return flows
-
-
-_NO_MAPS = (np.empty(0), np.empty(0))
+def _warn(result: xr.Dataset) -> None:
+    """State which cells were closed; warn of flows that are not known, and give the reason."""
+    if result["narrow_fraction"].any():
+        result["transmissivity"].attrs["comment"] = NARROW
+    unknown = int(result["transmissivity"].isnull().sum())
+    if not unknown:
+        return
+    for name in {"transmissivity", "hydraulic_aperture", "flow_conductance"} & set(result):
+        result[name].attrs["reason"] = UNKNOWN
+    message = f"{WHERE}: {unknown} of {result['transmissivity'].size} flows not known: {UNKNOWN}"
+    warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
 
 @dataclass(frozen=True)
 class Flow:
-    """Conductivity of the whole plane (gap cubed), whether an open path crosses it, relative residual.
+    """Conductivity of the whole plane (gap cubed), whether an open path crosses it, error of the solution.
 
-    `pressure` falls by 1 along the plane, NaN where nothing flows; `flux` is along and across, over 12.
+    `pressure` falls by 1 along the plane, NaN where nothing flows; `flux` is along y and x, over 12.
     """
 
     conductivity: float
@@ -192,48 +208,69 @@ class Flow:
     flux: Array
 
 
-def _no_flow(shape: tuple[int, ...]) -> Flow:
-    return Flow(0.0, False, 0.0, np.full(shape, np.nan), np.zeros((2, *shape)))
-
-
-def plane_flow(
-    gap: Array, ratio: float, wraps: tuple[bool, bool], order: Array, *, maps: bool = False
-) -> Flow:
-    """Return the conductivity (gap cubed) of a plane along its last axis.
+def plane_flows(
+    gap: Array, ratio: float, wraps: tuple[bool, bool], order: Array, axes: Sequence[int]
+) -> list[Flow]:
+    """Return the flow of a plane along axes (0 for y).
 
     Parameters
     ----------
     gap : ndarray, shape (ny, nx)
-        Cells at or below zero are closed.
+        Openings; cells at or below zero are closed.
     ratio : float
-        Spacing across the flow over the spacing along it.
+        Spacing of y over that of x.
     wraps : pair of bool
-        Whether the plane repeats across and along the flow. Nothing flows through free sides. Free ends have
-        prescribed pressures; a plane that repeats along the flow is under a mean pressure gradient.
+        Whether the plane repeats along y and x. Nothing flows through free sides. Free ends have prescribed
+        pressures; a plane that repeats along the flow is under a mean pressure gradient.
     order : ndarray
         All cells (flat indices) in the order in which elimination takes them.
-    maps : bool
-        Return pressure and flux as well.
     """
+    gap = conducting(gap)
     largest = float(gap.max())
     if not largest > 0:
-        return _no_flow(gap.shape)
+        return [_no_flow(gap.shape)] * len(axes)
     unit = float(np.ldexp(1.0, int(np.frexp(largest)[1])))
-    network = link_network(np.maximum(gap / unit, 0.0) ** 3, ratio, wraps)
-    inside = winding_cells(network) if wraps[1] else spanning_cells(network)
+    cells = (gap / unit) ** 3
+    network = link_network(cells, ratio, wraps)
+    flows = [_flow_along(axis, network, cells, ratio, order, repeats=wraps[axis]) for axis in axes]
+    return [
+        replace(flow, conductivity=flow.conductivity * unit**3, flux=flow.flux * unit**3) for flow in flows
+    ]
+
+
+def _no_flow(shape: tuple[int, ...]) -> Flow:
+    return Flow(0.0, False, 0.0, np.full(shape, np.nan), np.zeros((2, *shape)))
+
+
+def _flow_along(
+    axis: int, network: Network, cells: Array, ratio: float, order: Array, *, repeats: bool
+) -> Flow:
+    """Return the flow along an axis; lengths are in units of the spacing of x."""
+    held, ends = nothing_held(cells.shape), []
+    if repeats:
+        network = replace(network, jump=(network.closes & (network.axis == axis)).astype(np.float64))
+        inside = winding_cells(network)
+    else:
+        ends = [edge_conductance(cells, ratio, axis, place) for place in (0, -1)]
+        for place, end, level in zip((0, -1), ends, (1.0, 0.0), strict=True):
+            held.add(line_of(axis, place), end, level)
+        inside = spanning_cells(network, axis, ends)
     if not inside.any():
-        return _no_flow(gap.shape)
-    pressure, residual = pressures(network, inside, order, held_ends(network))
-    ny, nx = network.shape
-    conductivity = dissipation(network, pressure, inside) * (nx / ny) / ratio
-    if not maps:
-        return Flow(conductivity * unit**3, True, residual, *_NO_MAPS)
-    flux = _flux(network, pressure, inside, ratio) * unit**3
-    pressure = np.where(inside.reshape(network.shape), pressure, np.nan)
-    return Flow(conductivity * unit**3, True, residual, pressure, flux)
-
-
-def _flux(network: Network, pressure: Array, inside: Array, ratio: float) -> Array:
-    """Return the flow per width along and across, over that of the mean gradient of pressure, over 12."""
-    along, across = cell_flows(network, pressure, inside)
-    return np.stack([along / ratio, across]) * (network.shape[1] / 12.0)
+        return _no_flow(cells.shape)
+    pressure, error = pressures(network, inside, order, held, axis)
+    flow = dissipation(network, pressure, inside, held)
+    least = least_flow(network, axis, inside, ends)
+    most = dissipation(network, even_gradient(cells.shape, axis), inside, held)
+    residual = max(least / flow - 1.0, flow / most - 1.0, error)
+    if not residual <= ERROR:
+        return Flow(
+            math.nan, True, residual, np.full(cells.shape, np.nan), np.full((2, *cells.shape), np.nan)
+        )
+    spacing = (ratio, 1.0)
+    length, width = (n * step for n, step in zip(cells.shape, spacing, strict=True))
+    if axis == 1:
+        length, width = width, length
+    flows = cell_flows(network, pressure, inside, axis, ends)
+    flux = flows * length / 12.0 / np.array(spacing[::-1])[:, None, None]
+    pressure = np.where(inside.reshape(cells.shape), pressure, np.nan)
+    return Flow(flow * length / width, True, residual, pressure, flux)

@@ -16,8 +16,23 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._flow_network import check_gap
-from fractalcontact.joints._network_pressure import HeldFlow, Side, flow_memory
+from fractalcontact.joints._flow_network import (
+    Held,
+    check_gap,
+    conducting,
+    edge_conductance,
+    held_cells,
+    line_of,
+    link_network,
+    nothing_held,
+)
+from fractalcontact.joints._network_pressure import (
+    ERROR,
+    FLOW_BYTES,
+    UNKNOWN,
+    nested_dissection,
+    pressures,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -34,6 +49,7 @@ FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "
 ON_PATH = ("effective_stress", "balance_error")
 RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "residual", *FORCES, *ON_PATH,
            "iterations", "converged", "run_time")  # fmt: skip
+HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones
 PLACE_ERROR = 1e-9  # of the search between two steps of the path
 SHOWN = 5  # in a warning
 STRESS_BALANCE = 1e-4  # of the total stress: a single cell that opens takes up more than the solver's error
@@ -139,7 +155,7 @@ def _check_path(problems: Problems, gap: xr.DataArray) -> None:
         "Design of Gravity Dams (1976)"
     ),
     check=_check,
-    memory=flow_memory,
+    memory=FLOW_BYTES,
 )
 def uplift(
     gap: xr.DataArray,
@@ -164,8 +180,8 @@ def uplift(
     Parameters
     ----------
     gap : DataArray, dims (..., y, x)
-        Opening of the joint, m; no NaN. Cells at or below zero are in contact. Nothing flows through edges
-        without a pressure; periodic ones are joined.
+        Opening of the joint, m; no NaN. Cells open by less than 0.001 of the mean opening count as contact.
+        Nothing flows through edges without a pressure; periodic ones are joined.
     upstream_pressure, downstream_pressure : float
         Water pressure at the two sides, Pa: unit weight times head above the joint.
     upstream, downstream : {"W", "E", "S", "N"} or ("x" or "y", float)
@@ -173,8 +189,8 @@ def uplift(
         is the same. Default: W, and the edge opposite; of a line E or N.
     drains, drain_pressure, drain_diameter : sequence of (x, y), float, float, optional
         Drains, m. The open cells within `drain_diameter` (m), or the nearest cell, are held at
-        `drain_pressure` (Pa, default `downstream_pressure`). One cell is a drain with a radius of 0.2
-        spacings (Peaceman 1978). A drain in contact has no effect.
+        `drain_pressure` (Pa, default `downstream_pressure`). One cell is a drain with a radius of 0.14
+        hypot(dx, dy), 0.2 spacings of square cells (Peaceman 1983). A drain in contact has no effect.
     drain_share : float
         Share of the pressure difference at the drains in the bilinear diagram: 1/3 after the USBR.
     normal_stiffness : float, optional
@@ -248,12 +264,14 @@ def _explain(result: xr.Dataset) -> None:
     if result["uplift_arm"].isnull().any():
         for name in ("uplift_arm", "uplift_x", "uplift_y"):
             result[name].attrs["reason"] = NO_UPLIFT
-    if "effective_stress" not in result or result["effective_stress"].notnull().all():
+    is_known, reason = result["residual"] <= ERROR, UNKNOWN
+    if "effective_stress" in result and is_known.all():
+        is_known, reason = result["effective_stress"].notnull(), OFF_THE_PATH
+    if is_known.all():
         return
-    balances = result["effective_stress"].notnull()
-    for name in ("effective_stress", "wet_fraction", "isolated_fraction", *FORCES):
-        shown = balances | (result["diagram"] != "joint") if name in FORCES else balances
-        result[name] = result[name].where(shown).assign_attrs(reason=OFF_THE_PATH)
+    for name in {"effective_stress", "wet_fraction", "isolated_fraction", *FORCES} & set(result):
+        shown = is_known | (result["diagram"] != "joint") if name in FORCES else is_known
+        result[name] = result[name].where(shown).assign_attrs(reason=reason)
 
 
 def _from_edge(gap: xr.DataArray, axis: int, position: Any) -> Any:
@@ -292,6 +310,68 @@ def _drain_cells(gap: xr.DataArray, grid: Grid, drains: Any, diameter: float) ->
     return cells
 
 
+class Side(NamedTuple):
+    """An edge, or a line of cells: the axis that it lies across (0 for y) and its place on it (m)."""
+
+    axis: int
+    place: float
+    is_edge: bool
+
+
+class HeldFlow:
+    """A plane whose pressure is 1 at the upstream side, 0 at the downstream one, and `drained` at drains."""
+
+    def __init__(self, grid: Grid, sides: tuple[Side, Side], is_drain: Array, drained: float) -> None:
+        self.grid, self.sides, self.is_drain, self.drained = grid, sides, is_drain, drained
+        self.ratio = grid.spacing[0] / grid.spacing[1]
+        crossed = {side.axis for side in sides}
+        self.wraps = grid.periodic[0] and 0 not in crossed, grid.periodic[1] and 1 not in crossed
+        self.order = nested_dissection(grid.shape, self.wraps)
+
+    def pressure(self, gap: Array) -> tuple[Array, float]:
+        """Return the pressure, NaN where no water comes or beyond the allowed error, and its error."""
+        dry = np.full(gap.shape, np.nan), 0.0
+        gap = conducting(gap)
+        largest = float(gap.max())
+        if not largest > 0:
+            return dry
+        cells = (gap / largest) ** 3
+        network = link_network(cells, self.ratio, self.wraps)
+        held = self._held(cells)
+        wet = held_cells(network, held)
+        if not wet.any():
+            return dry
+        pressure, error = pressures(network, wet, self.order, held)
+        is_known = wet.reshape(gap.shape) & (error <= ERROR)
+        return np.where(is_known, pressure, np.nan), error
+
+    def _held(self, cells: Array) -> Held:
+        held = nothing_held(cells.shape)
+        fixed = HELD * (self.ratio + 1.0 / self.ratio) * cells
+        held.add(self.is_drain, fixed[self.is_drain], self.drained)
+        for side, pressure in zip(self.sides, (1.0, 0.0), strict=True):
+            row = min(int(side.place / self.grid.spacing[side.axis]), cells.shape[side.axis] - 1)
+            line = line_of(side.axis, row)
+            at_edge = edge_conductance(cells, self.ratio, side.axis, row)
+            held.add(line, at_edge if side.is_edge else fixed[line], pressure)
+        return held
+
+    @property
+    def sense(self) -> float:
+        """1 where the flow leaves the upstream side towards rising coordinates, else -1."""
+        upstream, downstream = self.sides
+        same_axis = downstream.axis == upstream.axis
+        beyond = downstream.place if same_axis else 0.5 * self.grid.extent[upstream.axis]
+        return 1.0 if beyond > upstream.place else -1.0
+
+    def distances(self, *, both_ends: bool = False) -> Array:
+        """Return the distance (m) of rows of cells, or of both ends of the plane, from the upstream side."""
+        upstream = self.sides[0]
+        spacing, n = self.grid.spacing[upstream.axis], self.grid.shape[upstream.axis]
+        places = np.array([0.0, n]) if both_ends else np.arange(n) + 0.5
+        return self.sense * (places * spacing - upstream.place)
+
+
 class State(NamedTuple):
     """Pressure, 1 upstream and 0 downstream, and how it was found; stresses in Pa."""
 
@@ -310,22 +390,24 @@ def _opened(gap: Array, flow: HeldFlow, soft: tuple[float, float] | None) -> Sta
     `soft` is the opening (m) under the downstream pressure and that under the pressure difference.
     """
     p, residual = flow.pressure(gap)
-    isolated = _isolated(gap, p)
-    if soft is None:
-        return State(p, residual, isolated)
+    isolated, is_known = _isolated(gap, p), residual <= ERROR
+    if soft is None or not is_known:
+        return State(p, residual, isolated, converged=is_known)
     opened, relaxation, last = np.zeros_like(gap), RELAXATION, math.inf
     for iteration in range(1, MAX_ITERATIONS + 1):
         wanted = np.where(np.isfinite(p), soft[0] + soft[1] * p, 0.0)
         opened += relaxation * (wanted - opened)
         previous = p
         p, residual = flow.pressure(gap + opened)
+        if residual > ERROR:
+            break
         change = float(np.nanmax(np.abs(p - previous), initial=0.0))
         if not change > BALANCE:
             return State(p, residual, isolated, iteration)
         if change > last:  # it oscillates
             relaxation = max(0.5 * relaxation, SMALLEST_RELAXATION)
         last = change
-    return State(p, residual, isolated, MAX_ITERATIONS, converged=False)
+    return State(p, residual, isolated, iteration, converged=False)
 
 
 def _isolated(gap: Array, pressure: Array) -> float:
@@ -366,7 +448,7 @@ def _balanced(
         p, residual = flow.pressure(gap)
         uplift = float(np.nan_to_num(water[0] + water[1] * p).mean())
         error = (stress + uplift) / total - 1.0
-        balances = abs(error) <= STRESS_BALANCE
+        balances = abs(error) <= STRESS_BALANCE and residual <= ERROR
         return State(p, residual, _isolated(gap, p), 0, balances, float(stress), error)
 
     place = float(len(stresses) - 1)  # as the search states it
@@ -387,7 +469,9 @@ def _warn(states: Sequence[State]) -> None:
     failed = [number for number, state in enumerate(states) if not state.converged]
     if not failed:
         return
-    if math.isfinite(states[0].balance_error):
+    if any(states[number].residual > ERROR for number in failed):
+        what = UNKNOWN
+    elif math.isfinite(states[0].balance_error):
         errors = ", ".join(f"{states[number].balance_error:+.2g}" for number in failed[:SHOWN])
         what = f"no effective stress on the path balances the total stress (balance_error {errors})"
     else:

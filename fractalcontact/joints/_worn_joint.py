@@ -10,19 +10,24 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import fractalcontact as fc  # loads `contact` on first use
-from fractalcontact.joints._closure import Pressing, ShearedContact
-from fractalcontact.joints._compass import Direction
-from fractalcontact.joints._crack import Crack
+from fractalcontact.base.compass import Direction
+from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.direct_shear"
-LOAD_ERROR = 1e-3  # relative error of the load on the contacts
-MAX_SOLUTIONS = 40  # for one such load
-SMALLEST_FORCE = 1e-6  # of the load of the step before: a spring may unload the block entirely
+LOAD_ERROR = 1e-3  # relative error of the load on the contacts, and of the normal force
+MAX_SOLUTIONS = (
+    40  # for one such load: the bracket of .5 is then below 1e-6, and 1 - mu d at the solver's error
+)
+SMALLEST_FORCE = 1e-6  # of the normal force at the start: a spring may unload the block entirely
 CAPACITY = 1.0 - 1e-9  # largest load over hardness times area
-BRACKET, LOWEST = 0.5, 40.0  # steps of the logarithm of the load, and its range below the capacity
+BRACKET, LOWEST = 0.5, 40.0  # steps of the logarithm of the load, and its range below that of the step before
+CRUSHED = "NaN from where the contacts would bear more than the hardness over the whole block"
+LOCKED = (
+    "NaN from where the block locks: slopes of 90 degrees less the friction angle stop it until they yield, "
+    "under a load on which the normal force no longer depends"
+)
 UNLOADED = 0.5  # the elastic stiffness is that of unloading to this share of the load
 
 
@@ -59,14 +64,11 @@ class ShearStep:
 class WornJoint:
     """A crack with the wear of both its faces, which grows as it is pressed."""
 
-    def __init__(self, crack: Crack, towards: Direction, options: fc.contact.ContactOptions) -> None:
+    def __init__(self, pressing: Pressing, towards: Direction) -> None:
+        crack, options = pressing.crack, pressing.options
         lower, upper = crack.faces()
-        self.crack, self.towards = crack, towards
+        self.crack, self.towards, self.pressing = crack, towards, pressing
         self.capacity = CAPACITY * float(options.hardness or math.inf) * crack.nominal_area
-        self.pressing = Pressing(
-            fc.contact.LoadPath("normal_force", (0.0,)), options, "flat_block", (), WHERE
-        )
-        self.elastic = replace(self.pressing, options=replace(options, hardness=None))
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
         self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
         self.unconverged = 0
@@ -74,15 +76,18 @@ class WornJoint:
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
         lower, upper = self.faces()
-        worn = replace(self.crack, lower=lower, upper=upper)
-        return ShearedContact(worn, position, self.towards, self.elastic if elastic else self.pressing)
+        pressing = replace(self.pressing, crack=replace(self.crack, lower=lower, upper=upper))
+        if elastic:
+            pressing = replace(pressing, options=replace(pressing.options, hardness=None))
+        return ShearedContact(pressing, position, self.towards)
 
     def press(self, contact: ShearedContact, load: float) -> State:
         """Press a contact of this joint under a load, N."""
-        columns = contact.press(fc.contact.LoadPath("normal_force", (load,)), ("residual_height",))
-        heights = np.asarray(contact.surface.values)
+        force = replace(self.pressing.load, control="normal_force", values=(load,))
+        columns = contact.press(force, ("residual_height",))
+        heights = contact.heights
         self.residual = max(self.residual, float(columns["residual"][0]))
-        self.steepest = max(self.steepest, float(columns["rms_slope"][0]))
+        self.steepest = max(self.steepest, float(columns["rms_slope"]))
         self.unconverged += int(not columns["converged"][0])
         closure, energy, share = (
             float(columns[name][0]) for name in ("interface_closure", "elastic_energy", "contact_fraction")
@@ -143,47 +148,51 @@ def balanced_step(
     start: float,
     friction: float,
     normal_force: Callable[[float], float],
-) -> ShearStep | None:
-    """Move the block by one step and wear the faces; None if no load on the contacts balances.
+) -> ShearStep | str:
+    """Move the block by one step and wear the faces; the reason if no load on the contacts balances.
 
     The load P on the contacts is that at which N = P (1 - mu d) is the normal force. The rise d falls as P
     grows, so that there is one such load. Where contacts yield all at once d jumps; the step is then the mean
     of those on both sides that has the normal force.
     """
 
-    def excess(log_load: float) -> tuple[float, ShearStep]:
+    def excess(step: ShearStep) -> float:
+        return step.forces(friction)[0] / normal_force(step.state.height) - 1.0
+
+    def moved(log_load: float) -> tuple[float, ShearStep]:
         step = _moved(joint, contacts, abs(there - here), math.exp(log_load))
-        wanted = max(normal_force(step.state.height), 0.0)
-        return step.forces(friction)[0] / max(wanted, start * SMALLEST_FORCE) - 1.0, step
+        return excess(step), step
 
     contacts = joint.contact(here, elastic=True), joint.contact(there)
     limit = math.log(joint.capacity)
     low = high = min(math.log(start), limit)
-    below = above = excess(low)
-    while below[0] > 0 and low > limit - LOWEST:
+    lowest = low - LOWEST
+    below = above = moved(low)
+    while below[0] > 0 and low > lowest:
         high, above = low, below
         low -= BRACKET
-        below = excess(low)
+        below = moved(low)
     while above[0] < 0 and high < limit:
         low, below = high, above
         high = min(high + BRACKET, limit)
-        above = excess(high)
+        above = moved(high)
     if below[0] > 0 or above[0] < 0:
-        return None
+        return CRUSHED
     for turn in range(MAX_SOLUTIONS):
-        if high - low <= LOAD_ERROR or min(above[0], -below[0]) <= LOAD_ERROR:
-            break
-        share = 0.5 if turn % 2 else above[0] / (above[0] - below[0])  # bisection and secant in turn
-        middle = high + share * (low - high)
-        value = excess(middle)
+        span = above[0] - below[0]
+        share = above[0] / span if span > 0 else 0.0
+        step = _mean(above[1], below[1], share)
+        is_narrow = high - low <= LOAD_ERROR or min(above[0], -below[0]) <= LOAD_ERROR
+        if is_narrow and abs(excess(step)) <= LOAD_ERROR:
+            joint.wear(there, step.state)
+            return step
+        middle = high + (0.5 if turn % 2 else share) * (low - high)  # bisection and secant in turn
+        value = moved(middle)
         if value[0] < 0:
             low, below = middle, value
         else:
             high, above = middle, value
-    span = above[0] - below[0]
-    step = _mean(above[1], below[1], above[0] / span if span > 0 else 0.0)
-    joint.wear(there, step.state)
-    return step
+    return LOCKED
 
 
 def _mean(first: ShearStep, second: ShearStep, share: float) -> ShearStep:

@@ -11,9 +11,8 @@ figure is one of pyplot: a notebook shows it once, at the end of the cell, and `
 lines and background follow the style of matplotlib that is in use;
 `plt.style.use("fractalcontact.plotting.report")` is that of the files that `draw` writes. Units are read from
 the data and shown with a suitable prefix (mm, µm, kN), or as `units={"normal_force": "kN"}` says; that of an
-axis is `ax.xaxis.get_units()`. `curves(ax).to_csv("closure.csv")` exports the numbers. `paper_figure` draws
-the five figures of the 1998 paper from a study; `draw` writes every figure that a study has data for, without
-pyplot.
+axis is `ax.xaxis.get_units()`. `curves(ax).to_csv("closure.csv")` exports the numbers. `draw` writes every
+figure that a study has data for, without pyplot.
 """
 
 import lazy_loader

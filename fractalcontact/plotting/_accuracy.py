@@ -4,52 +4,52 @@ from __future__ import annotations
 
 import textwrap
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, require_dims, require_variables, table, words
-from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._style import AxesArray, Panels
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import (
+    as_dataset,
+    quantity,
+    require_dims,
+    require_variables,
+    result_of,
+    table,
+    words,
+)
+from fractalcontact.plotting._line_panel import Family, LinePanel
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Units, marked, require_units
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
 NARROW = 2.0  # costs within this ratio are drawn on an axis of at least its width
 PLANE = ("method", "setting")
+MEASURED = ("error", "run_time", "memory", "on_pareto_front", "benchmark", "error_meaning")
+COSTS = {"run_time": "", "memory": "peak memory"}  # with their names on axes
+CASES = ("method", "family", "hurst", "size")
+QUANTITIES = {
+    "error_ratio": ("rms error / Cramér-Rao bound", 1.0),
+    "interval_coverage": ("interval coverage", 0.95),
+}
 
 
-@_style.checked
+@figure
 def error_against_time(measured: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
-    Each point is one setting of a method. A filled point is on the Pareto front: no other method of the
-    benchmark is clearly better in both error and time.
+    Each point is one setting of a method. A filled point is on the Pareto front: no setting of another method
+    of the benchmark has a smaller error in a shorter time.
 
     Parameters
     ----------
     measured : DataTree or Dataset
         From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
         on_pareto_front over (method, setting), benchmark and error_meaning over method.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"run_time": "ms"}` if the data have it. Default: a suitable prefix.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing.
+    {shared}
 
     Examples
     --------
@@ -72,67 +72,68 @@ def error_against_time(measured: Any, *, units: Units | None = None, axes: Panel
     >>> print(time.get_xlabel(), "|", memory.get_xlabel())
     run time (ms) | peak memory (MB)
     """
-    benchmarks = _benchmarks(shown_in(measured, units, "error_against_time"))
+    benchmarks = _benchmarks(measured, units)
     shape = (len(benchmarks), 2)
     shown = _style.panels(axes, shape, (8.6, 2.7 * len(benchmarks)), sharey="row")
-    for (left, right), (name, data) in zip(shown, benchmarks.items(), strict=True):
-        run_time = table(data, "run_time", PLANE)
-        seconds, bytes_shown = scale_of(data["run_time"]), scale_of(data["memory"])
-        _error_curves(left, data, seconds(run_time))
-        label_axis(left.xaxis, name_of(data["run_time"]), seconds)
-        label_axis(left.yaxis, "true error", PLAIN)
-        entries = _error_curves(right, data, bytes_shown(table(data, "memory", PLANE)))
-        label_axis(right.xaxis, "peak memory", bytes_shown)
-        right.tick_params(labelleft=False)
-        _style.side_legend(right, entries)
+    for row, (name, data) in zip(shown, benchmarks.items(), strict=True):
+        methods = _methods(words(data["method"]))
+        on_front = table(data, "on_pareto_front", PLANE) > 0
+        for ax, (cost, title) in zip(row, COSTS.items(), strict=True):
+            x, y = quantity(data, cost, PLANE, title), quantity(data, "error", PLANE, "true error")
+            panel = LinePanel(ax, x, y, methods)
+            face = ax.get_facecolor()
+            for i, own in enumerate(methods.styles):
+                finite = np.isfinite(y.values[i]) & np.isfinite(x.values[i])
+                best = finite & on_front[i]
+                method = methods.labels[i]
+                panel.line(method, x.values[i][finite], y.values[i][finite], **own, markerfacecolor=face)
+                panel.line(
+                    f"{method}, Pareto front", x.values[i][best], y.values[i][best], **own | {"ls": ""}
+                )
+            least, most = np.nanmin(x.shown), np.nanmax(x.shown)
+            if least > 0 and most < NARROW * least:  # nearly equal costs must not look different
+                ax.set_xlim(least / NARROW, most * NARROW)
+            panel.finish(log="xy", legend=cost == "memory")
+        row[1].set_ylabel("")
+        row[1].tick_params(labelleft=False)
         meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
-        left.set_title(f"{name}\n{meaning}", fontsize="small")
+        row[0].set_title(f"{name}\n{meaning}", fontsize="small")
     return shown
 
 
-def _benchmarks(measured: Any) -> dict[str, xr.Dataset]:
+def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
     """Return the results of each benchmark by name."""
     if isinstance(measured, xr.DataTree) and measured.children:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
         groups = {"": as_dataset(measured, "error_against_time", "measured")}
-    needed = ("error", "run_time", "memory", "on_pareto_front", "benchmark", "error_meaning")
+    if units is not None:
+        require_units(groups.values(), units, "error_against_time")
+        groups = {prefix: marked(data, units) for prefix, data in groups.items()}
     benchmarks = {}
     for prefix, data in groups.items():
-        require_variables(data, "error_against_time", needed, "measured")
+        require_variables(data, "error_against_time", MEASURED, "measured")
         names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):
             benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
     return benchmarks
 
 
-def _error_curves(ax: Axes, data: xr.Dataset, cost: Any) -> list[Any]:
-    """Draw error against a cost, a curve for each method; return the entries of the legend."""
-    errors, on_front = table(data, "error", PLANE), table(data, "on_pareto_front", PLANE).astype(bool)
-    entries = []
-    for row, name in enumerate(words(data["method"])):
-        finite = np.isfinite(errors[row]) & np.isfinite(cost[row])
-        best = finite & on_front[row]
-        style = _method_style(row)
-        label = name.replace("_", " ")
-        face = ax.get_facecolor()
-        ax.plot(cost[row][finite], errors[row][finite], **style, markerfacecolor=face, label=label)
-        ax.plot(cost[row][best], errors[row][best], **style, ls="", label=f"{label}, Pareto front")
-        entries.append(_style.legend_line(label, **style))
-    _style.log_scale(ax, x=cost, y=errors)
-    least, most = np.nanmin(cost), np.nanmax(cost)
-    if least > 0 and most < NARROW * least:  # nearly equal costs must not style different
-        ax.set_xlim(least / NARROW, most * NARROW)
-    _style.plain_ticks(ax)
-    return entries
+def _methods(names: list[str]) -> Family:
+    """Return a family of curves with a colour and a marker for each method."""
+    colours = _style.cycle()
+    styles = [
+        {
+            "color": colours[i % len(colours)],
+            "marker": MARKERS[i % len(MARKERS)],
+            "ls": "-" if i < len(colours) else "--",
+        }
+        for i in range(len(names))
+    ]
+    return Family(styles, [name.replace("_", " ") for name in names])
 
 
-def _method_style(number: int) -> dict[str, Any]:
-    colour = _style.cycle()[number % len(_style.cycle())]
-    return {"color": colour, "marker": MARKERS[number % len(MARKERS)]}
-
-
-@_style.checked
+@figure
 def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw the rms error over the Cramer-Rao bound and the interval coverage against the true Hurst exponent.
 
@@ -145,17 +146,7 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     bench : Dataset
         From `fractalcontact.accuracy.estimators`: error_ratio and interval_coverage over (method, family,
         hurst, size), with the ends of their intervals.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing.
+    {shared}
 
     Examples
     --------
@@ -170,48 +161,44 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(upper.get_title(), "|", lower.get_xlabel())
     fbm, n = 128 | true Hurst exponent
     """
-    data = as_dataset(bench, "estimator_errors", "bench")
-    require_variables(data, "estimator_errors", ("error_ratio", "interval_coverage"), "bench")
-    dims = {dim: dim for dim in ("method", "family", "hurst", "size")}
-    require_dims(data, "estimator_errors", dims, "bench")
+    data = result_of(bench, "estimator_errors", tuple(QUANTITIES), ("method",), argument="bench")
+    require_dims(data, "estimator_errors", {dim: dim for dim in CASES}, "bench")
     with Problems("fc.plotting.estimator_errors") as problems:
-        for dim in dims:
+        for dim in CASES:
             problems.require(data.sizes[dim] > 0, f"bench.{dim}", "at least one entry", NONE)
     families, sizes = words(data["family"]), data["size"].values
     cases = list(product(range(len(families)), range(len(sizes))))
     size = (2.3 * len(cases) + 1.6, 5.2)
     shown = _style.panels(axes, (2, len(cases)), size, sharex=True, sharey="row", height_ratios=(2.0, 1.0))
-    styles = {
-        name.replace("_", " "): _method_style(number) | {"ls": "-" if number < len(_style.cycle()) else "--"}
-        for number, name in enumerate(words(data["method"]))
-    }
-    for (upper, lower), (i, j) in zip(shown.T, cases, strict=True):
+    methods = _methods(words(data["method"]))
+    for column, (i, j) in zip(shown.T, cases, strict=True):
         case = data.isel(family=i, size=j)
-        for ax, quantity in ((upper, "error_ratio"), (lower, "interval_coverage")):
-            _curves_against_hurst(ax, case, quantity, styles)
-        upper.set_yscale("log")
-        upper.axhline(1.0, color=_style.ink(), lw=0.9, ls=":")
-        lower.axhline(0.95, color=_style.ink(), lw=0.9, ls=":")
-        _style.plain_ticks(upper)
-        upper.set_title(f"{families[i]}, n = {sizes[j]}")
-        label_axis(lower.xaxis, "true Hurst exponent", PLAIN)
-    label_axis(shown[0, 0].yaxis, "rms error / Cramér-Rao bound", PLAIN)
-    label_axis(shown[1, 0].yaxis, "interval coverage", PLAIN)
-    entries = [_style.legend_line(name, **style) for name, style in styles.items()]
-    _style.side_legend(shown[0, -1], entries)
+        for ax, (name, (title, ideal)) in zip(column, QUANTITIES.items(), strict=True):
+            panel = _draw_against_hurst(ax, case, name, title, methods)
+            panel.level(ideal, color=_style.ink(), lw=0.9, ls=":")
+            is_last = name == "error_ratio" and ax is shown[0, -1]
+            panel.finish(log="y" if name == "error_ratio" else "", legend=is_last)
+            if ax is not shown[list(QUANTITIES).index(name), 0]:
+                ax.set_ylabel("")
+        column[0].set_xlabel("")
+        column[0].set_title(f"{families[i]}, n = {sizes[j]}")
     return shown
 
 
-def _curves_against_hurst(ax: Axes, case: xr.Dataset, quantity: str, styles: dict[str, Any]) -> None:
+def _draw_against_hurst(ax: Axes, case: xr.Dataset, name: str, title: str, methods: Family) -> LinePanel:
     dims = ("method", "hurst")
-    hurst = np.asarray(case["hurst"].values, float)
-    values = table(case, quantity, dims)
-    for row, (name, style) in enumerate(styles.items()):
-        finite = np.isfinite(values[row])
+    hurst, values = (
+        quantity(case, "hurst", ("hurst",), "true Hurst exponent"),
+        quantity(case, name, dims, title),
+    )
+    panel = LinePanel(ax, hurst, values, methods)
+    for i, own in enumerate(methods.styles):
+        finite = np.isfinite(values.values[i])
         if not finite.any():
             continue
-        ax.plot(hurst[finite], values[row][finite], **style, label=name)
-        ends = [f"{quantity}_{end}" for end in ("low", "high")]
-        if set(ends) <= set(case.variables):
-            low, high = (table(case, end, dims)[row][finite] for end in ends)
-            ax.vlines(hurst[finite], low, high, color=style["color"], lw=0.8, label=f"{name}, interval")
+        panel.line(methods.labels[i], hurst.values[finite], values.values[i][finite], **own)
+        if {f"{name}_low", f"{name}_high"} <= case.variables.keys():
+            ends = (table(case, f"{name}_{end}", dims)[i][finite] for end in ("low", "high"))
+            label = f"{methods.labels[i]}, interval"
+            panel.bars(label, hurst.values[finite], *ends, color=own["color"], lw=0.8)
+    return panel

@@ -1,30 +1,27 @@
-"""Box dimension of a contact domain, and the local slopes it is fitted to."""
+"""Dimensions of a contact domain against load and shear."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.power_law import local_slope
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._box_size_curves import as_array, draw_size_curves, path_panels
-from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import at_force, curve_name, load_of, load_text, shear_words
-from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._style import AxesArray, Panels
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import as_dataset, quantity, result_of, table
+from fractalcontact.plotting._line_panel import Family, LinePanel
+from fractalcontact.plotting._paths import PATH, at_force, by_shear, load_of, load_text, loads_of
+from fractalcontact.plotting._size_curves import CELLS_NULL, as_array, path_panels
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Units
 
 DIMENSIONS = ("box_dimension", "minkowski_dimension", "correlation_dimension", "boundary_dimension")
+INTERVAL = ("ci_low", "ci_high")
 WIDE_INTERVAL = 0.5  # width of an interval beyond which a point is drawn open
 
 
-@_style.checked
+@figure
 def box_dimension(
     result: Any, *, normal_force: float | None = None, units: Units | None = None, axes: Panels | None = None
 ) -> AxesArray:
@@ -41,20 +38,7 @@ def box_dimension(
         `boundary_dimension` over (shear, step), or over one of them.
     normal_force : float, optional
         Normal force (N) of the panel against shear; the nearest step is taken. Default: the last step.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. There is one for each of the
-        dims that is longer than one. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
+    {shared}
 
     Examples
     --------
@@ -65,136 +49,55 @@ def box_dimension(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     coverage (%) | box dimension $\Delta_\sigma$
     """
-    result = shown_in(result, units, "box_dimension")
     dataset = as_dataset(result, "box_dimension")
     present = [name for name in DIMENSIONS if name in dataset]
-    data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], ("shear", "step"))
-    name = present[0]
-    shown = path_panels(axes, data)
-    colours, shears = _style.sequence_colours(data.sizes["shear"]), shear_words(data)
+    data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], PATH, units)
+    shown, shears = path_panels(axes, data), by_shear(data)
+    first, *_, last = (*shown.values(), *shown.values())
     for dim, ax in shown.items():
         if dim == "step":
-            for i, colour in enumerate(colours):
-                place = curve_name("", shears, i)
-                _dimension_curve(ax, data.isel(shear=i), name, dim, (colour, place), band=len(colours) == 1)
+            panel = _draw_dimension(ax, data, present[0], PATH, shears)
         else:
             path = at_force(data, normal_force)
             load = load_text(path, data)
-            _dimension_curve(ax, path, name, dim, (_style.ink(), f", {load}" if load else ""), band=True)
+            family = Family([{"color": _style.ink()}], [load] if load else [])
+            panel = _draw_dimension(ax, path.expand_dims("step"), present[0], PATH[::-1], family)
             ax.set_title(load)
+        if ax is not first:
+            ax.set_ylabel("")
+        panel.family = shears if data.sizes["step"] > 1 else Family([])
+        log = "x" if _style.needs_log_axis(panel.x.values) else ""
+        panel.finish(log=log, legend=ax is last, empty="no contact")
         ax.set_ylim(-0.05, 2.05)
-        if not bool(data[name].notnull().any()):
-            _style.write_in_empty_axes(ax, "no contact")
-    first, *_, last = (*shown.values(), *shown.values())
-    label_axis(first.yaxis, name_of(data[name]), PLAIN)
-    if data.sizes["step"] > 1:
-        _style.sequence_legend(last, *shears, colours)
-    _style.side_legend(last, _line_legend(data, name), low=data.sizes["step"] > 1)
     return as_array(shown)
 
 
-def _line_legend(data: xr.Dataset, name: str) -> list[Any]:
-    """Return the legend entries of the line and point styles in use."""
-    from matplotlib.patches import Patch
-
-    entries = [_style.legend_line("contact domain", marker="o")]
-    if "ci_low" in data and "ci_high" in data:
-        entries.append(Patch(facecolor=_style.grey(), alpha=0.25, lw=0, label="interval"))
-        uncertain = ~(data["ci_high"] - data["ci_low"] <= WIDE_INTERVAL) & data[name].notnull()
-        if bool(uncertain.any()):
-            label = f"interval wider than\n{WIDE_INTERVAL:g}, or none"
-            entries.append(_style.legend_line(label, ls="", marker="o", mfc=_style.tone(0.0)))
-    if "null_dimension" in data:
-        entries.append(_style.legend_line("random null,\nequal coverage", **_style.NULL_LINE))
-    return entries
-
-
-def _dimension_curve(
-    ax: Axes, path: xr.Dataset, name: str, dim: str, style: tuple[Any, str], *, band: bool
-) -> None:
-    """Draw one curve in its colour, with its random null, intervals and points, against shear or load."""
-    colour, place = style
-    load = load_of(path) or ("coverage" if "coverage" in path else dim)
-    against = "shear" if dim == "shear" else load
-    labelled = against in path.variables
-    values = table(path, name, (dim,))
-    x = table(path, against, (dim,)) if labelled else np.arange(values.size, dtype=float)
-    scale = scale_of(path[against]) if labelled else PLAIN
-    certain = np.full(values.shape, True)
-    if "ci_low" in path and "ci_high" in path:
-        low, high = (table(path, end, (dim,)) for end in ("ci_low", "ci_high"))
-        certain = high - low <= WIDE_INTERVAL
-        if band:
-            ax.fill_between(scale(x), low, high, color=colour, alpha=0.14, lw=0, label=f"interval{place}")
-    ax.plot(scale(x), values, color=colour, label=f"contact domain{place}")
-    if values.size <= _style.MAX_MARKED_POINTS:
-        ax.plot(scale(x)[certain], values[certain], "o", color=colour)
-        ax.plot(scale(x)[~certain], values[~certain], "o", mec=colour, mfc=ax.get_facecolor())
+def _draw_dimension(
+    ax: Axes, path: xr.Dataset, name: str, dims: tuple[str, str], family: Family
+) -> LinePanel:
+    """Draw one curve for each of the family with its random null, its points and, if alone, its interval."""
+    load = "shear" if dims[1] == "shear" else load_of(path) or "coverage"
+    x, y = loads_of(path, load, "box_dimension", dims), quantity(path, name, dims)
+    panel = LinePanel(ax, x, y, family, points=0)
+    reliable, described = np.full(y.values.shape, True), "interval wider than 0.5, or none"
+    panel.key("contact domain", marker="o")
+    if set(INTERVAL) <= path.variables.keys():
+        low, high = (table(path, end, dims) for end in INTERVAL)
+        reliable = high - low <= WIDE_INTERVAL
+        panel.area_key("interval", facecolor=_style.grey(), alpha=0.25)
+        if len(y.values) == 1:
+            panel.band(family.curve("interval"), x.values[0], low[0], high[0], family.styles[0]["color"])
+    if "follows_power_law" in path:
+        reliable = reliable & (table(path, "follows_power_law", dims) != 0)
+        described = "no power law, or wide interval"
+    panel.curves("contact domain", x.values, y.values)
+    if y.values.shape[1] <= _style.MAX_MARKED_POINTS:
+        for i, own in enumerate(family.styles):
+            panel.flagged("_points", x.values[i], y.values[i], reliable[i], **own)
+    if not reliable[np.isfinite(y.values)].all():
+        panel.key(described, ls="", marker="o", mfc=_style.tone(0.0))
     if "null_dimension" in path:
-        null = table(path, "null_dimension", (dim,))
-        ax.plot(scale(x), null, color=colour, label=f"random null{place}", **_style.NULL_LINE)
-    _style.log_x_if_wide(ax, x)
-    label_axis(ax.xaxis, name_of(path[against]) if labelled else against, scale)
-
-
-@_style.checked
-def local_slopes(
-    result: Any,
-    *,
-    shear: float | None = None,
-    normal_force: float | None = None,
-    units: Units | None = None,
-    axes: Panels | None = None,
-) -> AxesArray:
-    """Draw the local dimension against box size, for increasing load and for increasing shear.
-
-    A power law holds where the curve is level. Dashed lines show the random null: randomly placed cells of
-    equal coverage. At most six curves are drawn.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.domains.box_dimension`, `box_counts`, `correlation_dimension` or
-        `minkowski_dimension` over (shear, step), or without shear or step.
-    shear : float, optional
-        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
-        middle one.
-    normal_force : float, optional
-        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. There is one for each of the
-        dims that is longer than one. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import numpy as np
-    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
-    >>> (ax,) = fc.plotting.local_slopes(fc.domains.box_dimension(mask))
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    box size (mm) | local dimension
-    """
-    result = shown_in(result, units, "local_slopes")
-    data = result_of(result, "local_slopes", ("local_slope",), ("shear", "step"))
-    scale = next((name for name in ("box_size", "radius") if name in data.variables), "box_size")
-    nulls = [name for name in ("null_count", "null_mass", "null_fraction") if name in data]
-    require_dims(data, "local_slopes", dict.fromkeys(("local_slope", scale, *nulls), scale))
-    if "null_count" in data or "null_mass" in data:
-        curve, sign = ("null_count", -1.0) if "null_count" in data else ("null_mass", 1.0)
-        slope = sign * local_slope(data["box_size"].values, data[curve].values)
-        data = data.assign(null_slope=(data[curve].dims, slope))
-    elif "null_fraction" in data:
-        slope = 2.0 - local_slope(data["radius"].values, data["null_fraction"].values)
-        data = data.assign(null_slope=(data["null_fraction"].dims, slope))
-    return draw_size_curves(data, shear, normal_force, axes, "local_slope", "null_slope")
+        panel.curves(
+            "random null", x.values, table(path, "null_dimension", dims), key=CELLS_NULL, **_style.NULL_LINE
+        )
+    return panel

@@ -1,132 +1,187 @@
-"""Mean gap, stiffness and distribution of pressures of a contact, with theories beside them."""
+"""Contact area, pressures, slip loops and any other variable of a path, with theories beside them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._closure import draw_theories
-from fractalcontact.plotting._inputs import as_dataset, require_dims, result_of, table
-from fractalcontact.plotting._paths import curve_name, load_words, loads_of, shear_words
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
+from fractalcontact.plotting._line_panel import LinePanel
+from fractalcontact.plotting._paths import (
+    PATH,
+    at_shear,
+    by_load,
+    by_shear,
+    load_of,
+    loads_of,
+    path_axis,
+    shear_text,
+)
+from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
+from fractalcontact.plotting._units import PER_CENT, Quantity, Units, name_of, scale_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._units import Units
-
-STIFFNESSES = ("contact_stiffness", "stiffness", "interface_stiffness")
-PER_LENGTH = Scale(1e9, "MPa/mm")
+RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
+PROPORTIONAL: dict[str, Any] = {"ls": ":", "lw": 1.0}
 THEORY: dict[str, Any] = {"ls": "-.", "lw": 1.0}
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.5)), "-.")  # of the first, second ... variable
 MOST_STEPS = 6  # of the distributions in one figure
+MARKED = 30  # most points of a curve that are marked beside theories
+OF_THEORY = {"contact_stiffness": "interface_stiffness", "stiffness": "interface_stiffness"}
 
 
-@_style.checked
-def mean_gap(
+@figure
+def contact_area(
     result: Any,
     *,
-    against: str = "nominal_pressure",
+    against: str = "normal_force",
     theory: Any = None,
+    log: bool = False,
     units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the mean gap between two surfaces, one curve per shear displacement.
+    """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
+
+    Solid lines show the area corrected for the perimeter, thin dashed lines the count of cells in contact,
+    which is too high because a cell that is partly in contact counts fully.
 
     Parameters
     ----------
     result : Dataset or node of a DataTree
-        From `fractalcontact.contact.press` or `fractalcontact.joints.closure`: mean_gap (m) over (shear,
-        step), or over one of them.
+        From `fractalcontact.joints.closure` or `fractalcontact.contact.press`: contact_fraction,
+        corrected_contact_fraction and normal_force (N) over (shear, step), or over one of them.
     against : str
-        Variable on the x axis: nominal_pressure, normal_force or closure.
+        Variable on the x axis: normal_force, nominal_pressure or closure.
+    theory : Dataset, optional
+        From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
+    log : bool
+        Logarithmic axes, which show every decade of the load; a dotted line is proportional to the load.
+    {shared}
+
+    References
+    ----------
+    Yastrebov, Anciaux and Molinari (2017), Journal of the Mechanics and Physics of Solids 107 (correction).
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    >>> ax = fc.plotting.contact_area(result, against="nominal_pressure")
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    nominal pressure (MPa) | real / nominal contact area (%)
+    """
+    data = result_of(result, "contact_area", ("contact_fraction", against), PATH, units)
+    loads = loads_of(data, against, "contact_area")
+    cells = quantity(data, "contact_fraction", PATH, "real / nominal contact area")
+    panel = LinePanel(_style.axes_or_new(ax), loads, cells, by_shear(data))
+    if "corrected_contact_fraction" in data:
+        fraction = table(data, "corrected_contact_fraction", PATH)
+        name = "corrected for the perimeter"
+        panel.curves(name, loads.values, fraction, key=name)
+        panel.curves("cell count", loads.values, cells.values, key="cell count", **RAW_LINE)
+    else:
+        panel.curves("cell count", loads.values, cells.values)
+    if theory is not None:
+        _draw_theories(panel, theory, "contact_area", "contact_fraction", against)
+    if log and against != "closure":
+        _draw_proportional(panel, loads.values, cells.values)
+    return panel.finish(log="xy" if log else "", zero="" if log else "xy", title="contact area")
+
+
+def _draw_proportional(panel: LinePanel, x: Any, y: Any) -> None:
+    """Draw the line of proportional growth through the middle of the curves."""
+    used = (x > 0) & (y > 0)
+    if used.any():
+        slope = np.exp(np.median(np.log(y[used] / x[used])))
+        ends = np.array([x[used].min(), min(x[used].max(), y[used].max() / slope)])  # within the curves
+        name = "proportional to the load"
+        panel.line(name, ends, ends * slope, key=name, marker="", color=_style.grey(), **PROPORTIONAL)
+
+
+def _draw_theories(panel: LinePanel, theory: Any, where: str, name: str, against: str) -> None:
+    """Draw a variable of each theory that gives one."""
+    data = result_of(theory, where, (name, "theory", against), ("theory", "step"), argument="theory")
+    loads, values = table(data, against, ("step",)), table(data, name, ("theory", "step"))
+    colours = _style.cycle()
+    for i, word in enumerate(words(data["theory"])):
+        if np.isfinite(values[i]).any():
+            authors = ", ".join(part.capitalize() for part in word.split("_"))
+            colour = colours[(i + 1) % len(colours)]
+            panel.line(authors, loads, values[i], key=authors, marker="", color=colour, **THEORY)
+
+
+@figure
+def path(
+    result: Any,
+    variable: str | Sequence[str],
+    *,
+    against: str | None = None,
+    theory: Any = None,
+    log: bool | None = None,
+    units: Units | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw any variable of a load or shear path, for example the mean gap, the stiffness or the coverage.
+
+    There is one curve per shear displacement against a load, and one per load against shear. Of a single
+    curve the interval is a band, where the result has its ends as `<variable>_low` and `<variable>_high`.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        Any result over (shear, step), or over one of them: from `fractalcontact.contact.press`,
+        `fractalcontact.joints.closure`, `fractalcontact.joints.closure_laws`,
+        `fractalcontact.domains.evolution`.
+    variable : str or sequence of str
+        Name of the variable, or of several of one unit, which get a line style each.
+    against : str, optional
+        Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the first of the
+        loads that the result has, or shear where it has a single step.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
+    log : bool, optional
+        Logarithmic axes. Default: each axis where its values differ by more than a factor of 30.
+    {shared}
 
     Examples
     --------
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.mean_gap(pressed)
+    >>> ax = fc.plotting.path(pressed, "mean_gap", against="nominal_pressure")
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | mean gap (µm)
     """
-    result = shown_in(result, units, "mean_gap")
-    return _draw("mean_gap", result, "mean_gap", against, theory, ax)
+    names = (variable,) if isinstance(variable, str) else tuple(variable)
+    given = () if against is None else (against,)
+    data = result_of(result, "path", (*names, *given), PATH, units)
+    dims, x, family = path_axis(data, against, "path")
+    values = [table(data, name, dims) for name in names]
+    title = ", ".join(name_of(data[name]) for name in names)
+    y = quantity(data, names[0], dims, title, np.array(values))
+    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=MARKED)
+    for name, rows, line in zip(names, values, cycle(LINES), strict=False):
+        title = name_of(data[name])
+        panel.curves(title, x.values, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
+        if len(rows) == 1 and {f"{name}_low", f"{name}_high"} <= data.variables.keys():
+            low, high = (table(data, f"{name}_{end}", dims)[0] for end in ("low", "high"))
+            panel.band(f"{title}, interval", x.values[0], low, high, family.styles[0]["color"])
+    if theory is not None:
+        _draw_theories(panel, theory, "path", OF_THEORY.get(names[0], names[0]), against or load_of(data))
+    wide = "".join(
+        axis for axis, shown in (("x", x.values), ("y", np.array(values))) if needs_log_axis(shown)
+    )
+    return panel.finish(log=wide if log is None else "xy" * log, title="" if theory is None else "theory")
 
 
-@_style.checked
-def stiffness(
-    result: Any,
-    *,
-    against: str = "nominal_pressure",
-    theory: Any = None,
-    units: Units | None = None,
-    ax: Axes | None = None,
-) -> Axes:
-    """Draw the normal stiffness per nominal area, one curve per shear displacement.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        With contact_stiffness (from `fractalcontact.contact.press`, ``also="stiffness"``), stiffness (from
-        `fractalcontact.joints.closure_laws`) or interface_stiffness (Pa m-1) over (shear, step), or over one
-        of them.
-    against : str
-        Variable on the x axis: nominal_pressure, normal_force or closure.
-    theory : Dataset, optional
-        From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.spectral((32, 32), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
-    >>> loads = {"contact_modulus": 1e9, "nominal_pressure": [1e6, 1e7]}
-    >>> pressed = fc.contact.press(surface, also="stiffness", **loads)
-    >>> theory = fc.contact.theories(surface, **loads)
-    >>> print(fc.plotting.stiffness(pressed, theory=theory).get_ylabel())
-    normal stiffness (MPa/mm)
-    """
-    result = shown_in(result, units, "stiffness")
-    data = as_dataset(result, "stiffness")
-    name = next((name for name in STIFFNESSES if name in data.variables), None)
-    with Problems("fc.plotting.stiffness") as problems:
-        problems.require(name is not None, "result", f"one of {', '.join(STIFFNESSES)}", NONE)
-    assert name is not None
-    return _draw("stiffness", data, name, against, theory, ax)
-
-
-@_style.checked
+@figure
 def pressure_distribution(
     result: Any, *, theory: Any = None, units: Units | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -135,73 +190,55 @@ def pressure_distribution(
     Parameters
     ----------
     result : Dataset or node of a DataTree
-        From `fractalcontact.contact.press` with ``also="pressure_distribution"``.
+        From `fractalcontact.contact.press` with ``include="pressure_distribution"``.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves of Persson (2001), a Gaussian about the
         nominal pressure less that about its negative.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
+    {shared}
 
     Examples
     --------
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.spectral((32, 32), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
     >>> loads = {"contact_modulus": 1e9, "nominal_pressure": [1e7, 4e7]}
-    >>> pressed = fc.contact.press(surface, also="pressure_distribution", **loads)
+    >>> pressed = fc.contact.press(surface, include="pressure_distribution", **loads)
     >>> ax = fc.plotting.pressure_distribution(pressed)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     pressure (MPa) | nominal area per pressure (1/MPa)
     """
-    result = shown_in(result, units, "pressure_distribution")
-    ax = _style.axes_or_new(ax)
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
-    data = result_of(result, "pressure_distribution", names, ("step",))
+    data = result_of(result, "pressure_distribution", names, ("step",), units)
     require_dims(data, "pressure_distribution", {"area_share": "pressure_class"})
     with Problems("fc.plotting.pressure_distribution") as problems:
         count = data.sizes["pressure_class"]
         problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
     data = data.isel(step=_style.spread_indices(data.sizes["step"], MOST_STEPS))
     share = table(data, "area_share", ("step", "pressure_class"))
-    greatest = table(data, "maximum_pressure", ("step",))
-    nominal = table(data, "nominal_pressure", ("step",))
+    greatest, nominal = (table(data, name, ("step",)) for name in names[1::2])
     classes = np.asarray(data["pressure_class"].values, dtype=np.float64)
     scale = scale_of(data["maximum_pressure"])
+    x = Quantity(classes * greatest[:, None], scale, "pressure")
+    per_pressure = Scale(1 / scale.factor, f"1/{scale.unit}")
+    y = Quantity(share, per_pressure, "nominal area per pressure")
     spread = None
     if theory is not None:
         spread = float(
             result_of(theory, "pressure_distribution", ("pressure_spread",), ())["pressure_spread"]
         )
-    colours = _style.sequence_colours(len(share))
-    words = load_words(data.drop_vars("normal_force", errors="ignore"))
-    for i, colour in enumerate(colours):
-        if not greatest[i] > 0:
-            continue
-        pressure, width = scale(classes * greatest[i]), float(scale(greatest[i])) / classes.size
-        name = curve_name("this surface", words, i)
-        ax.step(pressure, share[i] / width, where="mid", color=colour, lw=1.0, label=name)
+    family = by_load(data.drop_vars("normal_force", errors="ignore"))
+    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=0)
+    for i in np.flatnonzero(greatest > 0).tolist():
+        own, pressure = family.styles[i], x.values[i]
+        density = share[i] * classes.size / greatest[i]
+        panel.line(family.curve("this surface", i), pressure, density, drawstyle="steps-mid", lw=1.0, **own)
         if spread:
             beside = np.linspace(0.0, float(pressure[-1]), 400)
-            density = _persson(beside, float(scale(nominal[i])), float(scale(spread)))
-            ax.plot(beside, density, color=colour, label=curve_name("Persson", words, i), **THEORY)
-    label_axis(ax.xaxis, "pressure", scale)
-    label_axis(ax.yaxis, "nominal area per pressure", Scale(1 / scale.factor, f"1/{scale.unit}"))
-    ax.set_xlim(left=0)
-    ax.set_ylim(bottom=0)
-    _style.sequence_legend(ax, *words, colours)
+            panel.line(
+                family.curve("Persson", i), beside, _persson(beside, nominal[i], spread), **own, **THEORY
+            )
     if spread:
-        _style.side_legend(ax, [_style.legend_line("Persson", **THEORY)], title="theory", low=True)
-    return ax
+        panel.key("Persson", **THEORY)
+    return panel.finish(zero="xy", title="theory" if spread else "")
 
 
 def _persson(pressure: Any, nominal: float, spread: float) -> Any:
@@ -210,31 +247,89 @@ def _persson(pressure: Any, nominal: float, spread: float) -> Any:
     return (first - image) / (spread * np.sqrt(2 * np.pi))
 
 
-def _draw(where: str, result: Any, name: str, against: str, theory: Any, ax: Axes | None) -> Axes:
-    """Draw a variable of every step against its load, on logarithmic axes."""
-    ax = _style.axes_or_new(ax)
-    data = result_of(result, where, (name, against), ("shear", "step"))
-    loads, values = loads_of(data, against, where), table(data, name, ("shear", "step"))
-    scale = scale_of(data[against])
-    up = PER_LENGTH if name in STIFFNESSES else scale_of(data[name])
-    colours, shears = _style.sequence_colours(len(loads)), shear_words(data)
-    for i, colour in enumerate(colours):
-        marker: dict[str, Any] = {"marker": "o", "ms": 3.0} if np.isfinite(values[i]).sum() <= 30 else {}
-        ax.plot(
-            scale(loads[i]),
-            up(values[i]),
-            color=colour,
-            label=curve_name("this surface", shears, i),
-            **marker,
-        )
-    _style.log_scale(ax, x=loads, y=values)
-    entries = []
-    if theory is not None:
-        beside = "interface_stiffness" if name in STIFFNESSES else name
-        entries = draw_theories(ax, theory, where, beside, against, scale, up)
-    _style.plain_ticks(ax)
-    label_axis(ax.xaxis, name_of(data[against]), scale)
-    label_axis(ax.yaxis, "normal stiffness" if name in STIFFNESSES else name_of(data[name]), up)
-    _style.sequence_legend(ax, *shears, colours)
-    _style.side_legend(ax, entries, title="theory", low=True)
-    return ax
+CORRECTED: dict[str, Any] = {"ls": (0, (4, 2)), "marker": "s", "ms": 3.5}
+
+
+@figure
+def area_dimension(
+    result: Any, *, shear: float | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the real contact area of a joint against the spacing of its heights, one curve per load.
+
+    Solid lines are the cells in contact, dashed lines the area corrected for their perimeter. The slope of a
+    straight line would be 2 less the dimension by area.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.area_dimension`.
+    shear : float, optional
+        Shear (m), the nearest one is drawn; None: the middle one.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> areas = fc.joints.area_dimension(crack, shear=4e-4, nominal_pressure=[1e6, 1e7])
+    >>> ax = fc.plotting.area_dimension(areas)
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    spacing (µm) | real contact area (%)
+    """
+    names = ("contact_fraction", "corrected_contact_fraction", "resolution")
+    result = result_of(result, "area_dimension", names, ("shear", "step", "resolution"), units)
+    data, dims = at_shear(result, shear), ("step", "resolution")
+    spacing = quantity(data, "resolution", ("resolution",), "spacing")
+    cells = quantity(data, "contact_fraction", dims)
+    panel = LinePanel(_style.axes_or_new(ax), spacing, cells, by_load(data), points=_style.MAX_MARKED_POINTS)
+    panel.curves("cells", spacing.values, cells.values, key="cells", marker="o")
+    corrected = table(data, "corrected_contact_fraction", dims)
+    name = "corrected for the perimeter"
+    panel.curves(name, spacing.values, corrected, key=name, **CORRECTED)
+    panel.ax.set_title(shear_text(data))
+    panel.finish(log="xy")
+    panel.ax.set_xticks(spacing.shown, [f"{value:g}" for value in spacing.shown])
+    panel.ax.set_xticks([], minor=True)
+    return panel.ax
+
+
+@figure
+def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
+    """Draw tangential force against displacement, and the part of the contact that sticks against the force.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
+        (shear, step).
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.partial_slip(
+    ...     surface,
+    ...     contact_modulus=1e9,
+    ...     poisson=0.2,
+    ...     friction_coefficient=0.5,
+    ...     normal_force=10.0,
+    ...     tangential_force=[0.0, 3.0, -3.0, 3.0],
+    ... )
+    >>> print(fc.plotting.slip_loops(result)[0].get_ylabel())
+    tangential force $Q$ (N)
+    """
+    names = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
+    data = result_of(result, "slip_loops", names, PATH, units)
+    force, displacement = (quantity(data, name, PATH) for name in names[:2])
+    stuck, contact = (table(data, name, PATH) for name in names[2:])
+    share = stuck / np.where(contact > 0, contact, np.nan)
+    sticking = Quantity(share, PER_CENT, "part of the contact that sticks")
+    shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
+    for ax, x, y in zip(shown, (displacement, force), (force, sticking), strict=True):
+        panel = LinePanel(ax, x, y, by_shear(data), points=_style.MAX_MARKED_POINTS)
+        panel.curves("loading path", x.values, y.values)
+        panel.finish(legend=y is sticking)
+    shown[1].set_ylim(0, 105)
+    return shown

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._inputs import extent_of, require_known_dims, result_of
-from fractalcontact.plotting._paths import load_text, select_path, shear_text
-from fractalcontact.plotting._surface import draw_outline, plane_scale
-from fractalcontact.plotting._units import shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._style import AxesArray, Panels
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of
+from fractalcontact.plotting._paths import PATH, load_text, select_path, shear_text
+from fractalcontact.plotting._style import AxesArray, Panels
+from fractalcontact.plotting._units import Units
 
 ZOOM = 1 / 6  # edge of the magnified window over the shorter side
 POINTS = 1.0  # of a screen: a map whose cells are narrower is magnified
 
 
-@_style.checked
+@figure
 def contact_domains(
     result: Any,
     *,
@@ -35,14 +30,15 @@ def contact_domains(
     units: Units | None = None,
     axes: Panels | None = None,
 ) -> AxesArray:
-    """Draw maps of the contact state for increasing load at one shear, or increasing shear at one force.
+    """Draw maps of the contact state, or of stick and slip, along a path of load or of shear.
 
     A further column magnifies a window, framed in the last map of each row, where the most contacts are.
 
     Parameters
     ----------
     result : Dataset or node of a DataTree
-        Variable `state` with dims (shear, step, y, x), or without shear or step.
+        Variable `state`, or `slip_state` of `fractalcontact.contact.partial_slip`, with dims (shear, step, y,
+        x), or without shear or step.
     shear : float, optional
         Shear displacement (m) whose load path is shown; the nearest one is taken.
     normal_force : float, optional
@@ -52,19 +48,7 @@ def contact_domains(
     zoom : float, optional
         Edge (m) of the window, 0 for none. Default: a sixth of the shorter side if the cells of a map are
         narrower than a typographic point, else none; none on given `axes`.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        There is no state, or the result has several shears and several steps and neither is chosen.
+    {shared}
 
     Examples
     --------
@@ -75,20 +59,26 @@ def contact_domains(
     >>> len(maps)
     2
     """
-    result = shown_in(result, units, "contact_domains")
-    data = result_of(result, "contact_domains", ("state",), ("shear", "step"))
-    require_known_dims(data, "contact_domains", {"state": ("shear", "step", "y", "x")})
+    names = as_dataset(result, "contact_domains").variables
+    name = "slip_state" if "slip_state" in names else "state"
+    data = result_of(result, "contact_domains", (name,), PATH, units)
+    require_known_dims(data, "contact_domains", {name: (*PATH, "y", "x")})
     path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
     count, columns = path.sizes[dim], _style.number_of_columns(path.sizes[dim])
     width = _style.WIDTH * columns / _style.COLUMNS
-    window = _window(path["state"], zoom, axes, width / columns)
+    state = path[name].transpose(dim, "y", "x")
+    window = _window(state, zoom, axes, width / columns)
     rows = -(-count // columns)
-    size = (max(width, 3.0), maps_height(path, count, width))
+    has_legend = name == "slip_state" or bool((state > 1).any())
+    left, right, bottom, top = extent_of(state)
+    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
+    height = 0.5 + rows * (shape * (width / columns - 0.15) + 0.28) + 0.25 * has_legend
+    size = (max(width, 3.0), height)
     zooms: Any
     if window is None:
         shown, zooms = _style.panels(axes, (rows, columns), size, count=count), []
     else:
-        size = (size[0] * (columns + 1) / columns, size[1])
+        size = (size[0] * (columns + 1) / columns, height)
         grid = _style.panels(axes, (rows, columns + 1), size)
         zooms, shown = grid[:, -1], grid[:, :-1].ravel()[:count]
         for unused in grid[:, :-1].ravel()[count:]:
@@ -96,22 +86,36 @@ def contact_domains(
     sheet = _style.sheet_of(axes, shown)
     common = shear_text(path, data) if dim == "step" else load_text(path, data)
     for number, ax in enumerate(shown):
-        state = path.isel({dim: number})
-        name = load_text(state, data) if dim == "step" else shear_text(state, data)
-        if sheet is None and common:  # no room above the panels of others
-            name = f"{common},  {name}" if name else common
-        _state_map(ax, state["state"], number if count > 1 else None, name)
+        step = path.isel({dim: number})
+        text = load_text(step, data) if dim == "step" else shear_text(step, data)
+        head = [common] if sheet is None else []  # no room above the panels of others
+        _maps.draw_flags(ax, state[number])
+        letter = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
+        parts = filter(None, (*head, text, _share_text(state[number])))
+        ax.set_title(letter + ",  ".join(parts), fontsize="medium")
     for row, ax in enumerate(zooms):
         last = min((row + 1) * columns, count) - 1
-        _magnify(ax, shown[last], path["state"].isel({dim: last}), window, _style.letter(last))
+        _magnify(ax, shown[last], state[last], window, _style.letter(last))
     if "x" in path.coords:
-        extent, length = extent_of(path["state"]), plane_scale(path["state"])
-        _maps.scale_bar(shown[(count - 1) // columns * columns], extent, length)
+        _maps.draw_scale_bar(shown[(count - 1) // columns * columns], state)
     if common and sheet is not None:
         sheet.suptitle(common, x=0.01, ha="left", fontsize="medium")
-    if bool((path["state"] > 1).any()):
-        _maps.flag_legend(shown, sheet, ("open", "contact", "yielded"), _style.STATE_COLOURS)
+    if has_legend:
+        _maps.draw_flag_legend(shown, sheet, name)
     return np.concatenate([shown, zooms]) if len(zooms) else shown
+
+
+def _share_text(plane: xr.DataArray) -> str:
+    """Return the share of the cells in contact, or of the contact that sticks."""
+    flags = np.asarray(plane.values)
+    touching = flags > 0
+    words, share = "in contact", np.mean(touching) if flags.size else 0.0
+    if plane.name == "slip_state":
+        if not touching.any():
+            return "no contact"
+        words, share = "sticks", np.mean(flags[touching] == 1)
+    percent = 100 * float(share)
+    return f"{percent:.0f} % {words}" if percent >= 10 else f"{percent:.2g} % {words}"
 
 
 def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width: float) -> Any:
@@ -125,38 +129,20 @@ def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width:
     size = round(min(zoom, extent[1] - extent[0]) / cell)
     if size < 1 or size >= min(shape):
         return None
-    touching = np.asarray(state.transpose(..., "y", "x").values).reshape(-1, *shape)[-1] > 0
+    touching = np.asarray(state.values)[-1] > 0
     sums = np.pad(touching.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
     inside = sums[size:, size:] - sums[:-size, size:] - sums[size:, :-size] + sums[:-size, :-size]
     row, column = np.unravel_index(int(np.argmax(inside)), inside.shape)
     return slice(int(row), int(row) + size), slice(int(column), int(column) + size)
 
 
-def _magnify(ax: Axes, of: Axes, plane: xr.DataArray, window: Any, letter: str) -> None:
+def _magnify(ax: Any, of: Any, plane: xr.DataArray, window: Any, letter: str) -> None:
     """Draw the window of a map on its own, and frame it in the map."""
-    part = plane.transpose("y", "x")[window]
-    length = plane_scale(plane)
-    _maps.state(ax, np.asarray(part.values), extent_of(part), length)
-    draw_outline(of, extent_of(part), length, edgecolor=_style.RED, linewidth=1.0)
+    part = plane[window]
+    _maps.draw_flags(ax, part)
+    _maps.draw_outline(of, part, _maps.plane_scale(plane), edgecolor=_style.RED, linewidth=1.0)
     for spine in ax.spines.values():
         spine.set(color=_style.RED, linewidth=1.0)
-    edge = extent_of(part)[1] - extent_of(part)[0]
-    size = f",  {quantity_text(edge, 'm')} wide" if "x" in plane.coords else ""
+    left, right, *_ = extent_of(part)
+    size = f",  {quantity_text(right - left, 'm')} wide" if "x" in plane.coords else ""
     ax.set_title(rf"$\bf{{{letter}}}$  magnified{size}", fontsize="medium")
-
-
-def _state_map(ax: Axes, plane: xr.DataArray, number: int | None, name: str) -> None:
-    flags = np.asarray(plane.transpose("y", "x").values)
-    _maps.state(ax, flags, extent_of(plane), plane_scale(plane))
-    head = "" if number is None else rf"$\bf{{{_style.letter(number)}}}$  "
-    fraction = 100 * float(np.mean(flags > 0)) if flags.size else 0.0
-    percent = f"{fraction:.0f}" if fraction >= 10 else f"{fraction:.2g}"
-    ax.set_title(f"{head}{name}{',  ' if name else ''}{percent} % in contact", fontsize="medium")
-
-
-def maps_height(path: xr.Dataset, count: int, width: float) -> float:
-    """Return the height (inches) of a figure of maps with the given width."""
-    columns = _style.number_of_columns(count)
-    left, right, bottom, top = extent_of(path["state"])
-    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
-    return 0.5 + -(-count // columns) * (shape * (width / columns - 0.15) + 0.28)

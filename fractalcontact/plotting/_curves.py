@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.validation import Problems
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from fractalcontact.plotting._style import Axes
 
 COLUMNS = ("panel", "curve", "x", "y", "x_axis", "y_axis")
 NUMBER = re.compile(r"[-\N{MINUS SIGN}.\d$]")  # how the label of a number begins
@@ -51,13 +49,13 @@ def curves(axes: Any) -> Any:
     >>> import fractalcontact as fc
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
-    >>> numbers = fc.plotting.curves(fc.plotting.mean_gap(pressed))
+    >>> numbers = fc.plotting.curves(fc.plotting.path(pressed, "mean_gap", against="nominal_pressure"))
     >>> numbers.to_csv(index=False).splitlines()[0]
     'panel,curve,x,y,x_axis,y_axis'
     >>> numbers[["curve", "x", "x_axis"]]
-              curve     x                  x_axis
-    0  this surface   1.0  nominal pressure (MPa)
-    1  this surface  10.0  nominal pressure (MPa)
+          curve     x                  x_axis
+    0  mean gap   1.0  nominal pressure (MPa)
+    1  mean gap  10.0  nominal pressure (MPa)
     """
     from matplotlib.axes import Axes
 
@@ -105,7 +103,8 @@ def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
                 yield f"{name}, interval", np.concatenate(bars.get_segments() or [np.empty((0, 2))])
     for collection in ax.collections:
         if isinstance(collection, LineCollection):
-            yield str(collection.get_label()), np.concatenate(collection.get_segments() or [np.empty((0, 2))])
+            segments = [points for points in collection.get_segments() if len(points)]  # none of a NaN
+            yield str(collection.get_label()), np.concatenate(segments or [np.empty((0, 2))])
         elif isinstance(collection, PolyCollection):
             for path in collection.get_paths():
                 yield str(collection.get_label()), path.vertices

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,20 +13,14 @@ from fractalcontact.base.results import provenance_of
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._contact_curves import PER_LENGTH
-from fractalcontact.plotting._inputs import table, words
-from fractalcontact.plotting._paper import group
-from fractalcontact.plotting._paths import curve_name, shear_words
-from fractalcontact.plotting._shear_curve import shear_curve
-from fractalcontact.plotting._strength_envelope import strength_envelope
-from fractalcontact.plotting._transmissivity import FLOW_LINES
-from fractalcontact.plotting._units import label_axis
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from fractalcontact.plotting._style import AxesArray
+from fractalcontact.plotting._figure import figure as checked
+from fractalcontact.plotting._flow import FLOW_LINES
+from fractalcontact.plotting._inputs import group, quantity, table, words
+from fractalcontact.plotting._line_panel import LinePanel
+from fractalcontact.plotting._paths import PATH, by_shear
+from fractalcontact.plotting._strength import shear_curve, strength_envelope
+from fractalcontact.plotting._style import Axes, AxesArray, Figure
+from fractalcontact.plotting._units import PER_LENGTH, Quantity
 
 A4 = (8.27, 11.69)  # inches
 ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
@@ -50,7 +44,7 @@ GROUPS = (
 MOST_SHEARS = 4  # with a line about their closure
 
 
-@_style.checked
+@checked
 def datasheet(
     tree: xr.DataTree, *, notes: Sequence[str] = (), figure: Figure | None = None
 ) -> dict[str, Axes]:
@@ -242,12 +236,11 @@ def _closure_lines(laws: xr.Dataset | None) -> Iterator[str]:
     yield f"Closure {seat}"
     every = laws if "shear" in laws.dims else laws.expand_dims("shear")
     meanings = str(laws["preferred_law"].attrs["flag_meanings"]).split()
-    title, labels = shear_words(every)
-    unit = title.partition("(")[2].rstrip(")")
+    shears = by_shear(every)
     for i in _style.spread_indices(every.sizes["shear"], MOST_SHEARS):
         law = every.isel(shear=i).squeeze()
         name = meanings[int(law["preferred_law"])]
-        shear = f"v = {labels[i]} {unit}: " if labels else ""
+        shear = f"v = {shears.labels[i]} {shears.unit}: " if shears.labels else ""
         if not np.isfinite(float(law["closure_length"])):
             yield f"  {shear}no law"
         elif name == "hyperbolic":
@@ -279,28 +272,40 @@ def _flow_panels(
 ) -> AxesArray:
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
     axes: AxesArray = _style.panel_row(figure, 3, A4)
-    shown = closure if closure is not None else flow
-    shears = shear_words(_with_dims(shown)) if shown is not None else ("", [])
+    last = None
     if closure is not None:
-        pressure = table(_with_dims(closure), "nominal_pressure", ("shear", "step"))
+        data = _with_dims(closure)
+        pressure, gap = (
+            quantity(data, "nominal_pressure", PATH, "normal stress"),
+            quantity(data, "mean_gap", PATH),
+        )
         if laws is not None:
-            stiffness = table(_with_dims(laws), "stiffness", ("shear", "step"))
+            slopes = table(_with_dims(laws), "stiffness", PATH)
         else:
-            closed = table(_with_dims(closure), "interface_closure", ("shear", "step"))
-            stiffness = secant_stiffness(pressure, closed)
-        _draw(axes[0], pressure, stiffness[..., None], "normal stiffness", PER_LENGTH, shears)
-        gap = table(_with_dims(closure), "mean_gap", ("shear", "step"))
-        _draw(axes[1], pressure, gap[..., None], "mean gap", scale_for("m", gap), shears)
+            slopes = secant_stiffness(pressure.values, table(data, "interface_closure", PATH))
+        for ax, values in zip(axes, (Quantity(slopes, PER_LENGTH, "normal stiffness"), gap), strict=False):
+            last = _draw_flow(ax, data, pressure, values, [values.values])
     if flow is not None and "nominal_pressure" in flow.variables:
         data = _with_dims(flow, "axis")
-        pressure = table(data, "nominal_pressure", ("shear", "step"))
-        flows = table(data, "transmissivity", ("shear", "step", "axis"))
-        names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
-        _draw(axes[2], pressure, flows, "transmissivity", FLOW, shears, names)
-        entries = [_style.legend_line(name, ls=FLOW_LINES[i % 2]) for i, name in enumerate(names)]
-        _style.side_legend(axes[2], entries, low=True)
-    _style.sequence_legend(axes[2], *shears, _style.sequence_colours(len(shears[1])))
+        pressure = quantity(data, "nominal_pressure", PATH, "normal stress")
+        flows = table(data, "transmissivity", ("axis", *PATH))
+        last = _draw_flow(axes[2], data, pressure, Quantity(flows, FLOW, "transmissivity"), flows)
+    if last is not None:
+        last.draw_legends(ax=axes[2])
     return axes
+
+
+def _draw_flow(ax: Axes, data: xr.Dataset, pressure: Quantity, values: Quantity, kinds: Any) -> LinePanel:
+    """Draw a quantity against the normal stress, of each kind of flow in its line."""
+    panel = LinePanel(ax, pressure, values, by_shear(data), points=_style.MAX_MARKED_POINTS)
+    names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
+    for i, rows in enumerate(kinds):
+        name, line = (names[i], FLOW_LINES[i % 2]) if names else (values.name, "-")
+        panel.curves(name, pressure.values, rows, key=name if names else "", ls=line, ms=3.0)
+    panel.finish(log="xy", legend=False)
+    ax.set_title(values.scale.label(values.name))
+    ax.set_ylabel("")
+    return panel
 
 
 def _with_dims(data: xr.Dataset, *more: str) -> xr.Dataset:
@@ -314,31 +319,6 @@ def secant_stiffness(pressure: Any, closure: Any) -> Any:
         if p.size > 1 and (np.diff(w) > 0).all():
             row[:] = np.gradient(p, w)
     return result
-
-
-def _draw(
-    ax: Any,
-    pressure: Any,
-    values: Any,
-    name: str,
-    across: Scale,
-    shears: tuple[str, list[str]],
-    flows: Sequence[str] = (),
-) -> None:
-    along = scale_for("Pa", pressure)
-    for i, colour in enumerate(_style.sequence_colours(len(pressure))):
-        for j in range(values.shape[2]):
-            style = {
-                "color": colour,
-                "ls": FLOW_LINES[j % 2],
-                "marker": ".",
-                "label": curve_name(flows[j] if flows else name, shears, i),
-            }
-            ax.plot(along(pressure[i]), across(values[i, :, j]), **style)
-    _style.log_scale(ax, x=pressure, y=values)
-    _style.plain_ticks(ax)
-    label_axis(ax.xaxis, "normal stress", along)
-    ax.set_title(across.label(name))
 
 
 def _limits(found: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:

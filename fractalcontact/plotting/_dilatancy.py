@@ -1,127 +1,54 @@
-"""Dilatancy of a sheared joint: rigid surfaces, and elastic bodies under constant normal force."""
+"""A joint under shear: dilatancy, loss of correlation of the faces, dimension of the delta-surface."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import mark_points
-from fractalcontact.plotting._directions import direction_styles, limit_shear, select_direction
-from fractalcontact.plotting._inputs import nearest, result_of, table
-from fractalcontact.plotting._paths import curve_name, load_words
-from fractalcontact.plotting._units import label_axis, name_of, scale_of, shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._directions import by_direction, direction_name, limit_shear, select_direction
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import nearest, quantity, result_of, table, words
+from fractalcontact.plotting._line_panel import Family, LinePanel, distinct
+from fractalcontact.plotting._paths import by_load
+from fractalcontact.plotting._style import Axes
+from fractalcontact.plotting._units import Units
 
 MEAN_SLOPE_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
+RIGID_LINE = 1.0  # points, width
 
 
-@_style.checked
-def rigid_dilatancy(dilatancy: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
-    r"""Draw the dilatancy of rigid surfaces against shear displacement, one curve per direction.
-
-    Thin dotted lines show the rise along the mean plane of the surface.
-
-    Parameters
-    ----------
-    dilatancy : Dataset or node of a DataTree
-        From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), and optionally
-        mean_slope over direction.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the result has a further dimension.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
-    >>> result = fc.joints.dilatancy(crack, shear=[0.0, 2e-4, 4e-4])
-    >>> ax = fc.plotting.rigid_dilatancy(result)
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    shear displacement $v$ (µm) | rigid dilatancy $\delta_\mathrm{r}$ (µm)
-    """
-    dilatancy = shown_in(dilatancy, units, "rigid_dilatancy")
-    ax = _style.axes_or_new(ax)
-    data = result_of(
-        dilatancy, "rigid_dilatancy", ("rigid_dilatancy", "shear"), ("direction", "shear"), "dilatancy"
-    )
-    opening = table(data, "rigid_dilatancy", ("direction", "shear"))
-    shear = np.atleast_1d(data["shear"].values).astype(float)
-    across, along = scale_of(data["rigid_dilatancy"]), scale_of(data["shear"])
-    entries, styles = [], direction_styles(data)
-    dot = "o" if shear.size == 1 else ""
-    slopes = table(data, "mean_slope", ("direction",)) if "mean_slope" in data else None
-    for i, (name, style) in enumerate(styles):
-        ax.plot(along(shear), across(opening[i]), marker=dot, label=name or "rigid dilatancy", **style)
-        entries.append(_style.legend_line(name, **style))
-        if slopes is not None:
-            ends = np.array([0.0, np.nanmax(shear)])
-            line = {"color": style["color"], "label": f"mean slope {name}".rstrip(), **MEAN_SLOPE_LINE}
-            ax.plot(along(ends), across(slopes[i] * ends), **line)
-    label_axis(ax.xaxis, name_of(data["shear"]), along)
-    label_axis(ax.yaxis, name_of(data["rigid_dilatancy"]), across)
-    if any(name for name, _ in styles):
-        _style.side_legend(ax, entries, title="block slides")
-    if slopes is not None:
-        _style.side_legend(ax, [_style.legend_line("mean slope", **MEAN_SLOPE_LINE)], low=True)
-    return ax
-
-
-@_style.checked
-def elastic_dilatancy(
+@figure
+def dilatancy(
     dilatancy: Any,
     *,
-    direction: str | None = None,
+    direction: str | float | None = None,
     reach: float | None = None,
     marked: Sequence[float] = (),
     units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw dilatancy under constant normal force against shear displacement, one curve per force.
+    r"""Draw the dilatancy of a joint against shear displacement.
 
-    The black curve is the dilatancy of rigid surfaces.
+    Under constant normal force there is one curve per force, and a black one for rigid surfaces. Without
+    forces there is one curve per direction for rigid surfaces; thin dotted lines show the rise along the
+    mean plane.
 
     Parameters
     ----------
     dilatancy : Dataset or node of a DataTree
-        From `fractalcontact.joints.dilatancy` with forces: dilatancy (m) over (direction, shear, step),
-        rigid_dilatancy (m) over (direction, shear).
-    direction : str, optional
-        Direction to draw; required if there are several.
+        From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), optionally
+        mean_slope over direction; with forces dilatancy (m) over (direction, shear, step).
+    direction : str or float, optional
+        Direction to draw: a word or degrees anticlockwise from E. Required with forces if there are several.
     reach : float, optional
         Largest shear displacement (m) to show.
     marked : sequence of float
         Shear displacements (m) to mark A, B, C ... on the curve of the last force.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or there are several directions and none is chosen.
+    {shared}
 
     Examples
     --------
@@ -129,36 +56,122 @@ def elastic_dilatancy(
     >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
     >>> result = fc.joints.dilatancy(crack, shear=[0.0, 2e-4], direction="E", normal_force=[1.0, 10.0])
-    >>> ax = fc.plotting.elastic_dilatancy(result)
+    >>> ax = fc.plotting.dilatancy(result)
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
-    dilatancy = shown_in(dilatancy, units, "elastic_dilatancy")
-    ax = _style.axes_or_new(ax)
-    selected = limit_shear(select_direction(dilatancy, direction, "elastic_dilatancy", "dilatancy"), reach)
-    data = result_of(selected, "elastic_dilatancy", ("dilatancy", "shear"), ("shear", "step"), "dilatancy")
-    shear = np.atleast_1d(data["shear"].values).astype(float)
-    opening = table(data, "dilatancy", ("shear", "step"))
-    rigid = table(data, "rigid_dilatancy", ("shear",)) if "rigid_dilatancy" in data else None
-    along = scale_of(data["shear"])
-    across = scale_of(data["dilatancy"], opening if rigid is None else np.append(opening.ravel(), rigid))
-    colours = _style.sequence_colours(opening.shape[1])
-    marker = "o" if shear.size <= _style.MAX_MARKED_POINTS else ""
-    entries = []
-    if rigid is not None:
-        ax.plot(along(shear), across(rigid), color=_style.ink(), lw=1.0, marker=marker, label="rigid")
-        entries.append(_style.legend_line("0 (rigid)", color=_style.ink(), lw=1.0))
-    title, labels = load_words(data)
-    for j, colour in enumerate(colours):
-        name = curve_name("dilatancy", (title, labels), j)
-        ax.plot(along(shear), across(opening[:, j]), color=colour, marker=marker, label=name)
+    data = select_direction(dilatancy, direction, "dilatancy", units, "dilatancy")
+    data = limit_shear(data, reach)
+    if "dilatancy" in data:
+        return _of_elastic_bodies(data, marked, ax)
+    return _of_rigid_surfaces(data, ax)
+
+
+def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
+    dims = ("direction", "shear")
+    data = result_of(data, "dilatancy", ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
+    shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "rigid_dilatancy", dims)
+    panel = LinePanel(_style.axes_or_new(ax), shear, opening, by_direction(data))
+    panel.curves("rigid dilatancy", shear.values, opening.values)
+    if "mean_slope" in data:
+        ends = np.array([0.0, np.nanmax(shear.values)])
+        rise = table(data, "mean_slope", ("direction",))[:, None] * ends
+        panel.curves("mean slope", ends, rise, key="mean slope", **MEAN_SLOPE_LINE)
+    return panel.finish()
+
+
+def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
+    data = result_of(data, "dilatancy", ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
+    shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "dilatancy", ("step", "shear"))
+    loads, points = by_load(data), _style.MAX_MARKED_POINTS
+    panel = LinePanel(_style.axes_or_new(ax), shear, opening, loads, points)
+    panel.curves("dilatancy", shear.values, opening.values)
+    if "rigid_dilatancy" in data:
+        style = {"color": _style.ink(), "lw": RIGID_LINE}
+        panel.line("rigid", shear.values, table(data, "rigid_dilatancy", ("shear",)), **style)
+        panel.family = Family([style, *loads.styles], ["0 (rigid)", *loads.labels], loads.name, loads.unit)
+    if "direction" in data.coords:
+        panel.ax.set_title(f"block slides {direction_name(words(data['direction'])[0])}")
     for number, target in enumerate(marked):
-        index = nearest(shear, target)
-        if np.isclose(shear[index], target, rtol=1e-6, atol=0.0):
-            point = slice(index, index + 1)
-            mark_points(ax, along(shear[point]), across(opening[point, -1]), colours[-1], number)
-    entries += [_style.legend_line(text, color=colour) for text, colour in zip(labels, colours, strict=True)]
-    label_axis(ax.xaxis, name_of(data["shear"]), along)
-    label_axis(ax.yaxis, r"dilatancy $\delta$", across)
-    _style.side_legend(ax, entries, title=title)
-    return ax
+        index = nearest(shear.values, target)
+        if np.isclose(shear.values[index], target, rtol=1e-6, atol=0.0):
+            place = slice(index, index + 1)
+            points_shown = shear.shown[place], opening.shown[-1, place]
+            mark_points(panel.ax, *points_shown, loads.styles[-1]["color"], number)
+    return panel.finish()
+
+
+LENGTHS = ("decorrelation_length_low", "decorrelation_length", "decorrelation_length_high")
+LENGTH_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
+DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
+
+
+@figure
+def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the correlation of the two faces of a joint against shear displacement.
+
+    Vertical dotted lines show the decorrelation lengths, and bands their intervals.
+
+    Parameters
+    ----------
+    memory : Dataset or node of a DataTree
+        From `fractalcontact.joints.decorrelation_length`.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> result = fc.joints.decorrelation_length(crack, direction="E")
+    >>> ax = fc.plotting.correlation(result)
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    shear displacement $v$ (mm) | correlation of the faces
+    """
+    names, dims = ("correlation", "shear", *LENGTHS), ("direction", "shear")
+    data = result_of(memory, "correlation", names, dims, units, "memory")
+    shear, values = (
+        quantity(data, "shear", ("shear",)),
+        quantity(data, "correlation", dims, "correlation of the faces"),
+    )
+    panel = LinePanel(_style.axes_or_new(ax), shear, values, by_direction(data), points=0)
+    panel.curves("", shear.values, values.values)
+    ends = [table(data.isel(shear=0), name, ("direction",)) for name in LENGTHS]
+    for own, low, length, high in zip(panel.family.styles, *ends, strict=True):
+        if np.isfinite(length):
+            panel.place(length, color=own["color"], **LENGTH_LINE)
+        if np.isfinite(low) and np.isfinite(high):
+            panel.ax.axvspan(*shear.scale([low, high]), color=own["color"], alpha=0.12, lw=0)
+    panel.level(0.0, color=_style.grey(), lw=0.6)
+    panel.key("decorrelation length", **LENGTH_LINE)
+    return panel.finish()
+
+
+@figure
+def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method.
+
+    Parameters
+    ----------
+    dimension : Dataset or node of a DataTree
+        From `fractalcontact.joints.delta_dimension`.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
+    >>> result = xr.Dataset({name: ("shear", [2.1, 2.2]) for name in names}, {"shear": [1e-4, 1e-3]})
+    >>> ax = fc.plotting.delta_dimension(result)
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    shear displacement $v$ (mm) | dimension of the delta-surface
+    """
+    data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",), units, "dimension")
+    shear = quantity(data, "shear", ("shear",))
+    values = quantity(data, DIMENSIONS[0], ("shear",), "dimension of the delta-surface")
+    methods = distinct([name.split("_")[0] for name in DIMENSIONS], "method")
+    panel = LinePanel(_style.axes_or_new(ax), shear, values, methods)
+    for name, method, own, marker in zip(DIMENSIONS, methods.labels, methods.styles, "osD", strict=True):
+        panel.line(method, shear.values, table(data, name, ("shear",)), marker=marker, ms=3.5, **own)
+    return panel.finish(log="x" if float(data["shear"].min()) > 0 else "")

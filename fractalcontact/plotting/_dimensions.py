@@ -1,23 +1,20 @@
-"""Scaling curves of a surface with their fits, and the estimated fractal dimensions."""
+"""Roughness of a surface: scaling curves with their fits, fractal dimensions, and the exponent by scale."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, result_of, table, words
-from fractalcontact.plotting._units import PLAIN, label_axis, name_of, scale_of, shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._style import AxesArray, Panels
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import as_dataset, quantity, result_of, table, words
+from fractalcontact.plotting._line_panel import LinePanel
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import PLAIN, Quantity, Units, marked, require_units
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "divider", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
@@ -38,10 +35,12 @@ CURVES = {
     "covering_length": (1.0, 0.0, -1.0),
 }
 NARROW = 0.1  # the axis of dimensions is at least this long: nearly equal ones must not look different
+ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
+MOST_DOTS = 60  # of a curve whose points are marked
 CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
-@_style.checked
+@figure
 def dimension_curves(
     curves: Any, estimates: Any = None, *, units: Units | None = None, axes: Panels | None = None
 ) -> AxesArray:
@@ -55,19 +54,7 @@ def dimension_curves(
     estimates : Dataset, optional
         From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
         scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
-    units : mapping of str to str, optional
-        Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.
-    axes : array of Axes, Figure or SubFigure, optional
-        The Axes of the panels, or a figure to make them in. Default: a new figure.
-
-    Returns
-    -------
-    array of Axes
-
-    Raises
-    ------
-    InvalidInput
-        There is no curve.
+    {shared}
 
     Examples
     --------
@@ -77,8 +64,7 @@ def dimension_curves(
     >>> print(upper.get_ylabel(), "|", lower.get_xlabel())
     variogram (µm²) | lag (mm)
     """
-    curves = shown_in(curves, units, "dimension_curves")
-    datasets, fits = _curves_in(curves, estimates)
+    datasets, fits = _curves_in(curves, estimates, units)
     names = list(datasets)
     columns = _style.number_of_columns(len(names))
     rows = -(-len(names) // columns)
@@ -102,27 +88,26 @@ def _curve_panels(
     return pairs[:, :count]
 
 
-ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
-
-
-def _curves_in(curves: Any, estimates: Any) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
-    datasets: dict[str, xr.Dataset] = {}
+def _curves_in(
+    curves: Any, estimates: Any, units: Units | None
+) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
+    """Return the scaling curves by name, and the estimates."""
     if isinstance(curves, xr.DataTree) and curves.children:
-        datasets = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
+        given: Any = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
         estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
-    elif isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset | xr.DataTree):
-        datasets = {
-            str(name): as_dataset(curve, "dimension_curves", "curves") for name, curve in curves.items()
-        }
     else:
-        dataset = as_dataset(curves, "dimension_curves", "curves")
-        datasets = {curve_of(dataset)[1]: dataset}
-    datasets = {name: curve for name, curve in datasets.items() if curve_of(curve)[1]}
+        is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
+        given = {"": curves} if is_one else curves
+    datasets = {str(name): as_dataset(curve, "dimension_curves", "curves") for name, curve in given.items()}
+    if units is not None:
+        require_units(datasets.values(), units, "dimension_curves")
+        datasets = {name: marked(curve, units) for name, curve in datasets.items()}
+    datasets = {name or curve_of(curve)[1]: curve for name, curve in datasets.items() if curve_of(curve)[1]}
     with Problems("fc.plotting.dimension_curves") as problems:
         problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
-    if estimates is None:
-        return datasets, None
-    return datasets, result_of(estimates, "dimension_curves", ESTIMATES, ("method",), "estimates")
+    if estimates is not None:
+        estimates = result_of(estimates, "dimension_curves", ESTIMATES, ("method",), argument="estimates")
+    return datasets, estimates
 
 
 def curve_of(curve: xr.Dataset) -> tuple[str, str]:
@@ -144,33 +129,26 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
     scale, value = curve_of(curve)
-    curve = result_of(curve, "dimension_curves", (scale, value), (), "curves")
+    curve = result_of(curve, "dimension_curves", (scale, value), (), argument="curves")
     with Problems("fc.plotting.dimension_curves") as problems:
         problems.require(curve[scale].ndim == 1, "curves", f"{scale} along one dim", curve[scale].dims)
-    dim = curve[scale].dims[0]
-    x, y = np.asarray(curve[scale].values, float), table(curve, value, (dim,))
-    along, across = scale_of(curve[scale]), scale_of(curve[value])
-    marker = "." if x.size <= 60 else ""
-    upper.plot(along(x), across(y), color=_style.BLUE, marker=marker, lw=1.2, label="curve")
-    if "local_slope" in curve:
-        slopes = table(curve, "local_slope", (dim,))
-        lower.plot(along(x), slopes, color=_style.BLUE, lw=1.0, marker=marker, label="local slope")
-        _slope_limits(lower, slopes)
-    for ax in (upper, lower):
-        _style.log_scale(ax, x=x)
-    _style.log_scale(upper, y=y)
+    dims = curve[scale].dims
+    x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
+    slopes = table(curve, "local_slope", dims) if "local_slope" in curve else np.full(y.values.shape, np.nan)
+    style = {"color": _style.BLUE, "marker": "." if x.values.size <= MOST_DOTS else ""}
+    above, below = LinePanel(upper, x, y), LinePanel(lower, x, Quantity(slopes, PLAIN, "local slope"))
+    above.line("curve", x.values, y.values, lw=1.2, **style)
+    below.line("local slope", x.values, slopes, lw=1.0, **style)
+    _slope_limits(lower, slopes)
     if fit is not None:
-        _draw_fit(upper, lower, fit, (scale, value), (x, y), (along, across))
-    upper.set_title(name.replace("_", " "))
-    label_axis(upper.yaxis, name_of(curve[value]), across)
-    upper.tick_params(labelbottom=False)
+        _draw_fit(above, below, fit, (scale, value))
+    above.finish(log="xy", empty="no curve")
+    lower.set_xscale(upper.get_xscale())
     lower.set_xlim(upper.get_xlim())
-    label_axis(lower.xaxis, name_of(curve[scale]), along)
-    label_axis(lower.yaxis, "local slope", PLAIN)
-    for ax in (upper, lower):
-        _style.plain_ticks(ax)
-    if not np.isfinite(y).any():
-        _style.write_in_empty_axes(upper, "no curve")
+    below.finish(log="x", empty="")
+    upper.set_title(name.replace("_", " "))
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
 
 
 def _slope_limits(ax: Axes, slopes: Any) -> None:
@@ -182,23 +160,16 @@ def _slope_limits(ax: Axes, slopes: Any) -> None:
         ax.set_ylim(low - margin, high + margin)
 
 
-def _draw_fit(
-    upper: Axes,
-    lower: Axes,
-    fit: xr.Dataset,
-    names: tuple[str, str],
-    curve: tuple[Any, Any],
-    shown: tuple[Any, Any],
-) -> None:
+def _draw_fit(above: LinePanel, below: LinePanel, fit: xr.Dataset, names: tuple[str, str]) -> None:
     """Shade the window of the fit, draw its slope through the curve, and write its value."""
     window = np.sort([float(fit["scale_min"]), float(fit["scale_max"])])
     if names[0] == "wavenumber":
         window = np.sort(2 * np.pi / window)
     if not np.isfinite(window).all():
         return
-    for ax in (upper, lower):
-        ax.axvspan(*shown[0](window), color=_style.pale(), alpha=0.55, lw=0, zorder=0)
-    x, y = curve
+    for panel in (above, below):
+        panel.ax.axvspan(*panel.x.scale(window), color=_style.pale(), alpha=0.55, lw=0, zorder=0)
+    x, y = above.x.values, above.y.values
     inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9)) & (x > 0) & (y > 0)
     hurst, dimension = float(fit["hurst"]), float(fit["fractal_dimension"])
     if not inside.any() or not np.isfinite(hurst):
@@ -207,16 +178,15 @@ def _draw_fit(
     slope = a * float(fit.get("fitted_hurst", hurst)) + b * (hurst + dimension) + c
     level = np.mean(np.log(y[inside]) - slope * np.log(x[inside]))
     ends = np.array([x[inside].min(), x[inside].max()])
-    fitted = shown[1](np.exp(level + slope * np.log(ends)))
-    upper.plot(shown[0](ends), fitted, color=_style.RED, lw=1.4, label="fit")
-    lower.plot(shown[0](ends), [slope] * 2, color=_style.RED, lw=1.2, label="fit")
+    style = {"color": _style.RED, "marker": ""}
+    above.line("fit", ends, np.exp(level + slope * np.log(ends)), lw=1.4, **style)
+    below.line("fit", ends, [slope] * 2, lw=1.2, **style)
     text = f"slope {slope:.2f}\n" + rf"$\Delta$ = {dimension:.2f}"
-    right = slope < 0
-    upper.text(0.96 if right else 0.04, 0.96, text, transform=upper.transAxes, va="top", color=_style.RED,
-               ha="right" if right else "left")  # fmt: skip
+    place, side = (0.96, "right") if slope < 0 else (0.04, "left")
+    above.ax.text(place, 0.96, text, transform=above.ax.transAxes, va="top", color=_style.RED, ha=side)
 
 
-@_style.checked
+@figure
 def dimensions(
     estimates: Any,
     *,
@@ -241,17 +211,7 @@ def dimensions(
         Range of dimensions for comparison, shaded.
     band_name : str
         What the range is, for the legend.
-    ax : Axes, optional
-        Default: those of a new figure.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing.
+    {shared}
 
     Examples
     --------
@@ -262,56 +222,98 @@ def dimensions(
     >>> print([label.get_text() for label in ax.get_yticklabels()], "|", ax.get_xlabel())
     ['default', 'variogram'] | fractal dimension $\Delta$
     """
-    data = result_of(
-        estimates, "dimensions", ("method", "hurst", "fractal_dimension"), ("method",), "estimates"
+    names, dims = ("method", "hurst", "fractal_dimension"), ("method",)
+    data = result_of(estimates, "dimensions", names, dims, argument="estimates")
+    methods = words(data["method"])
+    value, hurst = quantity(data, "fractal_dimension", dims), table(data, "hurst", dims)
+    rows = np.arange(len(methods))[::-1]
+    size = (_style.PANEL[0], 1.0 + 0.32 * len(methods))
+    panel = LinePanel(_style.axes_or_new(ax, size), value, Quantity(rows, PLAIN, ""))
+    embedding = value.values + hurst  # 3 for a surface, 2 for a profile
+    low, high = (
+        embedding - (table(data, end, dims) if end in data else np.nan) for end in ("ci_high", "ci_low")
     )
-    from matplotlib.patches import Patch
-
-    names = words(data["method"])
-    ax = _style.axes_or_new(ax, (_style.PANEL[0], 1.0 + 0.32 * len(names)))
-    value, hurst = table(data, "fractal_dimension", ("method",)), table(data, "hurst", ("method",))
-    embedding = value + hurst  # 3 for a surface, 2 for a profile
-    missing = np.full(value.shape, np.nan)
-    low = embedding - table(data, "ci_high", ("method",)) if "ci_high" in data else missing
-    high = embedding - table(data, "ci_low", ("method",)) if "ci_low" in data else missing
-    rows = np.arange(len(names))[::-1]
     has_interval = np.isfinite(low) & np.isfinite(high)
     ends = low[has_interval], high[has_interval]
-    ax.hlines(rows[has_interval], *ends, color=_style.BLUE, lw=2.2, label="95 % interval")
-    fitted = table(data, "fitted_hurst", ("method",)) if "fitted_hurst" in data else hurst
-    beyond = (hurst >= 1) | (fitted > 1), (hurst <= 0) | (fitted < 0)
-    smooth, rough = (np.isfinite(value) & side for side in beyond)
+    panel.ax.hlines(rows[has_interval], *ends, color=_style.BLUE, lw=2.2, label="95 % interval")
+    if has_interval.any():
+        panel.key("95 % interval", color=_style.BLUE, lw=2.2, marker="o")
+    fitted = table(data, "fitted_hurst", dims) if "fitted_hurst" in data else hurst
+    smooth, rough = (np.isfinite(value.values) & side
+                     for side in ((hurst >= 1) | (fitted > 1), (hurst <= 0) | (fitted < 0)))  # fmt: skip
     inside = ~(smooth | rough)
-    hollow: dict[str, Any] = {"ls": "", "mfc": _style.tone(0.0), "mec": _style.BLUE, "ms": 6}
-    closed = has_interval & inside
-    ax.plot(value[closed], rows[closed], "o", color=_style.BLUE, ms=6, label="estimate")
-    bare = ~has_interval & inside
-    ax.plot(value[bare], rows[bare], marker="o", label="estimate without interval", **hollow)
-    for side, marker in ((smooth, "<"), (rough, ">")):
-        ax.plot(value[side], rows[side], marker=marker, label="at the limit: no dimension", **hollow)
-    entries = (
-        [_style.legend_line("95 % interval", color=_style.BLUE, lw=2.2, marker="o")]
-        if has_interval.any()
-        else []
-    )
-    if bare.any():
-        entries.append(_style.legend_line("no interval", marker="o", **hollow))
-    if not inside.all():
-        marker = "<" if smooth.any() else ">"
-        entries.append(_style.legend_line("at the limit:\nno dimension", marker=marker, **hollow))
+    filled: dict[str, Any] = {"color": _style.BLUE, "ls": "", "ms": 6}
+    hollow = filled | {"mfc": _style.tone(0.0)}
+    for shown, name, key, marker, style in (
+        (inside & has_interval, "estimate", "", "o", filled),
+        (inside & ~has_interval, "estimate without interval", "no interval", "o", hollow),
+        (smooth, "at the limit: no dimension", "at the limit: no dimension", "<", hollow),
+        (rough, "at the limit: no dimension", "at the limit: no dimension", ">", hollow),
+    ):
+        if shown.any():
+            panel.line(name, value.values[shown], rows[shown], key=key, marker=marker, **style)
     if band is not None:
-        entries.append(Patch(facecolor=_style.pale(), lw=0, label=band_name))
-        ax.axvspan(*band, color=_style.pale(), lw=0, zorder=0)
+        panel.area_key(band_name, facecolor=_style.pale())
+        panel.ax.axvspan(*band, color=_style.pale(), lw=0, zorder=0)
     if truth is not None:
-        ax.axvline(truth, color=_style.ink(), lw=0.9, ls=":")
-        entries.append(_style.legend_line("true", color=_style.ink(), lw=0.9, ls=":"))
-    low_end, high_end = ax.get_xlim()
+        panel.place(truth, key="true", color=_style.ink(), lw=0.9, ls=":")
+    low_end, high_end = panel.ax.get_xlim()
     wider = max(NARROW - (high_end - low_end), 0.0) / 2
-    ax.set_xlim(low_end - wider, high_end + wider)
-    ax.set_yticks(rows, [name.replace("_", " ") for name in names])
-    ax.set_ylim(-0.6, len(names) - 0.4)
-    ax.grid(False, axis="y")
-    ax.locator_params(axis="x", nbins=6)  # more labels, of three decimals, would touch
-    label_axis(ax.xaxis, name_of(data["fractal_dimension"]), PLAIN)
-    _style.side_legend(ax, entries)
-    return ax
+    panel.ax.set_xlim(low_end - wider, high_end + wider)
+    panel.ax.set_yticks(rows, [name.replace("_", " ") for name in methods])
+    panel.ax.set_ylim(-0.6, len(methods) - 0.4)
+    panel.ax.grid(False, axis="y")
+    panel.ax.locator_params(axis="x", nbins=6)  # more labels, of three decimals, would touch
+    return panel.finish(empty="")
+
+
+LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
+WINDOW = ("window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max")
+OPACITY = 0.35  # of the band, the result of the figure
+
+
+@figure
+def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the Hurst exponent of every octave of wavelength with its interval.
+
+    The band is the longest run of octaves with one exponent, as wide as its wavelengths and as high as the
+    interval of its exponent. The range of fractals, 0 to 1, lies between the dotted lines.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.dimensions.scaling`.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> ax = fc.plotting.scaling(fc.dimensions.scaling(surface))
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    wavelength (mm) | Hurst exponent
+    """
+    dims = ("wavelength",)
+    data = result_of(result, "scaling", ("hurst", "ci_low", "ci_high", *dims, *WINDOW), dims, units)
+    wavelength = quantity(data, "wavelength", dims)
+    hurst = quantity(data, "hurst", dims, "Hurst exponent")
+    panel = LinePanel(_style.axes_or_new(ax), wavelength, hurst, points=0)
+    points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
+    low, high = (table(data, name, dims) for name in ("ci_low", "ci_high"))
+    # of an interval beside its value one end shows
+    ends = np.fmin(low, hurst.values), np.fmax(high, hurst.values)
+    panel.bars("octave, 95 %, interval", wavelength.values, *ends, color=_style.ink(), lw=1.0)
+    panel.line("octave, 95 %", wavelength.values, hurst.values, **(points | {"ls": ""}))
+    panel.key("octave, 95 %", **points)
+    window_hurst, bottom, top, *window = (float(table(data, name, ())) for name in WINDOW)
+    if np.isfinite(window_hurst):
+        panel.band("one exponent, 95 %", window, bottom, top, _style.BLUE, alpha=OPACITY)
+        panel.line("one exponent", window, 2 * [window_hurst], color=_style.BLUE, lw=1.2)
+        panel.area_key("one exponent", facecolor=_style.BLUE, alpha=OPACITY)
+    for limit in (0.0, 1.0):
+        panel.level(limit, color=_style.grey(), lw=0.7, ls=":")
+    panel.ax.set_xscale("log")
+    bottom, top = np.fmin.reduce(low, initial=HIGHEST), np.fmax.reduce(high, initial=LOWEST)
+    if bottom < top:
+        panel.ax.set_ylim(max(LOWEST, float(bottom) - 0.1), min(HIGHEST, float(top) + 0.1))
+    return panel.finish(log="x")

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import require_dims, result_of
-from fractalcontact.plotting._units import scale_of, shown_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._style import Axes
+from fractalcontact.plotting._units import Units, scale_of
 
 SIZE = (5.0, 4.0)  # inches
 RINGS = 4  # at most, so that their labels stay apart
@@ -25,7 +22,7 @@ CURVES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-@_style.checked
+@figure
 def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     r"""Draw the directional roughness over the azimuth of the shear, in polar coordinates.
 
@@ -36,19 +33,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.directional_roughness`.
-    units : mapping of str to str, optional
-        `{"roughness_metric": "rad"}` for both curves. Default: degrees.
-    ax : Axes, optional
-        Polar axes to draw on; otherwise a new figure is made.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    InvalidInput
-        A variable is missing, or the axes are not polar.
+    {shared}
 
     Examples
     --------
@@ -61,8 +46,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     """
     from matplotlib.ticker import MaxNLocator
 
-    result = shown_in(result, units, "directional_roughness")
-    data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",))
+    data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",), units)
     require_dims(data, "directional_roughness", dict.fromkeys(CURVES, "azimuth"))
     polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
     with Problems("fc.plotting.directional_roughness") as problems:
@@ -80,7 +64,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     polar.set_rticks(rings[(rings > 0) & (rings <= polar.get_ylim()[1])])
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
     polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))
-    polar.yaxis.units = angle.unit
+    polar.yaxis.units, polar.yaxis.factor = angle.unit, angle.factor
     polar.set_rlabel_position(22.5)
     for tick_label in polar.get_yticklabels():
         tick_label.set_path_effects(_style.halo())

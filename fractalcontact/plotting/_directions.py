@@ -10,20 +10,34 @@ import xarray as xr
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, words
+from fractalcontact.plotting._line_panel import Family
+from fractalcontact.plotting._units import Units, shown_in
 
 JUMP = 4.0  # ratio of successive shears at which the evenly sampled part of a curve ends
 NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 
-def select_direction(data: Any, direction: str | None, where: str, argument: str = "result") -> xr.Dataset:
-    """Return the part of a result that belongs to a direction (None: everything)."""
-    dataset = as_dataset(data, where, argument)
+def select_direction(
+    data: Any,
+    direction: str | float | None,
+    where: str,
+    units: Units | None = None,
+    argument: str = "result",
+) -> xr.Dataset:
+    """Return the part of a result that belongs to a direction, a word or an azimuth (None: everything)."""
+    dataset = shown_in(as_dataset(data, where, argument), units, where)
     if direction is None or "direction" not in dataset.coords:
         return dataset
     names = words(dataset["direction"])
     with Problems(f"fc.plotting.{where}") as problems:
-        problems.choice("direction", direction, names)
-    return dataset.isel(direction=names.index(direction)) if "direction" in dataset.dims else dataset
+        if isinstance(direction, str):
+            problems.choice("direction", direction, names)
+            matches = [name == direction for name in names]
+        else:
+            azimuths = np.atleast_1d(dataset["azimuth"].values if "azimuth" in dataset.coords else np.nan)
+            matches = np.isclose((azimuths - direction + 180.0) % 360.0, 180.0).tolist()
+            problems.require(any(matches), "direction", f"one of {azimuths.tolist()}", direction)
+    return dataset.isel(direction=matches.index(True)) if "direction" in dataset.dims else dataset
 
 
 def limit_shear(data: xr.Dataset, reach: float | None) -> xr.Dataset:
@@ -33,10 +47,13 @@ def limit_shear(data: xr.Dataset, reach: float | None) -> xr.Dataset:
     return data.isel(shear=np.flatnonzero(data["shear"].values <= reach * (1 + 1e-9)))
 
 
-def direction_styles(data: xr.Dataset) -> list[tuple[str, dict[str, Any]]]:
-    """Return the name and line style of every direction; one unnamed entry if there is no direction."""
-    names = words(data["direction"]) if "direction" in data.coords else [""]
-    return [(direction_name(name), direction_style(name, i)) for i, name in enumerate(names)]
+def by_direction(data: xr.Dataset) -> Family:
+    """Return the family of the curves of the directions; of one without a label if there is no direction."""
+    if "direction" not in data.coords:
+        return Family([direction_style("", i) for i in range(data.sizes.get("direction", 1))])
+    names = words(data["direction"])
+    styles = [direction_style(name, i) for i, name in enumerate(names)]
+    return Family(styles, [direction_name(name) for name in names], heading="block slides")
 
 
 def direction_style(name: str, number: int) -> dict[str, Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,56 +16,152 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems, writing
-from fractalcontact.plotting._area_dimension import area_dimension
-from fractalcontact.plotting._box_dimension import box_dimension, local_slopes
-from fractalcontact.plotting._closure import closure_laws, contact_area
+from fractalcontact.plotting._box_dimension import box_dimension
+from fractalcontact.plotting._closure import closure_laws
+from fractalcontact.plotting._contact_curves import area_dimension, contact_area, slip_loops
 from fractalcontact.plotting._contact_maps import contact_domains
 from fractalcontact.plotting._curves import curves
-from fractalcontact.plotting._decorrelation import correlation, delta_dimension
+from fractalcontact.plotting._dilatancy import correlation, delta_dimension, dilatancy
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directional_roughness import directional_roughness
 from fractalcontact.plotting._directions import evenly_sampled_reach
-from fractalcontact.plotting._ensemble import (
-    BAND,
-    MEDIAN,
-    draw_with_band,
-    member_count,
-    quantile_over_members,
-)
-from fractalcontact.plotting._friction import friction
-from fractalcontact.plotting._inputs import words
+from fractalcontact.plotting._ensemble import draw_with_band, member_count, reduced_trees
+from fractalcontact.plotting._evolution import first_contact, lineage
+from fractalcontact.plotting._flow import hydraulic_aperture, uplift
+from fractalcontact.plotting._inputs import group, words
 from fractalcontact.plotting._islands import islands
-from fractalcontact.plotting._lacunarity import lacunarity
-from fractalcontact.plotting._paper import group, has_figure, paper_figure, shown_shear
-from fractalcontact.plotting._partial_slip import slip_domains, slip_loops
-from fractalcontact.plotting._self_weight import self_weight
-from fractalcontact.plotting._shear_curve import shear_curve
-from fractalcontact.plotting._strength_envelope import strength_envelope
-from fractalcontact.plotting._style import drawn_for_files, figure_of, needs_log_axis
-from fractalcontact.plotting._transmissivity import hydraulic_aperture
-from fractalcontact.plotting._units import check_units, shown_in
-from fractalcontact.plotting._uplift import uplift
+from fractalcontact.plotting._paths import at_shear, loaded_steps, shear_text
+from fractalcontact.plotting._size_curves import lacunarity, signature
+from fractalcontact.plotting._strength import friction, self_weight, shear_curve, strength_envelope
+from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of, needs_log_axis
+from fractalcontact.plotting._surface import surface
+from fractalcontact.plotting._units import UNITS_EXPECTED, Units, marked, require_units
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fractalcontact.plotting._units import Units
-
-Drawing = Callable[[], Any]  # returns Axes, or an array of them
+Drawing = Callable[..., Any]  # of the data and of what stands beside them; returns Axes, or an array of them
 
 WHERE = "fc.plotting.draw"
-PAPER = {1: "surface", 2: "sliding_scheme", 3: "closure", 4: "contact_domains", 5: "dilatancy"}
 FORMATS = ("png", "svg", "pdf", "csv")
+SOFTWARE = {"Software": "fractalcontact"}  # of a PNG file: a run overwrites no picture of others
+MAPS = 6  # of contact domains along a path
 LARGE = 1 << 26  # bytes of a study whose figures are drawn one after the other: two at once take more memory
-PAPER_BAND = (2.15, 2.29)  # fractal dimensions that the paper gives for its surface
-# names of the same figures in a study that is not compared with the paper
-JOINT = {
-    1: "surface",
-    2: "sliding_scheme",
-    3: "joint_closure",
-    4: "joint_contact_domains",
-    5: "joint_dilatancy",
-}
+
+
+def _surface(data: xr.Dataset, delta: xr.Dataset | None = None) -> Any:
+    return surface(data, block=None if delta is None or "height" not in delta else delta["height"])
+
+
+def _delta_surface(data: xr.Dataset) -> Any:
+    last = data.isel(shear=-1) if "shear" in data.dims else data
+    return surface(last, title=f"delta-surface, {shear_text(last)}".rstrip(", "))
+
+
+def _joint_closure(data: xr.Dataset) -> Any:
+    """Draw the closure laws, with the steps marked whose maps `joint_contact_domains` shows."""
+    every = data.expand_dims([dim for dim in ("shear", "step") if dim not in data.dims])
+    shear = _middle_shear(data)
+    steps = loaded_steps(at_shear(every, shear), MAPS) if "state" in data else ()
+    return closure_laws(data, shear=shear, marked=steps)
+
+
+def _domains_along_load(data: xr.Dataset) -> Any:
+    return contact_domains(data, shear=_middle_shear(data))
+
+
+def _domains_along_shear(data: xr.Dataset) -> Any:
+    return contact_domains(data, normal_force=float(np.nanmax(data["normal_force"].values)))
+
+
+def _middle_shear(data: xr.Dataset) -> float | None:
+    shears = np.atleast_1d(data["shear"].values) if "shear" in data.coords else np.empty(0)
+    return float(shears[shears.size // 2]) if shears.size else None
+
+
+def _evenly_sampled(figure: Callable[..., Any]) -> Drawing:
+    """Return a drawing of the evenly sampled shears; under forces of one direction, which fits a figure."""
+
+    def draw(data: xr.Dataset) -> Any:
+        several = "step" in data.dims and data.sizes.get("direction", 1) > 1
+        direction = words(data["direction"])[0] if several else None
+        return figure(data, direction=direction, reach=evenly_sampled_reach(data))
+
+    return draw
+
+
+def _by_decades(figure: Callable[..., Any]) -> Drawing:
+    """Return a drawing with logarithmic axes where linear ones would hide all loads but the largest."""
+
+    def draw(data: xr.Dataset) -> Any:
+        force = np.asarray(data["normal_force"].values, float) if "normal_force" in data else np.empty(0)
+        return figure(data, log=needs_log_axis(force[force > 0]))
+
+    return draw
+
+
+def _at_end(figure: Callable[..., Any], *dims: str) -> Drawing:
+    """Return a drawing at the greatest shear, or under the greatest load."""
+    return lambda data: figure(data.isel({dim: -1 for dim in dims if dim in data.dims}))
+
+
+class Row(NamedTuple):
+    """A figure: its file, the group and the variable it is drawn from, the drawing and what it needs.
+
+    The `dims` are longer than one; options of the drawing take the groups that `beside` names.
+    """
+
+    file: str
+    group: str
+    variable: str
+    draw: Drawing
+    dims: tuple[str, ...] = ()
+    beside: Mapping[str, str] = {}
+
+
+BOTH = ("shear", "step")
+STRENGTH, TESTS = "joints/shear_curve", "joints/direct_shear"
+# every figure of a study; of several rows with one file the first that has data is drawn
+FIGURES = (
+    Row("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
+    Row("delta_surface", "joints/delta_surface", "height", _delta_surface),
+    Row("joint_closure", "joints/closure", "interface_closure", _joint_closure),
+    Row("joint_contact_area", "joints/closure", "contact_fraction", contact_area),
+    Row("joint_contact_domains", "joints/closure", "state", _domains_along_load),
+    Row("joint_contact_domains_along_shear", "joints/closure", "state", _domains_along_shear, BOTH),
+    Row("joint_first_contact", "joints/closure", "state", first_contact, ("step",)),
+    Row("rigid_dilatancy", "joints/rigid_dilatancy", "rigid_dilatancy", dilatancy),
+    Row("joint_dilatancy", "joints/elastic_dilatancy", "dilatancy", _evenly_sampled(dilatancy)),
+    Row("dimensions", "dimensions", "hurst", dimensions),
+    Row("dimension_curves", "dimensions/*", "a scaling curve", dimension_curves),
+    Row("friction", "joints/friction", "friction_angle", _evenly_sampled(friction)),
+    Row("box_dimension", "domains/box_dimension", "box_dimension", box_dimension),
+    Row("signature", "domains/signature", "local_slope", signature),
+    Row("local_slopes", "domains/box_dimension", "local_slope", signature),
+    Row("minkowski_dimension", "domains/minkowski_dimension", "minkowski_dimension", box_dimension),
+    Row("correlation_dimension", "domains/correlation_dimension", "correlation_dimension", box_dimension),
+    Row("lacunarity", "domains/lacunarity", "lacunarity", lacunarity),
+    Row("lacunarity_maps", "domains/lacunarity", "lacunarity", functools.partial(lacunarity, maps=True),
+        ("step", "box_size")),
+    Row("lineage", "domains/evolution", "births", lineage),
+    Row("islands", "domains/islands", "label", islands),
+    Row("delta_dimension", "joints/delta_dimension", "variogram_dimension", delta_dimension),
+    Row("area_dimension", "joints/area_dimension", "resolution", area_dimension),
+    Row("self_weight", "joints/self_weight", "structure_size", self_weight),
+    Row("correlation", "joints/decorrelation_length", "correlation", correlation),
+    Row("directional_roughness", "joints/directional_roughness", "roughness_metric", directional_roughness),
+    Row("hydraulic_aperture", "joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
+    Row("uplift", "joints/uplift", "uplift_profile", _at_end(uplift, *BOTH)),
+    Row("closure_law", "contact", "closure", _by_decades(closure_laws)),
+    Row("contact_area", "contact", "contact_fraction", _by_decades(contact_area)),
+    Row("contact_domains", "contact", "state", contact_domains),
+    Row("first_contact", "contact", "state", first_contact, ("step",)),
+    Row("slip_loops", "partial_slip", "stick_area", slip_loops),
+    Row("slip_domains", "partial_slip", "slip_state", _at_end(contact_domains, "shear")),
+    Row("joint_slip_loops", "joints/partial_slip", "stick_area", slip_loops),
+    Row("joint_slip_domains", "joints/partial_slip", "slip_state", _at_end(contact_domains, "shear")),
+    Row("strength_envelope", "joints/strength_envelope", "shear_strength", strength_envelope,
+        beside={"tests": TESTS}),
+    Row("shear_curve", TESTS, "shear_stress", shear_curve, beside={"beside": STRENGTH}),
+    Row("shear_curve", STRENGTH, "shear_stress", shear_curve),
+)  # fmt: skip
 
 
 def draw(
@@ -73,7 +169,6 @@ def draw(
     folder: str | os.PathLike[str],
     *,
     progress: bool = False,
-    paper: bool = True,
     formats: Sequence[str] = ("png",),
     units: Units | None = None,
 ) -> list[Path]:
@@ -89,8 +184,6 @@ def draw(
         complete.
     progress : bool
         Show a progress bar.
-    paper : bool
-        Name the figures of a joint after those of the 1998 paper.
     formats : sequence of str
         Any of png, svg, pdf and csv: the numbers of the curves (`curves`), of the figures that have any.
     units : mapping of str to str, optional
@@ -99,7 +192,7 @@ def draw(
     Returns
     -------
     list of Path
-        The files in the order in which they were drawn, the figures of the 1998 paper first.
+        The files in the order in which they were drawn.
 
     Raises
     ------
@@ -121,159 +214,66 @@ def draw(
         problems.tree("tree", tree)
         problems.path("folder", folder, what="the path of a folder")
         problems.boolean("progress", progress)
-        problems.boolean("paper", paper)
-        check_units(problems, "units", units)
+        expected, are_units = UNITS_EXPECTED
+        problems.require(units is None or are_units(units), "units", expected, units)
         if problems.require(
             isinstance(formats, (list, tuple)) and bool(formats), "formats", "a sequence of words", formats
         ):
             for word in formats:
                 problems.choice("formats", word, FORMATS)
-    tree = shown_in(tree, units, "draw")
+    if units is not None:
+        require_units([node.to_dataset() for node in tree.subtree], units, "draw")
+        tree = tree.map_over_datasets(lambda dataset: marked(dataset, units))
     with writing(WHERE, "folder", folder):
-        return _draw_all(tree, Path(folder), progress, paper, formats)
+        return _draw_all(tree, Path(folder), progress, formats)
 
 
-def _draw_all(
-    tree: xr.DataTree, folder: Path, progress: bool, paper: bool, formats: Sequence[str]
-) -> list[Path]:
+def _draw_all(tree: xr.DataTree, folder: Path, progress: bool, formats: Sequence[str]) -> list[Path]:
     """Draw every figure into a folder and return the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    drawings = _all_drawings(tree, paper)
-    files = [[folder / f"{name}.{suffix}" for suffix in formats] for name, _ in drawings]
+    members = member_count(tree)
+    trees = reduced_trees(tree) if members else [tree]
+    rows = list(_rows_with_data(trees[0]).values())
+    files = [[folder / f"{row.file}.{suffix}" for suffix in formats] for row in rows]
 
     def draw_one(number: int) -> None:
+        row = rows[number]
+        drawings = [functools.partial(_draw_row, row, each) for each in trees]
         with DRAWING_LOCK, drawn_for_files():
-            figure = figure_of(drawings[number][1]())
+            figure = figure_of(draw_with_band(drawings, members) if members else drawings[0]())
             for file in files[number]:
                 _write(figure, file)
             figure.clear()
 
     small = sum(node.nbytes for node in tree.subtree) < LARGE
-    drawn = calls_in_two_processes(draw_one, len(drawings)) if small else map(draw_one, range(len(drawings)))
-    for _ in track(drawn, progress, "figures", unit="figure", total=len(drawings)):
+    drawn = calls_in_two_processes(draw_one, len(rows)) if small else map(draw_one, range(len(rows)))
+    for _ in track(drawn, progress, "figures", unit="figure", total=len(rows)):
         pass
     return [file for each in files for file in each if file.suffix != ".csv" or file.exists()]
 
 
-def _all_drawings(tree: xr.DataTree, paper: bool) -> list[tuple[str, Drawing]]:
-    """Return file name and drawing function of every figure; of an ensemble with a band of the members."""
-    members = member_count(tree)
-    if not members:
-        return list(_drawings(tree, paper))
-    trees = [quantile_over_members(tree, share) for share in (MEDIAN, *BAND)]
-    figures = zip(*(_drawings(reduced, paper) for reduced in trees), strict=True)
-    return [
-        (each[0][0], _later(draw_with_band, [drawing for _, drawing in each], members)) for each in figures
-    ]
+def _draw_row(row: Row, tree: xr.DataTree) -> Any:
+    return row.draw(_data_of(tree, row), **{name: group(tree, path) for name, path in row.beside.items()})
 
 
-def _drawings(tree: xr.DataTree, paper: bool) -> Iterator[tuple[str, Drawing]]:
-    """Yield file name (without suffix) and drawing function of every figure with data."""
-    for number, name in PAPER.items():
-        if has_figure(tree, number):
-            yield f"figure_{number}_{name}" if paper else JOINT[number], _later(paper_figure, tree, number)
-    estimates = group(tree, "dimensions")
-    if estimates is not None and "method" in estimates.dims:
-        band = PAPER_BAND if paper else None
-        yield "dimensions", functools.partial(dimensions, estimates, band=band, band_name="1998 paper")
-    scaling_curves = _scaling_curves(tree)
-    if scaling_curves:
-        yield "dimension_curves", _later(dimension_curves, scaling_curves, estimates)
-    for path, name, drawing in (
-        ("joints/friction", "friction", _friction),
-        ("domains/box_dimension", "box_dimension", box_dimension),
-        ("domains/minkowski_dimension", "minkowski_dimension", box_dimension),
-        ("domains/correlation_dimension", "correlation_dimension", box_dimension),
-        ("domains/lacunarity", "lacunarity", _lacunarity),
-        ("domains/islands", "islands", islands),
-        ("joints/delta_dimension", "delta_dimension", delta_dimension),
-        ("joints/area_dimension", "area_dimension", area_dimension),
-        ("joints/self_weight", "self_weight", self_weight),
-        ("joints/decorrelation_length", "correlation", correlation),
-        ("joints/directional_roughness", "directional_roughness", directional_roughness),
-        ("joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
-        ("joints/uplift", "uplift", _uplift),
-        ("contact", "closure_law", _closure_laws),
-        ("contact", "contact_area", _contact_area),
-        ("partial_slip", "slip_loops", slip_loops),
-        ("joints/partial_slip", "joint_slip_loops", slip_loops),
-    ):
-        data = group(tree, path)
-        if data is not None:
-            yield name, _later(drawing, data)
-    yield from _strength_drawings(tree)
-    counts = group(tree, "domains/box_dimension")
-    if counts is not None and "local_slope" in counts:
-        yield "local_slopes", _later(_local_slopes, counts)
-    contact = group(tree, "contact")
-    if contact is not None and "state" in contact:
-        yield "contact_domains", _later(contact_domains, contact)
-    for path, name in (("partial_slip", "slip_domains"), ("joints/partial_slip", "joint_slip_domains")):
-        slipped = group(tree, path)
-        if slipped is not None and "slip_state" in slipped:
-            yield name, _later(_slip_domains, slipped)
+def _data_of(tree: xr.DataTree, row: Row) -> Any:
+    """Return the Dataset with the variable of a row; for `dimensions/*` the node if a child has a curve."""
+    if row.group.endswith("/*"):
+        node: Any = tree.children.get(row.group.removesuffix("/*"), xr.DataTree())
+        has_curve = any(curve_of(child.to_dataset(inherit=False))[1] for child in node.children.values())
+        return node if has_curve else None
+    data = group(tree, row.group)
+    return data if data is not None and row.variable in data.variables else None
 
 
-def _strength_drawings(tree: xr.DataTree) -> Iterator[tuple[str, Drawing]]:
-    """Yield the figures of the strength: criteria with the tests among them, shear curves of both."""
-    envelope, tests, curve = (
-        group(tree, f"joints/{name}") for name in ("strength_envelope", "direct_shear", "shear_curve")
-    )
-    if envelope is not None:
-        yield "strength_envelope", lambda: strength_envelope(envelope, tests=tests)
-    if tests is not None:
-        yield "shear_curve", lambda: shear_curve(tests, beside=curve)
-    elif curve is not None:
-        yield "shear_curve", _later(shear_curve, curve)
-
-
-def _later(drawing: Callable[..., Any], *arguments: Any) -> Drawing:
-    return lambda: drawing(*arguments)
-
-
-def _scaling_curves(tree: xr.DataTree) -> dict[str, xr.Dataset]:
-    node: Any = tree.children.get("dimensions")
-    children = {} if node is None else node.children
-    datasets = {name: child.to_dataset(inherit=False) for name, child in children.items()}
-    return {name: dataset for name, dataset in datasets.items() if curve_of(dataset)[1]}
-
-
-def _friction(data: xr.Dataset) -> Any:
-    # with forces only one direction fits in a figure: the first one
-    several = "step" in data.dims and data.sizes.get("direction", 1) > 1
-    direction = words(data["direction"])[0] if several else None
-    return friction(data, direction=direction, reach=evenly_sampled_reach(data))
-
-
-def _closure_laws(data: xr.Dataset) -> Any:
-    return closure_laws(data, log=_has_decades_of_load(data))
-
-
-def _contact_area(data: xr.Dataset) -> Any:
-    return contact_area(data, log=_has_decades_of_load(data))
-
-
-def _has_decades_of_load(data: xr.Dataset) -> bool:
-    """Return True where linear axes would hide all loads but the largest."""
-    force = np.asarray(data["normal_force"].values, float) if "normal_force" in data else np.empty(0)
-    return needs_log_axis(force[force > 0])
-
-
-def _lacunarity(data: xr.Dataset) -> Any:
-    return lacunarity(data, shear=shown_shear(data))
-
-
-def _slip_domains(data: xr.Dataset) -> Any:
-    return slip_domains(data.isel(shear=-1) if "shear" in data.dims else data)  # at the greatest shear
-
-
-def _uplift(data: xr.Dataset) -> Any:
-    """Draw the uplift at the greatest shear, under the greatest load."""
-    return uplift(data.isel({dim: -1 for dim in ("shear", "step") if dim in data.dims}))
-
-
-def _local_slopes(data: xr.Dataset) -> Any:
-    return local_slopes(data, shear=shown_shear(data))
+def _rows_with_data(tree: xr.DataTree) -> dict[str, Row]:
+    """Return by file the rows of the table that a study has data for."""
+    found: dict[str, Row] = {}
+    for row in FIGURES:
+        data = _data_of(tree, row)
+        if data is not None and all(data.sizes.get(dim, 0) > 1 for dim in row.dims):
+            found.setdefault(row.file, row)
+    return found
 
 
 def _write(figure: Figure, target: Path) -> None:
@@ -296,7 +296,7 @@ def _write(figure: Figure, target: Path) -> None:
         figure.set_layout_engine("none")
     with written_whole(target) as temporary:
         if target.suffix == ".png":
-            canvas.print_png(temporary, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
+            canvas.print_png(temporary, metadata=SOFTWARE, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})

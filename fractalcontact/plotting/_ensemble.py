@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.units import recorded_scales, replayed_scales
 from fractalcontact.plotting import _style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from fractalcontact.plotting._style import Axes
 
 MEMBER = "member"
+SAME = 1e-12  # relative; equal curves may be shown in different units
 MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
 
 
@@ -24,9 +23,13 @@ def member_count(tree: xr.DataTree) -> int:
     return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
 
 
-def quantile_over_members(tree: xr.DataTree, share: float) -> xr.DataTree:
-    """Return a quantile of every curve over the members; maps and flags are those of member 0."""
-    return tree.map_over_datasets(lambda dataset: _quantile(dataset, share))
+def reduced_trees(tree: xr.DataTree) -> list[xr.DataTree]:
+    """Return the median of every curve over the members, and both ends of the band.
+
+    Maps and flags are those of member 0.
+    """
+    shares = (MEDIAN, *BAND)
+    return [tree.map_over_datasets(functools.partial(_quantile, share=share)) for share in shares]
 
 
 def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
@@ -56,13 +59,7 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
 
 def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:
     """Draw the median, and for every curve the band between the same curves of the two other drawings."""
-    median, *ends = drawings
-    with recorded_scales() as record:
-        figure = _style.figure_of(median())
-    bounds = []
-    for drawing in ends:
-        with replayed_scales(record):
-            bounds.append(_style.figure_of(drawing()))
+    figure, *bounds = (_style.figure_of(drawing()) for drawing in drawings)
     bands = sum(
         _add_bands(ax, low, high)
         for ax, low, high in zip(figure.axes, *(bound.axes for bound in bounds), strict=False)
@@ -82,16 +79,17 @@ def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:
 def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
     """Fill between the curves of two axes, in the colour of the same curve; return how many were filled."""
     count, limits = 0, (ax.get_xlim(), ax.get_ylim())
-    lines = [list(axes.get_lines()) for axes in (ax, low, high)]
+    lines = [[line for line in each.get_lines() if line.get_transform() == each.transData]
+             for each in (ax, low, high)]  # fmt: skip
     if len({len(group) for group in lines}) > 1:
         return 0
     for line, *bounds in zip(*lines, strict=True):
         (x_low, y_low), (x_high, y_high) = (
-            np.broadcast_arrays(*(np.asarray(values, dtype=float) for values in bound.get_data()))
-            for bound in bounds
+            _in_units_of(ax, bound, drawn) for bound, drawn in zip((low, high), bounds, strict=True)
         )
-        same = x_low.size == x_high.size and bool(np.all((x_low == x_high) & (y_low == y_high)))
-        if x_low.size < 2 or x_low.size != x_high.size or same:
+        if x_low.size < 2 or x_low.size != x_high.size:
+            continue
+        if np.allclose(x_low, x_high, rtol=SAME, atol=0) and np.allclose(y_low, y_high, rtol=SAME, atol=0):
             continue
         finite = np.isfinite(x_low + y_low + x_high + y_high)
         x = np.concatenate([x_low[finite], x_high[finite][::-1]])
@@ -105,6 +103,19 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         ax.set_xlim(limits[0])
         ax.set_ylim(limits[1])
     return count
+
+
+def _in_units_of(ax: Axes, bound: Axes, line: Any) -> tuple[Any, Any]:
+    """Return the points of a curve of other axes in the units of these."""
+    ratios = (_factor(b) / _factor(a) for a, b in ((ax.xaxis, bound.xaxis), (ax.yaxis, bound.yaxis)))
+    x, y = (ratio * np.asarray(v, dtype=float) for ratio, v in zip(ratios, line.get_data(), strict=True))
+    shown = np.broadcast_arrays(x, y)
+    return shown[0], shown[1]
+
+
+def _factor(axis: Any) -> float:
+    """Return the size of the unit that an axis shows."""
+    return float(getattr(axis, "factor", 1.0))
 
 
 def _widened(limits: tuple[float, float], values: np.ndarray[Any, Any]) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.plotting._units import Quantity, Units, name_of, scale_of, shown_in
 
 Array = np.ndarray[Any, np.dtype[Any]]
 MAPS = ("height", "state", "slip_state", "label")
@@ -17,7 +18,12 @@ PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
 
 def result_of(
-    data: Any, where: str, names: Sequence[str], dims: Sequence[str], argument: str = "result"
+    data: Any,
+    where: str,
+    names: Sequence[str],
+    dims: Sequence[str],
+    units: Units | None = None,
+    argument: str = "result",
 ) -> xr.Dataset:
     """Return a result in which every dim of `dims` exists and no other path dim is left.
 
@@ -32,6 +38,8 @@ def result_of(
         Variables that must be present.
     dims : sequence of str
         Dims that the figure runs over (`shear`, `step` ...).
+    units : mapping of str to str, optional
+        Unit of each variable by name.
     argument : str
         Name of the argument, for the message.
 
@@ -40,18 +48,13 @@ def result_of(
     InvalidInput
         A variable is missing, or another path dim is longer than one.
     """
-    dataset = as_dataset(data, where, argument)
+    dataset = shown_in(as_dataset(data, where, argument), units, where)
+    require_variables(dataset, where, names, argument)
     with Problems(f"fc.plotting.{where}") as problems:
-        for name in names:
-            problems.require(
-                name in dataset.variables, argument, f"the variable {name!r}", list(dataset.variables)
-            )
         extra = [
             dim
             for dim in dataset.dims
-            if dim in PATH_DIMS
-            and dim not in dims
-            and any(dim in dataset[name].dims for name in names if name in dataset)
+            if dim in PATH_DIMS and dim not in dims and any(dim in dataset[name].dims for name in names)
         ]
         for dim in extra:
             problems.require(
@@ -84,7 +87,9 @@ def as_dataset(data: Any, where: str, argument: str = "result") -> xr.Dataset:
     return result
 
 
-def require_variables(dataset: xr.Dataset, where: str, names: Sequence[str], argument: str) -> None:
+def require_variables(
+    dataset: xr.Dataset, where: str, names: Sequence[str], argument: str = "result"
+) -> None:
     """Raise InvalidInput unless the variables are present."""
     with Problems(f"fc.plotting.{where}") as problems:
         for name in names:
@@ -124,6 +129,16 @@ def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     return np.asarray(variable.transpose(*dims).values, dtype=np.float64)
 
 
+def quantity(
+    data: xr.Dataset, name: str, dims: Sequence[Hashable], title: str = "", shown: Any = None
+) -> Quantity:
+    """Return a variable as `table` does, with its scale and name for an axis.
+
+    `title` replaces the name; `shown` are all values on the axis, where they are more than the variable.
+    """
+    return Quantity(table(data, name, dims), scale_of(data[name], shown), title or name_of(data[name]))
+
+
 def words(data: xr.DataArray) -> list[str]:
     """Return the strings of a coordinate, decoded if they were read as bytes."""
     return [v.decode() if isinstance(v, bytes) else str(v) for v in np.atleast_1d(data.values).tolist()]
@@ -147,3 +162,13 @@ def nearest(values: Any, target: float) -> int:
     """Return the index of the value nearest to `target`, ignoring NaN."""
     distance = np.abs(np.asarray(values, dtype=float) - target)
     return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
+
+
+def group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
+    """Return the Dataset of a group, or None where the study has none."""
+    try:
+        node: Any = tree[path]
+    except KeyError:
+        return None
+    dataset: xr.Dataset | None = node.to_dataset() if getattr(node, "has_data", False) else None
+    return dataset

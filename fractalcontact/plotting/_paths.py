@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.plotting._inputs import nearest, table
+from fractalcontact.plotting._inputs import nearest, quantity, table
+from fractalcontact.plotting._line_panel import Family, ordered
 from fractalcontact.plotting._style import spread_indices
-from fractalcontact.plotting._units import name_of, scale_of
+from fractalcontact.plotting._units import PLAIN, Quantity, name_of, number_texts, scale_of
 
+PATH = ("shear", "step")
 SAME = 5e-3  # loads with a smaller relative difference count as equal
-LOADS = {"normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
+LOADS = {"tangential_force": "$Q$", "normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
 def load_of(data: xr.Dataset) -> str:
@@ -21,38 +21,47 @@ def load_of(data: xr.Dataset) -> str:
     return next((name for name in LOADS if name in data.variables), "")
 
 
-def loads_of(data: xr.Dataset, against: str, where: str) -> Any:
-    """Return the loads of every shear and step; raise InvalidInput for a variable that is none of a step."""
+def loads_of(data: xr.Dataset, against: str, where: str, dims: tuple[str, str] = PATH) -> Quantity:
+    """Return a variable of every shear and step for the x axis; without one of that name the step."""
+    if against not in data.variables:
+        steps = np.arange(data.sizes["step"], dtype=float)
+        values = np.broadcast_to(steps, [data.sizes[dim] for dim in PATH])
+        return Quantity(values if dims == PATH else values.T, PLAIN, "step")
     with Problems(f"fc.plotting.{where}") as problems:
         own = data[against].dims
-        problems.require(set(own) <= {"shear", "step"}, "against", "a variable of every step", own)
-    return table(data, against, ("shear", "step"))
+        problems.require(set(own) <= set(PATH), "against", "a variable of every step", own)
+    return quantity(data, against, dims)
 
 
-def load_words(data: xr.Dataset) -> tuple[str, list[str]]:
-    """Return a legend title and a label for each step: its load, or its number."""
+def path_axis(data: xr.Dataset, against: str | None, where: str) -> tuple[tuple[str, str], Quantity, Family]:
+    """Return the dims of curves along a path, the variable they are drawn against, and their family.
+
+    Without `against` it is the first load that the result has, or shear where it has a single step.
+    """
+    if against is None:
+        by_step = data.sizes["step"] > 1 or "shear" not in data.coords
+        against = (load_of(data) or "step") if by_step else "shear"
+    by_shears = against == "shear"
+    dims = ("step", "shear") if by_shears else PATH
+    return dims, loads_of(data, against, where, dims), by_load(data) if by_shears else by_shear(data)
+
+
+def by_load(data: xr.Dataset) -> Family:
+    """Return the family of the curves of the steps, labelled by their load or by their number."""
     for name in LOADS:
         if name in data.variables and data[name].dims in (("step",), ()):
             scale = scale_of(data[name])
-            return scale.label(name_of(data[name])), _numbers(scale(np.atleast_1d(data[name].values)), 3)
-    return "step", [str(number) for number in range(data.sizes.get("step", 1))]
+            return ordered(number_texts(scale, data[name], 3), name_of(data[name]), scale.unit)
+    count = data.sizes.get("step", 1)
+    return ordered([str(number) for number in range(count)] if count > 1 else (), "step", count=count)
 
 
-def shear_words(data: xr.Dataset) -> tuple[str, list[str]]:
-    """Return a legend title and a label for each shear; empty without a shear coordinate."""
+def by_shear(data: xr.Dataset) -> Family:
+    """Return the family of the curves of the shears; of one without a label if there is no shear."""
     if "shear" not in data.coords:
-        return "", []
+        return ordered((), count=data.sizes.get("shear", 1))
     scale = scale_of(data["shear"])
-    return scale.label("shear $v$"), _numbers(scale(np.atleast_1d(data["shear"].values)), 4)
-
-
-def curve_name(what: str, words: tuple[str, list[str]] = ("", []), number: int = 0) -> str:
-    """Return the name of a curve: what it shows, and its load or shear out of the words of a legend."""
-    title, labels = words
-    if not labels:
-        return what
-    name, _, unit = title.partition(" (")
-    return f"{what}, {name} = {labels[number]} {unit.rstrip(')')}".rstrip()
+    return ordered(number_texts(scale, data["shear"], 4), "shear $v$", scale.unit)
 
 
 def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
@@ -64,7 +73,7 @@ def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
         if values.size == 0 or np.ptp(values) > SAME * abs(values[0]):
             continue
         scale = scale_of((state if path is None else path)[name])
-        return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}"
+        return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
     return ""
 
 
@@ -121,7 +130,3 @@ def loaded_steps(path: xr.Dataset, most: int) -> list[int]:
         return evenly_numbered
     targets = np.linspace(closure[0], closure[-1], most)
     return sorted({int(steps[nearest(closure, target)]) for target in targets})
-
-
-def _numbers(values: Any, digits: int) -> list[str]:
-    return [f"{value:.{digits}g}" for value in values]

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import xarray as xr
 
-from fractalcontact.base.numbers import is_real, number_of_entries
-from fractalcontact.base.validation import Problems, Words
-from fractalcontact.plotting._units import check_units
+from fractalcontact.base.validation import Problems
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    import matplotlib.axes
+    import matplotlib.figure
 
-P = ParamSpec("P")
-R = TypeVar("R")
+# names of types that are loaded only to draw
+Axes: TypeAlias = "matplotlib.axes.Axes"
+Figure: TypeAlias = "matplotlib.figure.Figure"
 AxesArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]  # of Axes
 # the Axes of the panels, or a figure or subfigure in which they are made
-Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | SubFigure"
+Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | matplotlib.figure.SubFigure"
 
 STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
 FONT_SIZE = 9.0  # points; the sizes of figures below are for text of this size
 WIDTH = 7.2  # inches, a figure with several panels
 PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
+MAP = (4.6, 3.8)  # inches, a figure with one map and its colour bar
 COLUMNS = 3  # of panels, at most
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
@@ -54,6 +51,7 @@ MAX_LEGEND_ENTRIES = 8
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
 NULL_LINE: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}  # the random null beside a measured curve
 LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
+NARROW_DECADES = 120.0  # up to two decades, with margins, have room for 1, 2 and 5 of each on a panel
 
 _for_files: ContextVar[bool] = ContextVar("figures for files", default=False)
 
@@ -69,71 +67,6 @@ def drawn_for_files() -> Iterator[None]:
             yield
     finally:
         _for_files.reset(token)
-
-
-def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Check the options of a figure by their declared types, before anything is drawn."""
-    signature = inspect.signature(function)
-    where = f"fc.plotting.{function.__name__}"
-
-    @functools.wraps(function)
-    def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
-        with Problems(where) as problems:
-            for name, value in signature.bind(*arguments, **options).arguments.items():
-                parameter = signature.parameters[name]
-                if not (value is None and parameter.default is None):
-                    _check_option(problems, name, value, str(parameter.annotation))
-        return function(*arguments, **options)
-
-    return wrapper
-
-
-def _check_option(problems: Problems, name: str, value: Any, declared: str) -> None:
-    """Check the value of an option whose annotation is one of a few; data are read, and checked, later."""
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
-
-    words = declared.split(" | ")
-    optional = "None" in words
-    if words[0] == "Axes":
-        problems.require(value is None or isinstance(value, Axes), name, "an Axes, or None", value)
-    elif words[0] == "Panels":
-        several = isinstance(value, (list, tuple, np.ndarray)) and all(
-            isinstance(each, Axes) for each in np.ravel(np.asarray(value, dtype=object))
-        )
-        expected = "a sequence of Axes, a Figure or SubFigure, or None"
-        problems.require(value is None or several or isinstance(value, FigureBase), name, expected, value)
-    elif words[0] == "Units":
-        check_units(problems, name, value)
-    elif words[0] == "Figure":
-        expected = "a Figure or SubFigure, or None"
-        problems.require(value is None or isinstance(value, FigureBase), name, expected, value)
-    elif words[0] == "Any":  # labelled data, or several by name
-        expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
-        got = type(value).__name__
-        problems.require(isinstance(value, (xr.DataArray, Mapping)), name, expected, got)
-    elif words[0] == "xr.DataArray":
-        problems.require(isinstance(value, xr.DataArray), name, "a DataArray with x and y", value)
-    elif words[0] == "xr.DataTree":
-        problems.tree(name, value)
-    elif words[0] == "bool":
-        problems.boolean(name, value)
-    elif words[0] == "str":
-        problems.require(isinstance(value, str) or (optional and value is None), name, "words", value)
-    elif words[0] == "int":
-        problems.integer(name, value, at_least=1)
-    elif words[0] == "float":
-        plain = is_real(value) or value is None  # a labelled number would carry its dims into the figure
-        problems.number(name, value if plain else Words(type(value).__name__), optional=optional)
-    elif words[0] == "Sequence[str]":
-        valid = isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
-        problems.require(valid or (optional and value is None), name, "a sequence of words", value)
-    elif words[0].startswith(("Sequence[", "tuple[")) and not (optional and value is None):
-        pair = words[0].startswith("tuple[")
-        expected = "two numbers" if pair else "a sequence of numbers"
-        size = number_of_entries(value) if isinstance(value, (list, tuple, np.ndarray)) else None
-        if problems.require(size is not None and (size == 2 or not pair), name, expected, value) and size:
-            problems.numbers(name, value)
 
 
 def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL, **options: Any) -> Any:
@@ -281,17 +214,6 @@ def sequence_colours(count: int) -> list[Any]:
     return [colours(position) for position in np.linspace(*ends, max(count, 2))[:count]]
 
 
-def sequence_legend(ax: Axes, title: str, labels: Sequence[str], colours: Sequence[Any]) -> None:
-    """Put a legend of an ordered set of curves beside the axes; a long legend is thinned out."""
-    from matplotlib.lines import Line2D
-
-    if not labels:
-        return
-    shown = spread_indices(len(labels), MAX_LEGEND_ENTRIES)
-    entries = [Line2D([], [], color=colours[i], label=labels[i]) for i in shown]
-    side_legend(ax, entries, title=title)
-
-
 def side_legend(ax: Axes, entries: Sequence[Any], *, title: str = "", low: bool = False) -> None:
     """Put a legend to the right of the axes: at the top, or at the bottom with `low`."""
     from matplotlib.legend import Legend
@@ -362,10 +284,10 @@ def plain_ticks(ax: Axes) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         if axis.get_scale() != "log":
             continue
-        low, high = sorted(axis.get_view_interval())
+        low, high = sorted(ax.get_xlim() if axis is ax.xaxis else ax.get_ylim())  # of all curves so far
         if low < 1e-3 or high > 1e6:
             continue  # powers of ten are easier to read there
-        narrow = high / low < 50
+        narrow = high / low < NARROW_DECADES
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
@@ -374,10 +296,3 @@ def plain_ticks(ax: Axes) -> None:
 def write_in_empty_axes(ax: Axes, text: str) -> None:
     """Write a note in the middle of axes without data."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=grey())
-
-
-def log_x_if_wide(ax: Axes, values: Any) -> None:
-    """Make the x axis logarithmic where the positive values on it span more than `LOG_AXIS_RATIO`."""
-    if needs_log_axis(values):
-        ax.set_xscale("log")
-        plain_ticks(ax)

@@ -5,7 +5,8 @@ Only the stages that the wanted results need are computed, imported, compiled an
 ``[surface]``     the lower face, or the only surface: ``read`` a file (with spacing, units, channel),
                   ``sample`` a shipped one, or ``generate`` with fbm, spectral, midpoint or weierstrass and
                   its arguments (``members`` makes an ensemble); ``level``, ``despike``, ``fill`` prepare it.
-                  Spikes are removed for the contact alone: the roughness is that of the surface as scanned.
+                  Spikes are removed for the contact alone: the roughness is that of the surface as scanned,
+                  unless nothing is pressed.
 ``[upper]``       the upper face, in the same way; without it the two faces match perfectly
 ``[material]``    young, poisson, basic_friction_angle, hardness, yield_pressure
 ``[joint]``       block, and the arguments of the functions of `joints` (shear, direction, normal_force ...);
@@ -18,8 +19,7 @@ Only the stages that the wanted results need are computed, imported, compiled an
 ``[want]``        surfaces, dimensions, contact, joints, domains: lists of results; keep: maps to store;
                   figures: true or false
 
-Before the tables: ``title``; ``error`` or ``budget`` to select methods and tolerances (values set explicitly
-are never changed); ``paper = true`` to compare a study of a concrete crack with the paper of 1998.
+Before the tables: ``title``.
 
 A list of numbers may be a range: ``{start, stop, step}``, or ``{first, last, count}`` evenly spaced in the
 logarithm.

@@ -1,8 +1,5 @@
-from ._contents import contents as contents
 from ._html_report import report as report
 from ._json_schema import json_schema as json_schema
-from ._paper import paper_criteria as paper_criteria
-from ._paper import paper_table as paper_table
 from ._plan import plan as plan
 from ._reproduce import reproduce as reproduce
 from ._run import run as run
@@ -15,11 +12,8 @@ from ._validation import validate as validate
 
 __all__ = [
     "Scene",
-    "contents",
     "json_schema",
     "load",
-    "paper_criteria",
-    "paper_table",
     "plan",
     "report",
     "reproduce",

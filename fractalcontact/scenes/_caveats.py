@@ -1,4 +1,4 @@
-"""What limits the results of a study: resolution of the spots, slopes, true pressures."""
+"""What limits the results of a study, and what each limit does to the numbers; the most important first."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.results import provenance_of
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.units import number, quantity_text
+from fractalcontact.scenes._result_tables import group_of, length
+from fractalcontact.scenes._rows import aperture_as_placed
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MEMBER = "member"
 ISOLATED = 0.05  # of the area: less is lost in the pressure beside it
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
 PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
-RARE = 1e-3  # fraction of the openings beyond the quantile that a spike is compared with
-SPIKE = 2.0  # distances from the mean to that quantile; a Gaussian opening of 1e6 points has 1.6
-STEEP_SPIKE = 5.0  # rms increments of the lower face: one is the error of a filled point
-LEAST_OPENINGS = 2000
+TILTED = 0.5  # of the mean square height that the mean plane carries: more, and a flat touches one edge
+SPIKED_DIMENSION, SPIKED_JRC, SPIKED_LIFT = 0.01, 0.5, 0.1  # changes by spikes that are worth a sentence:
+# half of the usual interval of D, a fortieth of the scale of JRC, a tenth of the opening at first touch
+QUICK = "increments"  # the estimator that shows what spikes do: 10 ms, and gaps do not matter to it
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
 
 def caveats(tree: xr.DataTree) -> list[str]:
-    """Return what limits the results of a study, for every group that was pressed.
+    """Return what limits the results of a study, and what it does to the numbers.
 
     Parameters
     ----------
@@ -37,70 +37,96 @@ def caveats(tree: xr.DataTree) -> list[str]:
     Returns
     -------
     list of str
-        One sentence each: a spike that holds two faces apart; islands of too few cells, at which loads;
-        slopes beyond small strains; the true pressure where no hardness limits it; strengths beyond that of
-        the material; uplift that did not come to balance. Empty where the results have no such limit.
+        One sentence each, the most important first: spikes of a scan, a tilted surface below a flat, islands
+        of too few cells, pressures and strengths beyond those of the material, slopes beyond small strains,
+        uplift that did not come to balance. Empty where the results have no such limit.
     """
-    lines: list[str] = [*_spike(tree)]
-    for path, surface in PRESSED.items():
-        pressed = group_of(tree, path)
-        if pressed is not None and "contact_fraction" in pressed:
-            lines += [*_resolution(path, pressed), *_slopes(path, pressed, surface)]
-            lines += _true_pressure(path, pressed, _material(tree))
-    return [*lines, *_strength(tree), *_uplift(tree)]
+    lines = [*_spikes(tree), *_tilt(tree)]
+    pressed = {path: group_of(tree, path) for path in PRESSED}
+    known = {path: data for path, data in pressed.items() if data is not None and "contact_fraction" in data}
+    for path, data in known.items():
+        lines += _resolution(path, data)
+    for path, data in known.items():
+        lines += _true_pressure(path, data, _scene(tree).get("material", {}))
+    lines += _strength(tree)
+    for path, data in known.items():
+        lines += _slopes(path, data, PRESSED[path])
+    return [*lines, *_uplift(tree)]
 
 
-def _spike(tree: xr.DataTree) -> Iterator[str]:
-    """Yield that the faces touch first at points far below the other openings: spikes of a scan."""
+def _spikes(tree: xr.DataTree) -> Iterator[str]:
+    """Yield how many points of the scans stand out from all around them, and what they do to the results."""
+    counts: dict[str, int] = {}
+    heights: dict[str, xr.DataArray] = {}
+    clean: dict[str, xr.DataArray] = {}
+    for name, path in (("surface", "surfaces"), ("upper", "joints/faces")):
+        data, table = group_of(tree, path), _scene(tree).get(name, {})
+        is_scan = isinstance(table, dict) and ("read" in table or "sample" in table)
+        if data is None or "height" not in data or data["height"].ndim != 2 or not is_scan:
+            continue
+        if table.get("despike") or min(data["height"].shape) < 3:
+            continue
+        from fractalcontact import surfaces  # only for scans that were not despiked
+
+        heights[name] = data["height"]
+        clean[name] = surfaces.despike(heights[name])
+        counts[name] = int(clean[name]["removed_points"])
+    if not sum(counts.values()):
+        return
+    effects: list[str] = []
+    if counts.get("surface"):
+        effects += _without_spikes(tree, heights["surface"], clean["surface"])
+    effects += _lift_of_spikes(tree, clean)
+    if effects:
+        points = " and ".join(f"{count} of [{name}]" for name, count in counts.items() if count)
+        without = ", ".join(effects)
+        yield f"points that stand out as spikes of a scan: {points}; without them {without} (--despike)."
+
+
+def _without_spikes(tree: xr.DataTree, scan: xr.DataArray, clean: xr.DataArray) -> Iterator[str]:
+    """Yield the fractal dimension and the roughness coefficient without spikes, where they are others."""
+    estimates, jrc = group_of(tree, "dimensions"), group_of(tree, "joints/roughness_coefficient")
+    if estimates is not None and "default" in estimates["method"].values:
+        from fractalcontact import dimensions
+
+        before, after = (
+            float(dimensions.estimate(face, QUICK)["fractal_dimension"][0]) for face in (scan, clean)
+        )
+        if abs(after - before) > SPIKED_DIMENSION:
+            yield f"D (of {QUICK}) is {after:.2f}, not {before:.2f}"
+    if jrc is not None:
+        from fractalcontact import joints
+
+        direction = [str(name) for name in np.atleast_1d(jrc["direction"].values)]
+        values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
+        pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
+        if max(abs(after - before) for _, after, before in pairs) > SPIKED_JRC:
+            text = ", ".join(f"{after:.0f}, not {before:.0f}, toward {name}" for name, after, before in pairs)
+            yield f"JRC is {text}"
+
+
+def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:
+    """Yield the mean aperture of two faces at first touch without spikes, where it is another."""
     aperture = aperture_as_placed(tree)
-    if aperture is None:
+    if aperture is None or set(clean) != {"surface", "upper"}:
         return
-    openings = aperture.values[np.isfinite(aperture.values)]
-    if openings.size < LEAST_OPENINGS:
-        return
-    low, mean = np.quantile(openings, RARE), openings.mean()
-    increment = np.sqrt(np.nanmean(np.diff(np.asarray(tree["surfaces/height"]), axis=-1) ** 2))
-    if mean - openings.min() > max(SPIKE * (mean - low), STEEP_SPIKE * increment):
-        ends = [quantity_text(float(end), "m") for end in (openings.min(), low)]
+    without = clean["upper"].drop_vars("removed_points") - clean["surface"].drop_vars("removed_points")
+    before, after = (float(opening.mean() - opening.min()) for opening in (aperture, without))
+    if before - after > SPIKED_LIFT * before:
+        yield f"the faces first touch at a mean aperture of {length(after)}, not {length(before)}"
+
+
+def _tilt(tree: xr.DataTree) -> Iterator[str]:
+    """Yield that a flat presses a tilted surface at one edge."""
+    share = float(tree.attrs.get("plane_share", 0.0))
+    if share > TILTED and group_of(tree, "contact") is not None:
         yield (
-            f"joints/faces: the smallest opening, {ends[0]}, is far below the others, of which "
-            f"{100 * (1 - RARE):g} % are above {ends[1]}: probably a spike of a scan, which then carries the "
-            "load and holds the faces apart. To remove spikes: despike = true and fill = true in [surface] "
-            "and [upper], or --despike."
+            f"the surface is tilted: its mean plane carries {100 * share:.0f} % of Sq², so that the flat "
+            "touches one edge first, and area and closure are those of a wedge. Remedy: level = 1."
         )
 
 
-def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
-    """Return the upper less the lower of two measured faces, where they lie; None where they are not kept."""
-    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
-    if upper is None or lower is None or "height" not in upper or "height" not in lower:
-        return None
-    return upper["height"] - lower["height"]
-
-
-def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
-    """Return the Dataset of a group, None where the study has none."""
-    node = tree
-    for name in path.split("/"):
-        if name not in node.children:
-            return None
-        node = node.children[name]
-    return node.to_dataset() if node.has_data else None
-
-
-def member_count(tree: xr.DataTree) -> int:
-    """Return the number of members of an ensemble; 0 for a single study."""
-    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
-
-
-def of_member(tree: xr.DataTree, number: int) -> xr.DataTree:
-    """Return the results of one member of an ensemble."""
-    one: xr.DataTree = tree.map_over_datasets(lambda data: data.isel({MEMBER: number}, missing_dims="ignore"))
-    one.attrs = dict(tree.attrs)
-    return one
-
-
-def cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
+def _cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
     """Return the median number of cells of the islands of contact, over the dims of the contact area.
 
     Where no map of the contact is stored, it is the number of cells of square islands with the same ratio of
@@ -124,7 +150,7 @@ def _median_cells(mask: Array) -> float:
 
 
 def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
-    cells = cells_per_island(pressed)
+    cells = _cells_per_island(pressed)
     others = [dim for dim in cells.dims if dim != "step"]
     low, high = (np.atleast_1d(getattr(cells, end)(others).values) for end in ("min", "max"))
     touching = np.isfinite(low)
@@ -133,28 +159,18 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
         return
     greatest = int(np.flatnonzero(unresolved)[-1])
     ends = dict.fromkeys(number(float(end[greatest]), 2) for end in (low, high))
-    where = (
-        "at every load"
-        if unresolved.sum() == touching.sum()
-        else (f"at {int(unresolved.sum())} of {int(touching.sum())} loads")
-    )
+    of_loads = f"{int(unresolved.sum())} of {int(touching.sum())} loads"
     source = "" if "state" in pressed else ", from their perimeter"
-    yield (
-        f"{path}: the spots of contact are not resolved {where}: at the last of them the median of the cells "
-        f"per island is {' to '.join(ends)}{source}; {MIN_CELLS} are needed. Areas of single islands and "
-        "their shape are those of the grid."
+    where = "every load" if unresolved.sum() == touching.sum() else of_loads
+    ratio = pressed["contact_fraction"] / pressed["corrected_contact_fraction"].where(cells < MIN_CELLS) - 1.0
+    excess = float(ratio.where(np.isfinite(ratio)).max())
+    counted = (
+        f"counted areas are up to {100 * excess:.2g} % above the corrected ones, and " if excess > 0 else ""
     )
-
-
-def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
-    if "rms_slope" not in pressed:
-        return
-    slope = float(pressed["rms_slope"].max())
-    if slope > STEEP:
-        yield (
-            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are not "
-            "small, and linear elasticity is an approximation."
-        )
+    yield (
+        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} cells, {MIN_CELLS} "
+        f"needed{source}): {counted}the shapes and the dimension of islands are those of the grid."
+    )
 
 
 def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> Iterator[str]:
@@ -165,14 +181,28 @@ def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> 
     limits = material.get("yield_pressure")
     if limits is not None and float(true.max()) > np.min(limits):
         span = " to ".join(f"{float(limit) / 1e9:.2g}" for limit in np.atleast_1d(limits))
+        factor = float(true.max()) / float(np.max(limits))
+        times = f", by a factor of up to {factor:.2g}" if factor > 1 else ""
         yield (
             f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
-            "elastic contact areas are too small; a hardness limits the pressure."
+            f"elastic contact areas are too small{times}; a hardness limits the pressure."
+        )
+
+
+def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
+    if "rms_slope" not in pressed:
+        return
+    slope = float(pressed["rms_slope"].max())
+    if slope > STEEP:
+        yield (
+            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are not "
+            "small, and the closures and areas of linear elasticity are approximations."
         )
 
 
 def _strength(tree: xr.DataTree) -> Iterator[str]:
-    friction, limits = group_of(tree, "joints/friction"), _material(tree).get("yield_pressure")
+    friction = group_of(tree, "joints/friction")
+    limits = _scene(tree).get("material", {}).get("yield_pressure")
     if friction is None or limits is None or "peak_shear_strength" not in friction:
         return
     strengths = np.ravel(friction["peak_shear_strength"].values)
@@ -181,7 +211,7 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
         strength, limit = (quantity_text(value, "Pa") for value in (strengths.max(), np.min(limits)))
         yield (
             f"joints/friction: the peak shear strength is up to {strength}, and the material yields at "
-            f"{limit}: asperities break before the faces climb over them."
+            f"{limit}: asperities break before the faces climb over them, and the joint is weaker."
         )
 
 
@@ -189,6 +219,15 @@ def _uplift(tree: xr.DataTree) -> Iterator[str]:
     water = group_of(tree, "joints/uplift")
     if water is None:
         return
+    forces = water["uplift_force"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        more = forces.sel(diagram="joint") / forces.drop_sel(diagram="joint") - 1.0
+    more = more.where(np.isfinite(more))
+    if float(more.max()) > 0:
+        yield (
+            f"joints/uplift: the diagrams are NOT on the safe side: the joint has up to "
+            f"{100 * float(more.max()):.1f} % more uplift."
+        )
     isolated = float(water["isolated_fraction"].max())
     if isolated > ISOLATED:
         yield (
@@ -216,64 +255,14 @@ def _uplift(tree: xr.DataTree) -> Iterator[str]:
         )
 
 
-def peak_remarks(tree: xr.DataTree, friction: xr.Dataset) -> Iterator[str]:
-    """Yield how the peaks depend on their distance, and what the kinematic form leaves out of them."""
-    known = friction["peak_friction_angle"].notnull()
-    if not known.any():
-        return
-    comment = friction["peak_friction_angle"].attrs.get("comment")
-    if comment:
-        change = _strength_over_half(friction)
-        strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
-        yield f"The peak friction angle {comment}.{strength}"
-    elastic = group_of(tree, "joints/elastic_dilatancy")
-    form = provenance_of(friction).get("parameters", {}).get("form")
-    if elastic is None or "elastic_energy" not in elastic or form != "kinematic":
-        return
-    angle = _energy_peak(elastic, friction)
-    more, locked = (angle - friction["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
-    more = more[np.isfinite(more)]
-    found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
-    found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
-    yield (
-        "It is that of the kinematic form, which leaves out the elastic energy that the faces store while "
-        f'they slide: form = "energy" {" and ".join(found)}.'
-    )
-
-
-def _strength_over_half(friction: xr.Dataset) -> float | None:
-    """Return the greatest relative change of the strength between the two shortest distances."""
-    strengths = friction["secant_shear_strength"].sortby("distance").transpose("distance", ...).values
-    if len(strengths) < 2:
-        return None
-    with np.errstate(divide="ignore", invalid="ignore"):
-        change = np.abs(strengths[0] / strengths[1] - 1.0)
-    return float(change[np.isfinite(change)].max()) if np.isfinite(change).any() else None
-
-
-def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
-    """Return the peak friction angle of the energy form over the same distance, of every member."""
-    from fractalcontact import joints
-
-    distance = float(friction["peak_distance"].max())
-    members = range(elastic.sizes[MEMBER]) if MEMBER in elastic.dims else [None]
-    peaks = [
-        joints.friction(
-            elastic if number is None else elastic.isel({MEMBER: number}),
-            basic_friction_angle=float(friction["basic_friction_angle"].mean()),
-            form="energy",
-            distance=distance,
-        )["peak_friction_angle"]
-        for number in members
-    ]
-    return peaks[0] if members == [None] else xr.concat(peaks, MEMBER)
-
-
-def _material(tree: xr.DataTree) -> dict[str, Any]:
-    """Return the table of the material in the scene of a study, empty where there is none."""
+def _scene(tree: xr.DataTree) -> dict[str, Any]:
+    """Return the tables of the scene of a study, empty where there is none."""
     try:
         scene = json.loads(tree.attrs["provenance"])["parameters"]["scene"]
-        material = scene.get("material", {})
     except (AttributeError, KeyError, TypeError, ValueError):
         return {}
-    return material if isinstance(material, dict) else {}
+    return (
+        {name: table for name, table in scene.items() if isinstance(table, dict)}
+        if isinstance(scene, dict)
+        else {}
+    )

@@ -24,6 +24,7 @@ import xarray as xr
 import fractalcontact
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.netcdf import clear_partial, written_whole
+from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
 from fractalcontact.scenes._inputs import contact_options, locate, slip_options
 from fractalcontact.scenes._scene import Scene
@@ -137,7 +138,8 @@ def _read_part(path: Path) -> xr.Dataset:
         for number, (name, dims, attributes) in enumerate(header["variables"])
     }
     coordinates = {name: variables.pop(name) for name in header["coordinates"]}
-    return encoded(xr.Dataset(variables, coordinates, _attributes(header["attrs"], arrays)))
+    part = xr.Dataset(variables, coordinates, _attributes(header["attrs"], arrays))
+    return with_load_indexes(encoded(part))
 
 
 def _plain_attributes(

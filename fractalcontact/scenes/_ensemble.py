@@ -89,6 +89,10 @@ class Ensemble:
         """Return the wanted results of the finished members."""
         return self.finished.results
 
+    def preparation(self) -> dict[str, str | float]:
+        """Return nothing: the surfaces of an ensemble are generated."""
+        return {}
+
     @property
     def seconds(self) -> dict[str, float]:
         """Seconds that each stage took in this run, all members together."""
@@ -111,7 +115,8 @@ def numbered(result: xr.Dataset, member: int) -> xr.Dataset:
     """Return the result of one member with its number as first dim, and beside every row of a ragged dim."""
     # the value of a load may differ from member to member
     loads = [name for name, coord in result.coords.items() if name != "step" and "step" in coord.dims]
-    dataset = result.drop_dims(RAGGED, errors="ignore").reset_coords(loads).expand_dims({MEMBER: [member]})
+    plain = result.drop_dims(RAGGED, errors="ignore").drop_indexes(loads, errors="ignore")
+    dataset = plain.reset_coords(loads).expand_dims({MEMBER: [member]})
     dataset = dataset.set_coords(loads).assign_coords({MEMBER: label(dataset[MEMBER])})
     for dim in (dim for dim in RAGGED if dim in result.dims):
         number = xr.DataArray(np.full(result.sizes[dim], member), dims=dim, name=f"{dim}_{MEMBER}")

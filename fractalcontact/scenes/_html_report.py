@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import html
 import importlib.resources
 import io
 import json
 import math
 import os
 import re
-import string
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,22 +22,20 @@ import xarray as xr
 from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.schema import CORE_DIMS
-from fractalcontact.base.tables import Note, Part, Table
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
-from fractalcontact.scenes._caveats import member_count, of_member
-from fractalcontact.scenes._summary import Summary, compares_with_paper, summary_parts
+from fractalcontact.scenes._result_tables import member_count, of_member
+from fractalcontact.scenes._results_folder import REPORT, is_report
+from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._tables import tables
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.report"
-REPORT = "report.html"
 SURFACE_CELLS = 128  # along the longer side of the surface that can be turned
 MAP_CELLS = 400  # along the longer side of a map
 MAPS = 120  # pictures of one set of maps
-HEADINGS = {"section": "Claims of the 1998 paper, by section", "stage": "Stages of the run"}
 ROWS = 100  # of a table on the page; the CSV file has all
 RELIEF = 0.25  # height range of the drawn surface over its longer side
 NO_HEIGHT = 65535  # of the 16-bit levels: a point without height
@@ -89,7 +85,8 @@ def report(
     Raises
     ------
     InvalidInput
-        `result` is no study, `path` is missing and `result` no file, or `path` cannot be written.
+        `result` is no study, `path` is missing and `result` no file, or `path` cannot be written or is a file
+        of another kind.
     UnreadableFile
         There is no such file, or it is not complete.
 
@@ -121,9 +118,12 @@ def report(
                 problems.file("figures", figure)
     tree = result if isinstance(result, xr.DataTree) else _study(result)
     target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
+    with Problems(WHERE) as problems:
+        is_free = not target.is_file() or is_report(target)
+        problems.require(is_free, "path", "a new file, or a report of this package", target.name)
     with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
         pictures = _drawn(tree, folder) if figures is None else figures
-        return write_report(tree, target, pictures, summary_parts(tree))
+        return write_report(tree, target, pictures, summary_of(tree))
 
 
 def write_report(
@@ -149,81 +149,33 @@ def _study(path: str | os.PathLike[str]) -> xr.DataTree:
 
 def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summary) -> str:
     """Return the text of the page."""
-    single = of_member(tree, 0)
-    surface, maps = _surface(single), list(_maps(single))
-    which = " Member 0 of the ensemble." if member_count(tree) else ""
-    sections = {
-        "Summary": _summary(summary),
-        "Surface": _surface_section(surface, which) if surface else "",
-        "Maps": "".join(_map_section(each, number, which) for number, each in enumerate(maps)),
-        "Figures": "".join(_figure(name, content) for name, content in figures),
-        "Tables": _table_section(tree),
-        "Scene and provenance": _provenance_section(tree),
-    }
-    shown = {name: text for name, text in sections.items() if text}
+    from jinja2 import Environment  # here: a study without a folder has no report
+
     template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
-    return string.Template(template.read_text(encoding="utf-8")).substitute(
-        title=html.escape(_title(tree)),
-        subtitle=html.escape(_subtitle(tree)),
-        generator=html.escape(str(tree.attrs.get("source", "fractalcontact"))),
-        contents="".join(f'<li><a href="#{_anchor(name)}">{name}</a></li>' for name in shown),
-        sections="\n".join(
-            f'<section id="{_anchor(name)}"><h2>{name}</h2>\n{text}\n</section>'
-            for name, text in shown.items()
-        ),
-        surface=_json(surface),
-        maps=_json([each.data for each in maps]),
-    )
-
-
-def _anchor(name: str) -> str:
-    return name.lower().replace(" ", "-")
-
-
-def _json(data: Any) -> str:
-    """Return JSON that can stand inside a script element."""
-    return json.dumps(data).replace("<", "\\u003c")
-
-
-def _title(tree: xr.DataTree) -> str:
-    return str(tree.attrs.get("title", tree.name or "Result"))
-
-
-def _subtitle(tree: xr.DataTree) -> str:
+    single = of_member(tree, 0)
+    entry = _provenance(tree)
+    scene = entry.get("parameters", {}).get("scene")
     written = str(tree.attrs.get("history", "")).split(" ")[0]
-    parts = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
-    return " · ".join(str(part) for part in parts if part)
-
-
-def _summary(sections: Summary) -> str:
-    """Return the sections of the summary; the head of the first column of a table is its heading."""
-    return "\n".join(
-        ("<h3>Caveats</h3>\n" if all(isinstance(part, Note) for part in parts) else "")
-        + _summary_section(parts)
-        for parts in sections
+    subtitle = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(template.read_text(encoding="utf-8")).render(
+        title=summary.title,
+        subtitle=" · ".join(str(part) for part in subtitle if part),
+        generator=str(tree.attrs.get("source", "fractalcontact")),
+        of_member="Member 0 of the ensemble." if member_count(tree) else "",
+        surface=_surface(single),
+        maps=list(_maps(single)),
+        figures=[
+            (name.replace("_", " ").capitalize(), base64.b64encode(content).decode())
+            for name, content in figures
+        ],
+        summary=summary,
+        written_rows=written_rows,
+        curves=[_curve_table(name, frame) for name, frame in _curves(tree).items()],
+        scene=_as_json(scene) if scene else "",
+        provenance=_as_json(entry),
+        references=str(tree.attrs.get("references", "")),
     )
-
-
-def _summary_section(parts: Sequence[Part]) -> str:
-    """Return tables as tables, and remarks and lines as paragraphs."""
-    texts = []
-    for part in parts:
-        if isinstance(part, Table):
-            (title, *heads), *rows = [[html.escape(str(cell)) for cell in row] for row in part.rows]
-            head = "".join(f'<th scope="col">{cell}</th>' for cell in ("", *heads))
-            body = "".join(
-                f'<tr><th scope="row">{name}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
-                for name, *cells in rows
-            )
-            title = HEADINGS.get(title, title[:1].upper() + title[1:])
-            texts.append(
-                f'<h3>{title}</h3>\n<div class="scroll words"><table>'
-                f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-            )
-        else:
-            words = html.escape(part.words if isinstance(part, Note) else part)
-            texts.append(f'<p class="{"note" if isinstance(part, Note) else "line"}">{words}</p>')
-    return "\n".join(texts)
 
 
 def _surface(tree: xr.DataTree) -> dict[str, Any] | None:
@@ -252,6 +204,7 @@ def _surface(tree: xr.DataTree) -> dict[str, Any] | None:
         "colours": HEIGHT_COLOURS,
         "labels": [f"{dim}, {quantity_text(length, 'm')}" for dim, length in zip("yx", extent, strict=True)],
         "block": block,
+        "ends": [quantity_text(end, "m") for end in (lowest, highest)],
     }
 
 
@@ -261,23 +214,6 @@ def _heights(tree: xr.DataTree) -> xr.DataArray | None:
         if "height" in node.data_vars and node["height"].dims == CORE_DIMS:
             return node["height"]
     return None
-
-
-def _surface_section(surface: dict[str, Any], of_member: str) -> str:
-    block = surface["block"]
-    means = f" Means of blocks of {block} × {block} points are drawn." if block > 1 else ""
-    low, high = (quantity_text(surface[end], "m") for end in ("lowest", "highest"))
-    ramp = ", ".join(f"rgb{colour}" for colour in HEIGHT_COLOURS)
-    return f"""<figure>
-<canvas id="surface-view" width="1000" height="620" tabindex="0" role="img"
- aria-label="The surface in perspective; heights from {low} to {high}"></canvas>
-<figcaption><span class="screen">Drag to turn, or use the arrow keys. </span>Heights are enlarged
-<output id="exaggeration-value"></output>.{means}{of_member}
-<span class="key" style="display:inline-block">{low}
-<i style="width:8em;background:linear-gradient(to right, {ramp})"></i> {high}</span></figcaption>
-<label class="controls">Enlargement of heights
-<input type="range" id="exaggeration" min="-4" max="4" step="0.25" value="0"></label>
-</figure>"""
 
 
 @dataclass(frozen=True)
@@ -383,33 +319,11 @@ def _value(scalar: xr.DataArray) -> str:
     return quantity_text(float(scalar), str(scalar.attrs.get("units", "")), 4)
 
 
-def _map_section(maps: Maps, number: int, of_member: str) -> str:
-    sliders = "".join(
-        f'<label class="controls">{html.escape(axis["name"])}: <output id="axis-value-{number}-{i}"></output>'
-        f'<input type="range" id="axis-{number}-{i}" max="{last}" value="{last}"></label>'
-        for i, axis in enumerate(maps.data["axes"])
-        for last in [len(axis["labels"]) - 1]
-    )
-    key = "".join(
-        f'<span><i style="background:{colour}"></i>{name}</span>' for name, colour in maps.key.items()
-    )
-    blocks = (
-        f" A pixel stands for {maps.block} × {maps.block} cells: the highest flag among them."
-        if maps.block > 1
-        else ""
-    )
-    return f"""<h3>{html.escape(maps.title)}</h3>
-<figure class="two"><div><img class="map" id="map-{number}" alt="">
-<figcaption id="map-caption-{number}"></figcaption></div>
-<div>{sliders}<p class="key">{key}</p>
-<p class="soft">x to the right, y upwards.{blocks}{of_member}</p></div></figure>"""
-
-
 def _drawn(tree: xr.DataTree, folder: str) -> list[Path]:
     """Draw every figure of a study and return the files."""
     from fractalcontact import plotting
 
-    return plotting.draw(tree, folder, paper=compares_with_paper(tree))
+    return plotting.draw(tree, folder)
 
 
 def _picture_file(path: Path) -> tuple[str, bytes]:
@@ -422,43 +336,25 @@ def _picture_file(path: Path) -> tuple[str, bytes]:
     return path.stem, content.getvalue()
 
 
-def _figure(name: str, content: bytes) -> str:
-    title = name.replace("_", " ").capitalize()
-    source = base64.b64encode(content).decode()
-    return (
-        f'<figure><img src="data:image/webp;base64,{source}" alt="{title}">'
-        f"<figcaption>{title}</figcaption></figure>\n"
-    )
+def _curves(tree: xr.DataTree) -> dict[str, Any]:
+    """Return the curves of a study as tables, without those that hold run times alone."""
+    frames = tables(tree).items()
+    return {name: frame for name, frame in frames if not set(frame.columns) <= {"run_time (s)"}}
 
 
-def _table_section(tree: xr.DataTree) -> str:
-    intro = '<p class="soft">Every table is also a CSV file in SI units, with all rows and columns.</p>\n'
-    parts = [
-        _table(name, frame)
-        for name, frame in tables(tree).items()
-        if not set(frame.columns) <= {"run_time (s)"}
-    ]
-    return intro + "\n".join(parts) if parts else ""
-
-
-def _table(name: str, frame: Any) -> str:
-    """Return one table, closed, with a link to all of it as CSV."""
-    csv = base64.b64encode(frame.to_csv(index=False, float_format="%.9g").encode()).decode()
-    link = f'<a download="{name}.csv" href="data:text/csv;base64,{csv}">{name}.csv</a>'
+def _curve_table(name: str, frame: Any) -> dict[str, Any]:
+    """Return the first rows of a table as text, and all of it as CSV."""
     shown = frame[[column for column in frame.columns if column.split(" (")[0] not in HIDDEN]].head(ROWS)
     heads, columns = zip(*(_column(head, shown[head]) for head in shown.columns), strict=True)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
-        for row in zip(*columns, strict=True)
-    )
-    more = f", the first {ROWS} of {len(frame)} rows" if len(frame) > ROWS else ""
-    title = name.replace("_", " ")
-    head = "".join(f"<th>{html.escape(text)}</th>" for text in heads)
-    return (
-        f"<details><summary>{title}{more}</summary><p>{link}</p>"
-        f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-        "</details>"
-    )
+    csv = frame.to_csv(index=False, float_format="%.9g").encode()
+    return {
+        "name": name,
+        "title": name.replace("_", " "),
+        "left_out": len(frame) - len(shown),
+        "heads": heads,
+        "rows": list(zip(*columns, strict=True)),
+        "csv": base64.b64encode(csv).decode(),
+    }
 
 
 def _column(head: str, values: Any) -> tuple[str, list[str]]:
@@ -472,21 +368,15 @@ def _column(head: str, values: Any) -> tuple[str, list[str]]:
     return scale.label(name), cells
 
 
-def _provenance_section(tree: xr.DataTree) -> str:
+def _provenance(tree: xr.DataTree) -> dict[str, Any]:
+    """Return the provenance of a study, empty for one of another origin."""
     try:
         entry = json.loads(tree.attrs.get("provenance", "{}"))
     except (TypeError, ValueError):
-        entry = {}
-    scene = entry.get("parameters", {}).get("scene") if isinstance(entry, dict) else None
-    parts = [f"<h3>Scene</h3>{_as_json(scene)}"] if scene else []
-    parts.append(f"<details><summary>Provenance</summary>{_as_json(entry)}</details>")
-    references = tree.attrs.get("references")
-    if references:
-        parts.append(f"<h3>References</h3><p>{html.escape(str(references))}</p>")
-    return "".join(parts)
+        return {}
+    return entry if isinstance(entry, dict) else {}
 
 
 def _as_json(entry: Any) -> str:
     """Return JSON with a line for each key; a list of plain values stays on one line."""
-    text = PLAIN_LIST.sub(lambda match: " ".join(match.group().split()), json.dumps(entry, indent=1))
-    return f'<pre class="wrap">{html.escape(text)}</pre>'
+    return PLAIN_LIST.sub(lambda match: " ".join(match.group().split()), json.dumps(entry, indent=1))

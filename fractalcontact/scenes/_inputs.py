@@ -15,6 +15,7 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
+from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
 from fractalcontact.scenes._stages import ONE_LOAD, PARTIAL_SLIP, STAGES, public_function
 
@@ -48,16 +49,50 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
         if "y" not in surface.dims:
             remedy = "see fractalcontact.dimensions.estimate"
             raise InvalidInput("surface", [f"read: expected a surface, got a profile: {remedy}"])
-    source = surface.attrs["references"]
+    source, done = surface.attrs["references"], []
+    if table.generate is None and (missing := int(surface.isnull().sum())):
+        done.append(f"{100 * missing / surface.size:.3g} % of the points are missing")
     if table.despike:
         surface = surfaces.despike(surface)
         source = joined_references(source, surface.attrs["references"])
+        done.append(f"{_points(surface['removed_points'])} removed as spikes")
     if table.fill:
         surface = surfaces.fill(surface)
         source = joined_references(source, surface.attrs["references"])
+        done.append(f"{_points(surface['filled_points'])} filled in")
     if table.level is not None:
+        before, tilt = rms_height(surface), math.degrees(math.atan(math.hypot(*mean_slopes(surface))))
         surface = surfaces.level(surface, table.level)
-    return surface.assign_attrs(references=source)
+        ends = [quantity_text(height, "m") for height in (before, rms_height(surface))]
+        if table.level > 0:
+            done.append(f"levelled: tilt {tilt:.3g}° removed, Sq {ends[0]} before and {ends[1]} after")
+    return surface.assign_attrs(references=source, **({"preparation": ", ".join(done)} if done else {}))
+
+
+def _points(count: Any) -> str:
+    return f"{int(count)} point" + ("s" if int(count) != 1 else "")
+
+
+def rms_height(surface: xr.DataArray) -> float:
+    """Return the root mean square height about the mean (m)."""
+    return float(surface.std())
+
+
+def mean_slopes(surface: xr.DataArray) -> tuple[float, float]:
+    """Return the slopes (y, x) of the least-squares plane of the heights that are there."""
+    known = np.isfinite(surface.values)
+    y, x = np.meshgrid(surface["y"], surface["x"], indexing="ij")
+    plane = np.stack([y[known], x[known], np.ones(int(known.sum()))], axis=-1)
+    slopes = np.linalg.lstsq(plane, surface.values[known], rcond=None)[0]
+    return float(slopes[0]), float(slopes[1])
+
+
+def plane_share(surface: xr.DataArray) -> float:
+    """Return the part of the mean square height that the mean plane carries."""
+    total = rms_height(surface)
+    slope_y, slope_x = mean_slopes(surface) if total > 0 else (0.0, 0.0)
+    plane = slope_y * surface["y"] + slope_x * surface["x"] + 0.0 * surface
+    return (rms_height(plane) / total) ** 2 if total > 0 else 0.0
 
 
 def generator_options(table: SurfaceTable) -> dict[str, Any]:
@@ -108,7 +143,8 @@ def locate(path: str, folder: Path) -> Path:
         unset = " and ".join(VARIABLE.findall(expanded))
         remedy = f"set the environment variable {unset} to the folder that holds the file {Path(path).name}"
         raise InvalidInput("surface", [f"read: {remedy}"])
-    for candidate in (folder / expanded, datasets_folder() / expanded):
+    beside = Path(os.path.normpath(folder / expanded))  # also where the folder does not exist yet
+    for candidate in (beside, datasets_folder() / expanded):
         if candidate.is_file():
             return candidate
     raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])

@@ -55,9 +55,6 @@ PURPOSES = {
 }
 OWN = {
     "title": "Title of the study.",
-    "paper": "Test the claims of the 1998 paper on this study, and draw its figures.",
-    "error": "Choose tolerances and methods that reach this relative error at the least cost.",
-    "budget": "Choose tolerances and methods with the smallest error within these seconds.",
     "read": "A file, relative to the scene: every format of fractalcontact.surfaces.read.",
     "sample": "A surface that is installed with the package.",
     "generate": "A synthetic surface; the other keys are the arguments of this function.",
@@ -72,6 +69,7 @@ OWN = {
     "yield_pressure": "Pressure that the true pressures are compared with, Pa; changes no result.",
     "block": "Edges of the upper block, m.",
     "register": "Bring two measured faces into mated position first.",
+    "turn_upper": "The axis about which an upper body that was scanned face up is turned over.",
     "surfaces": "Results about the surface.",
     "dimensions": 'Estimators of fractal dimension: "default" or names of `fractalcontact methods`.',
     "contact": "Results of the surface pressed by a flat.",
@@ -102,7 +100,7 @@ def json_schema() -> Schema:
     >>> import fractalcontact as fc
     >>> schema = fc.scenes.json_schema()
     >>> sorted(schema["properties"])[:5]
-    ['budget', 'contact', 'dimensions', 'domains', 'error']
+    ['contact', 'dimensions', 'domains', 'joint', 'material']
     >>> schema["properties"]["material"]["properties"]["young"]["description"]
     "Young's modulus, Pa."
     """
@@ -120,18 +118,12 @@ def json_schema() -> Schema:
     }
     for name, purpose in PURPOSES.items():
         tables[name]["description"] = purpose
-    settings = {
-        "title": {"type": "string"},
-        "paper": FLAG,
-        "error": _number({"above": 0.0, "below": 1.0}),
-        "budget": _number({"above": 0.0}),
-    }
+    settings = {"title": {"type": "string"}}
     return {
         "$schema": DRAFT,
         "title": "Scene of fractalcontact",
         **_table(_described(settings, OWN) | tables, {}),
         "required": ["surface", "want"],
-        "not": {"required": ["error", "budget"]},
         "definitions": dict(zip(("even_range", "logarithmic_range"), _ranges(), strict=True)),
     }
 
@@ -232,7 +224,7 @@ def _with_stages(name: str, common: Iterable[str], function: str, stages: Iterab
     texts = parameter_texts(function) if function else _shared_texts(stages)
     properties = {key: _value(key) for key in common}
     if "register" in properties:
-        properties["register"] = FLAG
+        properties |= {"register": FLAG, "turn_upper": {"enum": ["x", "y"]}}
     subpackage = "joints" if name == "joint" else name
     for word in stages:
         row = STAGES[word if name == "contact" else f"{subpackage}/{word}"]
@@ -240,7 +232,7 @@ def _with_stages(name: str, common: Iterable[str], function: str, stages: Iterab
         table["description"] = f"Arguments of fractalcontact.{row.function}."
         own = properties.get(word)  # [joint.closure] is a stage, closure = 1e-6 a load
         properties[word] = table if own is None else {"anyOf": [*own.get("anyOf", [own]), table]}
-    return _table(properties, texts | {key: OWN[key] for key in ("block", "register")})
+    return _table(properties, texts | {key: OWN[key] for key in ("block", "register", "turn_upper")})
 
 
 def _shared_texts(stages: Iterable[str]) -> dict[str, str]:

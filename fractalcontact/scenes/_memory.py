@@ -7,13 +7,13 @@ what the call of its public function takes (see `base.memory`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memory
-from fractalcontact.scenes._autotune import PERIODIC
 from fractalcontact.scenes._inputs import (
     block_shape,
     contact_options,
@@ -38,6 +38,7 @@ COMPILER = 6.0e7  # with the first of these subpackages; each adds its kernels
 KERNELS = {"dimensions": 5.0e7, "contact": 6.0e7, "joints": 6.0e7, "domains": 2.0e7}
 DRAWING = 9.0e7
 READ = 24.0  # bytes for each point of a file while it is read
+PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
 def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
@@ -103,8 +104,8 @@ def _surface_memory(scene: Scene, plane: Plane) -> float:
     if table.generate is None:
         return READ * plane.cells
     function = public_function(f"surfaces.{table.generate}")
-    arguments = {"members": None} | generator_options(table)
-    return bytes_on(function.memory, plane, arguments)  # type: ignore[attr-defined]
+    members = int(generator_options(table).get("members") or 1)
+    return bytes_on(function.memory, replace(plane, planes=members), {})  # type: ignore[attr-defined]
 
 
 def _options(scene: Scene, stage: Stage) -> dict[str, Any]:

@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 import time
 import warnings
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +21,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance
-from fractalcontact.base.construction import joined_along
-from fractalcontact.base.errors import SmallStrainWarning
+from fractalcontact.base.errors import InvalidInput, SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.results import provenance_of
+from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._inputs import (
     contact_options,
     crack_options,
@@ -131,17 +133,15 @@ def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
     """Join results along a dim; their run times are added, and their provenance is that of the whole."""
     if len(results) == 1:
         return results[0]
-    joined = joined_along(dim, results)
-    if joined is None:
-        joined = xr.concat(
-            results,
-            dim=dim,
-            data_vars="minimal",
-            coords="minimal",
-            compat="override",
-            join="override",
-            combine_attrs="override",
-        )
+    joined = xr.concat(
+        results,
+        dim=dim,
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+        combine_attrs="override",
+    )
     if "run_time" in joined and dim not in joined["run_time"].dims:
         total = sum(result["run_time"].values for result in results)
         joined["run_time"] = results[0]["run_time"].copy(data=total)
@@ -166,14 +166,15 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
     if stage.name == "surfaces":
         return StageWork((partial(_read_height, scene.surface, scene.folder),))
     if subpackage == "surfaces":
-        return StageWork((partial(call, stage.row.function, _heights(results, "surfaces")),))
+        surface = _measured(scene, results, replace(scene.surface, fill=False))
+        return StageWork((partial(call, stage.row.function, surface),))
     if subpackage == "dimensions":
         return _dimension_work(stage, scene, results)
-    if subpackage == "contact":
-        return _contact_work(stage, scene, results)
-    if stage.name == PARTIAL_SLIP:
-        height, options = _heights(results, "surfaces"), slip_options(scene)
-        return StageWork((partial(call, stage.row.function, height, keep=stage.keep, **options),))
+    if stage.name in ("contact", PARTIAL_SLIP):
+        height = _heights(results, "surfaces")
+        options = contact_options(scene) if stage.name == "contact" else slip_options(scene)
+        function = partial(call, stage.row.function, height, keep=stage.keep)
+        return _split(stage, function, options, height.size)
     return _joint_work(name, stage, scene, results)
 
 
@@ -190,81 +191,59 @@ def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
 
 
 def _dimension_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
-    surface = _heights(results, "surfaces")
-    if scene.surface.despike:
-        # spikes are removed for the contact alone: the roughness is that of the surface as it was scanned
-        surface = read_surface(replace(scene.surface, despike=False), scene.folder)
+    # spikes are removed for the contact alone: the roughness is that of the surface as it was scanned
+    # unless nothing is pressed
+    table = scene.surface if scene.roughness_only else replace(scene.surface, despike=False)
+    surface = _measured(scene, results, replace(table, fill=table.fill and not table.despike))
     if stage.name != "dimensions":
         return StageWork((partial(call, stage.row.function, surface),))
     options, methods = dict(scene.table("dimensions")), list(scene.want.dimensions)
     return StageWork((partial(call, stage.row.function, surface, methods, **options),))
 
 
-def _contact_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
-    options, height = contact_options(scene), _heights(results, "surfaces")
+def _measured(scene: Scene, results: Results, table: SurfaceTable) -> xr.DataArray:
+    """Return the surface as another table prepares it; that of the contact where the tables are equal."""
+    return _heights(results, "surfaces") if table == scene.surface else read_surface(table, scene.folder)
+
+
+def _split(stage: Stage, function: Part, options: Mapping[str, Any], nodes: int) -> StageWork:
+    """Return the parts of a stage: a call for each value of the arguments that its row splits."""
+    pieces = [_pieces(dim, options, nodes) for dim in stage.row.splits]
+    apart = {name for piece in pieces for part in piece for name in part}
+    common = {name: value for name, value in options.items() if name not in apart}
+    parts = (partial(function, **common, **dict(ChainMap(*part))) for part in product(*pieces))
+    return StageWork(tuple(parts), stage.row.splits, tuple(map(len, pieces)))
+
+
+def _pieces(dim: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, Any]]:
+    """Return the arguments along one dim: one value each, or one section of the path of the load."""
+    if dim != "step":
+        return [{dim: [value]} for value in _as_list(options[dim])]
     load = next(key for key in LOADS if key in options)
-    paths = _sections(options.pop(load), height.size, has_hardness="hardness" in options)
-    press = partial(call, stage.row.function, height, keep=stage.keep, **options)
-    return StageWork(tuple(partial(press, **{load: path}) for path in paths), ("step",), (len(paths),))
-
-
-def _sections(path: Any, nodes: int, *, has_hardness: bool) -> list[Any]:
-    """Cut a load path into sections."""
+    path = options[load]
     if not isinstance(path, list):
-        return [path]
-    length = section_length(len(path), nodes, has_hardness=has_hardness)
-    return [path[k : k + length] for k in range(0, len(path), length)]
+        return [{load: path}]
+    length = section_length(len(path), nodes, has_hardness="hardness" in options)
+    return [{load: path[start : start + length]} for start in range(0, len(path), length)]
 
 
 def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> StageWork:
     if name == "faces":
         return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
     options = joint_options(scene, name)
+    if stage.row.keeps or name == "elimination":  # which stores no maps
+        options["keep"] = stage.keep
     if name in FROM_RESULTS:
         return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
     if stage.row.takes_surface:
         return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))
     crack = _crack(scene, results, name)
-    if name == "direct_shear":  # every pressure has a joint of its own
-        pressures = _as_list(options.pop("nominal_pressure"))
-        test = partial(call, stage.row.function, crack, **options)
-        tests = tuple(partial(test, nominal_pressure=[pressure]) for pressure in pressures)
-        return StageWork(tests, ("nominal_pressure",), (len(pressures),))
     if name == "delta_surface" and name not in scene.want.joints:
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
-    if name in ("closure", "elimination"):
-        return _closure_work(crack, options, stage)
-    if name == "area_dimension":
-        shears = _as_list(options.pop("shear"))
-        call_at = partial(partial, call, stage.row.function, crack, **options)
-        return StageWork(tuple(call_at(shear=[shear]) for shear in shears), ("shear",), (len(shears),))
-    if name == PARTIAL_SLIP:
-        shears = _as_list(options.pop("shear"))
-        push = partial(call, stage.row.function, crack, keep=stage.keep, **options)
-        return StageWork(tuple(partial(push, shear=[shear]) for shear in shears), ("shear",), (len(shears),))
     if name == "elastic_dilatancy":
-        options |= _pressed(scene, results, options)
-        directions = _as_list(options.pop("direction", ("E", "N", "W", "S")))
-        shears = _as_list(options.pop("shear"))
-        parts = (
-            partial(call, stage.row.function, crack, direction=[direction], shear=[shear], **options)
-            for direction in directions
-            for shear in shears
-        )
-        return StageWork(tuple(parts), ("direction", "shear"), (len(directions), len(shears)))
-    return StageWork((partial(call, stage.row.function, crack, **options),))
-
-
-def _closure_work(crack: Crack, options: dict[str, Any], stage: Stage) -> StageWork:
-    load = next(key for key in LOADS if key in options)
-    shears, nodes = _as_list(options.pop("shear")), crack.layout.cells[0] * crack.layout.cells[1]
-    paths = _sections(options.pop(load), nodes, has_hardness="hardness" in options)
-    parts = (
-        partial(call, stage.row.function, crack, shear=[shear], keep=stage.keep, **options, **{load: path})
-        for shear in shears
-        for path in paths
-    )
-    return StageWork(tuple(parts), ("shear", "step"), (len(shears), len(paths)))
+        options = {"direction": ("E", "N", "W", "S")} | options | _pressed(scene, results, options)
+    nodes = crack.layout.cells[0] * crack.layout.cells[1]
+    return _split(stage, partial(call, stage.row.function, crack), options, nodes)
 
 
 def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
@@ -287,9 +266,20 @@ def _heights(results: Results, stage: str) -> xr.DataArray:
 
 def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
     upper = read_surface(scene.upper or scene.surface, scene.folder, lower)
-    if scene.joint.register:
-        return call("joints.register", lower, upper)
-    return as_dataset(upper.rename("height"))
+    registers = scene.joint.register
+    if registers:
+        faces = call("joints.register", lower, upper, turn_upper=scene.joint.turn_upper)
+    else:
+        faces = as_dataset(upper.rename("height"))
+        mean = float((upper - lower).mean())
+        if mean < 0:
+            expected = (
+                "an upper face above the lower one: swap them ([surface] and [upper]), or register them"
+            )
+            got = f"a mean aperture of {quantity_text(mean, 'm')}"
+            raise InvalidInput("fractalcontact.scenes.run", [f"upper: expected {expected}, got {got}"])
+    prepared = upper.attrs.get("preparation")
+    return faces.assign_attrs(preparation=prepared) if prepared else faces
 
 
 def _crack(scene: Scene, results: Results, name: str) -> Crack:

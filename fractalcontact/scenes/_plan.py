@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import NONE, Problems, Words
-from fractalcontact.scenes._autotune import Choice, choose
 from fractalcontact.scenes._inputs import FRICTION_ANGLE, joint_options
 from fractalcontact.scenes._memory import stage_memory
 from fractalcontact.scenes._scene import LOADS, Scene
@@ -39,8 +38,6 @@ class Plan:
     scene : str
         Name of the scene.
     stages : tuple of Stage
-    choices : tuple of Choice
-        Methods and tolerances selected for `error` or `budget`.
     memory : mapping
         Estimated peak memory of each stage in bytes, libraries and earlier results included; empty where the
         size of the surface is not known.
@@ -48,7 +45,6 @@ class Plan:
 
     scene: str
     stages: tuple[Stage, ...] = field(default=())
-    choices: tuple[Choice, ...] = field(default=())
     memory: Mapping[str, float] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Stage]:
@@ -67,7 +63,7 @@ class Plan:
             name = stage.name + ("" if stage.stored else " (not stored)")
             peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
             rows.append((name, needs, stage.reason, peak))
-        notes = [f"selected: {choice}" for choice in self.choices]
+        notes = []
         if screen_width() < WITH_MEMORY:
             rows = [row[:-1] for row in rows]
             largest = max(self.memory, key=lambda name: self.memory[name], default="")
@@ -77,8 +73,6 @@ class Plan:
 
 def plan(scene: Scene) -> Plan:
     """Return the stages that the wanted results of a scene need, and no others.
-
-    With `error` or `budget` in the scene, the plan also has the methods and tolerances selected for it.
 
     Parameters
     ----------
@@ -100,13 +94,12 @@ def plan(scene: Scene) -> Plan:
     """
     with Problems("fractalcontact.scenes.plan") as problems:
         problems.require(isinstance(scene, Scene), "scene", "a Scene, from fractalcontact.scenes.load", scene)
-    scene, choices = choose(scene)
     stages = stages_of(scene)
-    return Plan(scene.name, stages, choices, stage_memory(scene, stages))
+    return Plan(scene.name, stages, stage_memory(scene, stages))
 
 
 def stages_of(scene: Scene) -> tuple[Stage, ...]:
-    """Return the stages of a scene whose methods and tolerances are all set."""
+    """Return the stages of a scene."""
     reasons = _reasons(scene)
     stages = [
         Stage(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,27 +15,34 @@ import xarray as xr
 
 from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked, output_folder
-from fractalcontact.base.references import PAPER, joined_references
+from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
+from fractalcontact.base.references import joined_references
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._autotune import Choice, choose
-from fractalcontact.scenes._caveats import caveats, of_member
+from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
-from fractalcontact.scenes._html_report import REPORT, write_report
+from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
+from fractalcontact.scenes._result_tables import of_member
+from fractalcontact.scenes._results_folder import (
+    DATASHEET,
+    REPORT,
+    SOFTWARE,
+    TABLES,
+    remove_old_figures,
+    results_folder,
+)
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
-from fractalcontact.scenes._summary import Summary, summary_parts, summary_text
+from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validate
 
-DATASHEET, TABLES = "datasheet.pdf", "tables"
 OWN_REFERENCES = "see the references of each group"
 
 
@@ -45,8 +52,10 @@ def run(
     out: str | os.PathLike[str] | None = None,
     progress: bool = True,
     summary: bool = False,
+    verbose: bool = False,
     workers: int = 0,
     client: Any = None,
+    force: bool = False,
 ) -> xr.DataTree:
     """Run a scene and return its results.
 
@@ -61,6 +70,8 @@ def run(
         Show a bar for stages of several parts.
     summary : bool, default False
         Print the summary at the end, see `fractalcontact.scenes.summary`.
+    verbose : bool, default False
+        Print all of it.
     workers : int, default 0
         Share the study between so many processes on this machine, at most 4 for each processor. An ensemble
         is shared by members, any other study by the parts of a stage. A script needs an
@@ -69,6 +80,9 @@ def run(
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
         is set on the worker. Workers need no access to `out`; a scene that reads files needs them there.
+    force : bool, default False
+        Overwrite in `out` the results of another study, and files that this package did not write. Without
+        it they are refused.
 
     Returns
     -------
@@ -96,23 +110,22 @@ def run(
     [1.15 0.5 ]
     """
     start = time.perf_counter()
-    _check(summary, workers, client)
+    _check(summary, verbose, force, workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
         check_memory(scene, stages_of(scene), workers)
         among = workers_of(processes if client is None else client)
-        tree, sections = _run(scene, out, progress, among, start)
+        with results_folder(out, scene, force=force) as folder:
+            tree, whole = _run(scene, folder, progress, among, start)
     if summary:
-        print(summary_text(tree, summary_parts(tree) if sections is None else sections))  # noqa: T201
+        print(_text(tree, whole, verbose=verbose))  # noqa: T201
     return tree
 
 
 def _run(
-    scene: Scene, out: str | os.PathLike[str] | None, progress: bool, workers: Workers | None, start: float
+    scene: Scene, folder: Path | None, progress: bool, workers: Workers | None, start: float
 ) -> tuple[xr.DataTree, Summary | None]:
     """Return the results, and the summary where the report has computed it."""
-    folder = None if out is None else output_folder(out)
-    scene, choices = choose(scene)
     store = PartStore(folder)
     with locked(folder), signals.noted(folder is not None) as stop:
         scene = with_seeds(scene, store)
@@ -124,7 +137,8 @@ def _run(
         for name in ("contact", "joints/closure"):
             if name in groups:
                 warn(implausible_result(name, groups[name]))
-        tree = _assemble(scene, groups, study.seconds, choices, missing)
+        tree = _assemble(scene, groups, study.seconds, missing)
+        tree.attrs |= study.preparation()
         _note_run_time(tree, start)
         if folder is None:
             return tree, None
@@ -139,21 +153,31 @@ def _run(
         with _beside_the_result():
             figures = []
             if scene.want.figures:
-                figures = _draw(tree, folder, progress, paper=scene.paper)
+                figures = _draw(tree, folder, progress)
                 _note_run_time(tree, start)
+                remove_old_figures(folder, figures)
                 netcdf.replace_attribute(folder / RESULT, "provenance", tree.attrs["provenance"])
-            sections = summary_parts(tree)
-            write_report(tree, folder / REPORT, figures, sections)
+            whole = summary_of(tree)
+            write_report(tree, folder / REPORT, figures, whole)
             if scene.want.datasheet:
                 tables(tree, folder / TABLES)
                 _draw_datasheet(tree, folder / DATASHEET)
         store.clear()
-    return tree, sections
+    return tree, whole
 
 
-def _check(summary: Any, workers: Any, client: Any) -> None:
+def _text(tree: xr.DataTree, whole: Summary | None, *, verbose: bool) -> str:
+    """Return the summary as text, from what the report has computed of it."""
+    if verbose:
+        return verbose_text(summary_of(tree) if whole is None else whole)
+    return screen_text(tree, None if whole is None else whole.caveats)
+
+
+def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) -> None:
     with Problems("fractalcontact.scenes.run") as problems:
         problems.boolean("summary", summary)
+        problems.boolean("verbose", verbose)
+        problems.boolean("force", force)
         if problems.integer("workers", workers, at_least=0, at_most=most_workers()) and workers:
             problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)
@@ -163,7 +187,6 @@ def _assemble(
     scene: Scene,
     results: Mapping[str, xr.Dataset],
     seconds: Mapping[str, float],
-    choices: Sequence[Choice],
     missing: list[str],
 ) -> xr.DataTree:
     """Return the finished results as a tree that states what is missing."""
@@ -181,7 +204,7 @@ def _assemble(
         "fractalcontact.scenes.run",
         {"scene": _without_folders(scene.tables)},
         title=str(scene.tables.get("title", scene.name)),
-        references=PAPER if scene.paper else OWN_REFERENCES,
+        references=OWN_REFERENCES,
         stages={
             name: {
                 "run_time": second,
@@ -192,8 +215,6 @@ def _assemble(
         },
     )
     tree.attrs = root.attrs
-    if choices:
-        tree.attrs["selected"] = "; ".join(map(str, choices))
     if missing:
         tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
     return tree
@@ -256,7 +277,7 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     first, page = of_member(tree, 0), Figure()
     with DRAWING_LOCK, netcdf.written_whole(target) as temporary:
         plotting.datasheet(first, notes=caveats(first), figure=page)
-        page.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+        page.savefig(temporary, format="pdf", metadata={"CreationDate": None, "Creator": SOFTWARE})
 
 
 @contextmanager
@@ -275,12 +296,12 @@ def _beside_the_result() -> Iterator[None]:
         ) from error
 
 
-def _draw(tree: xr.DataTree, folder: Path, progress: bool, *, paper: bool) -> list[Path]:
+def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
     """Draw the figures, note the time they took, and return their files."""
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    files = plotting.draw(tree, folder, progress=progress, paper=paper)
+    files = plotting.draw(tree, folder, progress=progress)
     entry = json.loads(tree.attrs["provenance"])
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)

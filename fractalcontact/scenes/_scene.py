@@ -75,6 +75,8 @@ class JointTable:
         Edges of the upper block, m.
     register : bool
         Bring two measured faces into mated position first.
+    turn_upper : str, optional
+        The axis about which an upper body that was scanned face up is turned over.
     options : mapping
         Arguments common to all stages.
     stages : mapping
@@ -83,6 +85,7 @@ class JointTable:
 
     block: Any = None
     register: bool = False
+    turn_upper: str | None = None
     options: Table = field(default_factory=dict)
     stages: Mapping[str, Table] = field(default_factory=dict)
 
@@ -168,7 +171,8 @@ class Scene:
     @cached_property
     def material(self) -> MaterialTable:
         """The material of both bodies."""
-        return MaterialTable(**self.table("material"))
+        table = self.table("material")  # unknown keys are reported where the scene is read
+        return MaterialTable(**{key: value for key, value in table.items() if key in MATERIAL_KEYS})
 
     @cached_property
     def joint(self) -> JointTable:
@@ -176,7 +180,8 @@ class Scene:
         table = self.table("joint")
         stages = {key: value for key, value in table.items() if isinstance(value, dict)}
         options = {key: value for key, value in table.items() if key not in stages}
-        return JointTable(options.pop("block", None), bool(options.pop("register", False)), options, stages)
+        block, turn_upper = (options.pop(key, None) for key in ("block", "turn_upper"))
+        return JointTable(block, bool(options.pop("register", False)), turn_upper, options, stages)
 
     @cached_property
     def want(self) -> WantTable:
@@ -195,9 +200,10 @@ class Scene:
         return PRESS in self.wanted("contact")
 
     @property
-    def paper(self) -> bool:
-        """Whether the study is compared with the paper of 1998 and draws its figures."""
-        return self.tables.get("paper") is True
+    def roughness_only(self) -> bool:
+        """Whether the study presses nothing, and describes the surface alone."""
+        of_surface = ("roughness_coefficient", "directional_roughness", "strength_envelope", "shear_curve")
+        return not (self.want.contact or self.want.domains or set(self.want.joints) - set(of_surface))
 
     def wanted(self, subpackage: str) -> tuple[str, ...]:
         """Return the words that `[want]` gives for a subpackage."""

@@ -16,7 +16,7 @@ import numpy as np
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.lengths import UNITS
-from fractalcontact.base.validation import NONE, Problems, did_you_mean
+from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
 from fractalcontact.scenes._plan import check_loads
 from fractalcontact.scenes._scene import (
     LOADS,
@@ -45,7 +45,7 @@ READING = (
     "read", "sample", "channel", "units", "spacing", "first_row", "columns", "plane", "level", "despike",
     "fill",
 )  # fmt: skip
-SETTINGS = ("title", "paper", "error", "budget")
+SETTINGS = ("title",)
 TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
 LONGEST_RANGE = 1_000_000
@@ -77,6 +77,16 @@ NUMBERS: dict[str, dict[str, Any]] = {
 }
 
 
+# keys that people write as the symbol of the field
+SYMBOLS = {
+    "jcs": "wall_strength",
+    "jrc": "roughness_coefficient",
+    "phi_b": "basic_friction_angle",
+    "phi_r": "residual_friction_angle",
+    "e": "young",
+    "nu": "poisson",
+    "h": "hurst",
+}
 PAIRS = ("young", "poisson")  # one value, or that of each body
 RIGID = ("delta_surface", "delta_dimension", "rigid_dilatancy", "decorrelation_length")
 
@@ -159,6 +169,9 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
     _check(scene, problems)
     if not any(argument.startswith("want") for argument in problems.arguments):
         check_loads(scene, problems)
+    problems.messages.sort(
+        key=lambda message: "an unknown key" not in message
+    )  # other problems follow from it
     return scene, problems
 
 
@@ -242,6 +255,7 @@ def _check(scene: Scene, problems: Problems) -> None:
         _check_values(scene.table("dimensions"), "dimensions", problems)
     if "joint" in scene.tables:
         problems.boolean("joint.register", scene.table("joint").get("register", False))
+        problems.choice("joint.turn_upper", scene.table("joint").get("turn_upper"), ("x", "y"), optional=True)
         _check_stages(scene.table("joint"), "joint", joint_keys(), JOINT_STAGES, problems)
     if "domains" in scene.tables:
         _check_stages(scene.table("domains"), "domains", (), DOMAIN_STAGES, problems)
@@ -249,13 +263,6 @@ def _check(scene: Scene, problems: Problems) -> None:
 
 
 def _check_settings(tables: Table, problems: Problems) -> None:
-    if "error" in tables and "budget" in tables:
-        problems.add("error / budget", "one of them", "both of them")
-    if "error" in tables:
-        problems.number("error", tables["error"], above=0, below=1)
-    if "budget" in tables:
-        problems.number("budget", tables["budget"], above=0)
-    problems.boolean("paper", tables.get("paper", False))
     title = tables.get("title", "")
     problems.require(isinstance(title, str), "title", "words", title)
 
@@ -306,9 +313,13 @@ def _check_material(table: Table, problems: Problems) -> None:
 
 
 def joint_keys() -> tuple[str, ...]:
-    """Return the keys of `[joint]`: the block, `register`, and the arguments of all stages."""
+    """Return the keys of `[joint]`: the block, `register`, `turn_upper`, and the arguments of all stages."""
     stages = (STAGES[f"joints/{name}"] for name in JOINT_STAGES)
-    return tuple(dict.fromkeys(["block", "register", *(key for row in stages for key in row.arguments())]))
+    return tuple(
+        dict.fromkeys(
+            ["block", "register", "turn_upper", *(key for row in stages for key in row.arguments())]
+        )
+    )
 
 
 def _check_stages(
@@ -430,5 +441,16 @@ def _check_keys(
     for key in table:
         if key not in words:
             place = f"{name}.{key}" if name else key
-            hint = did_you_mean(key, (*words, *similar))
-            problems.add(place, f"one of the keys {', '.join(words) or 'none'}", f"an unknown key{hint}")
+            hint = did_you_mean(key, (*words, *similar)) or _home_of(key)
+            got = Words(f"an unknown key{hint}")
+            problems.add(place, f"one of the keys {', '.join(words) or 'none'}", got)
+
+
+def _home_of(key: str) -> str:
+    """Return the tables that a key belongs to, also one that is written as the symbol of the field."""
+    name = SYMBOLS.get(key.lower(), key)
+    homes = [f"[{row.table}]" for row in STAGES.values() if row.table and name in row.arguments()]
+    homes += ["[material]"] if name in MATERIAL_KEYS else []
+    if not homes:
+        return ""
+    return f": {name!r} belongs to {', '.join(homes[:-1])}{' or ' if homes[1:] else ''}{homes[-1]}"

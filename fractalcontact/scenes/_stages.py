@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fractalcontact.scenes import _rows
+from fractalcontact.scenes._result_tables import Rows
+
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
 PRESS, PARTIAL_SLIP = "press", "partial_slip"
@@ -58,6 +61,11 @@ class StageType:
         The map that it reads from the stage it needs.
     keeps : tuple of str
         The maps that it can store.
+    splits : tuple of str
+        Arguments whose values are computed apart, each by a call of its own (a part of the stage) that may
+        run anywhere; "step" is the path of the load, cut into sections.
+    rows : Rows, optional
+        The table of its result in the summary and the report.
     takes_surface : bool
         It describes the lower face, not the crack.
     whole_path : bool
@@ -71,6 +79,8 @@ class StageType:
     table: str = ""
     reads: str = ""
     keeps: tuple[str, ...] = ()
+    splits: tuple[str, ...] = ()
+    rows: Rows | None = None
     takes_surface: bool = False
     whole_path: bool = False
 
@@ -109,24 +119,27 @@ def _curve(method: str) -> StageType:
     return StageType(f"dimensions/{method}", _SURFACE, f"dimensions.{method}")
 
 
-def _joint(name: str, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any) -> StageType:
-    return StageType(f"joints/{name}", needs, f"joints.{function or name}", f"joint.{name}", **more)
+def _joint(
+    name: str, rows: Rows | None, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any
+) -> StageType:
+    return StageType(
+        f"joints/{name}", needs, f"joints.{function or name}", f"joint.{name}", rows=rows, **more
+    )
 
 
-def _domain(name: str, **more: Any) -> StageType:
+def _domain(name: str, rows: Rows | None = None, **more: Any) -> StageType:
     source = ("contact or joints/closure",)
-    return StageType(f"domains/{name}", source, f"domains.{name}", f"domains.{name}", reads="state", **more)
+    table = f"domains.{name}"
+    return StageType(f"domains/{name}", source, table, table, reads="state", rows=rows, **more)
 
 
 _ROWS = (
-    StageType("surfaces", (), "surfaces.read", "surface"),
+    StageType("surfaces", (), "surfaces.read", "surface", rows=_rows.surfaces),  # with its description
     StageType("surfaces/description", _SURFACE, "surfaces.describe"),
-    StageType("surfaces/texture", _SURFACE, "surfaces.texture"),
-    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions"),
+    StageType("surfaces/texture", _SURFACE, "surfaces.texture", rows=_rows.texture),
+    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions", rows=_rows.dimensions),
     _curve("spectrum"),
     _curve("variogram"),
-    _curve("madogram"),
-    _curve("second_variogram"),
     _curve("cube_counts"),
     _curve("roughness_length"),
     _curve("variation"),
@@ -134,40 +147,63 @@ _ROWS = (
     _curve("detrended_fluctuation"),
     _curve("divider"),
     _curve("covering"),
-    StageType("contact", _SURFACE, "contact.press", "contact", keeps=CONTACT_MAPS),
+    StageType(
+        "contact",
+        _SURFACE,
+        "contact.press",
+        "contact",
+        keeps=CONTACT_MAPS,
+        splits=("step",),
+        rows=_rows.contact,
+    ),
     # not below contact: its steps are others than those of the load path
-    StageType(PARTIAL_SLIP, _SURFACE, "contact.partial_slip", "contact.partial_slip", keeps=SLIP_MAPS),
-    StageType("joints/faces", _SURFACE, "joints.register", "upper"),
-    _joint("delta_surface"),
-    _joint("delta_dimension"),
-    _joint("rigid_dilatancy", function="dilatancy"),
-    _joint("closure", keeps=CONTACT_MAPS),
-    _joint("closure_laws", ("joints/closure",)),
-    _joint("elimination", function="closure"),
-    _joint("area_dimension"),
-    _joint(PARTIAL_SLIP, keeps=SLIP_MAPS),
-    _joint("elastic_dilatancy", (*_FACES, "joints/closure"), function="dilatancy"),
-    _joint("friction", ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
-    _joint("roughness_coefficient", _SURFACE, takes_surface=True),
-    _joint("directional_roughness", _SURFACE, takes_surface=True),
-    _joint("direct_shear"),
-    _joint("shear_curve", _SURFACE, takes_surface=True),
-    _joint("strength_envelope", _SURFACE, takes_surface=True),
-    _joint("self_weight"),
-    _joint("decorrelation_length"),
-    _joint("transmissivity", ("joints/closure",), reads="gap"),
-    _joint("uplift", ("joints/closure",), reads="gap"),
-    _domain("box_dimension"),
+    StageType(
+        PARTIAL_SLIP,
+        _SURFACE,
+        "contact.partial_slip",
+        "contact.partial_slip",
+        keeps=SLIP_MAPS,
+        rows=_rows.partial_slip,
+    ),
+    StageType("joints/faces", _SURFACE, "joints.register", "upper", rows=_rows.faces),
+    _joint("delta_surface", None),
+    _joint("delta_dimension", _rows.delta_dimension),
+    _joint("rigid_dilatancy", _rows.rigid_dilatancy, function="dilatancy"),
+    _joint("closure", _rows.closure, keeps=CONTACT_MAPS, splits=("shear", "step")),
+    _joint("closure_laws", _rows.closure_laws, ("joints/closure",)),
+    _joint("elimination", _rows.elimination, function="closure", splits=("shear", "step")),
+    _joint("area_dimension", _rows.area_dimension, splits=("shear",)),
+    _joint(PARTIAL_SLIP, _rows.partial_slip, keeps=SLIP_MAPS, splits=("shear",)),
+    _joint(
+        "elastic_dilatancy",
+        _rows.elastic_dilatancy,
+        (*_FACES, "joints/closure"),
+        function="dilatancy",
+        splits=("direction", "shear"),
+    ),
+    _joint("friction", _rows.friction, ("joints/elastic_dilatancy or joints/rigid_dilatancy",)),
+    _joint("roughness_coefficient", _rows.roughness_coefficient, _SURFACE, takes_surface=True),
+    _joint("directional_roughness", _rows.directional_roughness, _SURFACE, takes_surface=True),
+    _joint("direct_shear", _rows.direct_shear, splits=("nominal_pressure",)),
+    _joint("shear_curve", _rows.shear_curve, _SURFACE, takes_surface=True),
+    _joint("strength_envelope", _rows.strength_envelope, _SURFACE, takes_surface=True),
+    _joint("self_weight", _rows.self_weight),
+    _joint("decorrelation_length", _rows.decorrelation_length),
+    _joint("transmissivity", _rows.transmissivity, ("joints/closure",), reads="gap"),
+    _joint("uplift", _rows.uplift, ("joints/closure",), reads="gap"),
+    _domain("signature", _rows.signature, whole_path=True),  # one window for all states
+    _domain("box_dimension", _rows.box_dimension),
     _domain("box_counts"),
-    _domain("minkowski_dimension"),
-    _domain("correlation_dimension"),
-    _domain("generalised_dimensions"),
-    _domain("boundary_dimension"),
-    _domain("lacunarity"),
-    _domain("islands", keeps=(ISLAND_MAP,), whole_path=True),
-    _domain("percolation"),
-    _domain("describe"),
-    _domain("evolution", whole_path=True),
+    _domain("minkowski_dimension", _rows.minkowski_dimension),
+    _domain("correlation_dimension", _rows.correlation_dimension),
+    _domain("generalised_dimensions", _rows.generalised_dimensions),
+    _domain("boundary_dimension", _rows.boundary_dimension),
+    _domain("lacunarity", _rows.lacunarity),
+    _domain("islands", _rows.islands, keeps=(ISLAND_MAP,), whole_path=True),
+    _domain("percolation", _rows.percolation),
+    _domain("hausdorff_content"),
+    _domain("describe", _rows.describe),
+    _domain("evolution", _rows.evolution, whole_path=True),
     _domain("lineage", whole_path=True),
 )
 STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}

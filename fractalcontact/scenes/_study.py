@@ -11,6 +11,7 @@ from fractalcontact.base import signals
 from fractalcontact.base.progress import track
 from fractalcontact.scenes._checkpoint import PartStore, digest
 from fractalcontact.scenes._executor import Workers, run_tasks
+from fractalcontact.scenes._inputs import plane_share
 from fractalcontact.scenes._parts import (
     PartWithReaders,
     Precomputed,
@@ -158,6 +159,22 @@ class Study:
             for stage in self.plan
             if stage.stored and stage.name in self.results
         }
+
+    def preparation(self) -> dict[str, str | float]:
+        """Return what was done to the faces, in words, and how much of the heights is a tilt."""
+        if "surfaces" not in self.results:
+            return {}
+        height, upper = self.results["surfaces"]["height"], self.results.get("joints/faces")
+        lines = [str(height.attrs.get("preparation", ""))]
+        if upper is not None:
+            lines = [line and f"lower face: {line}" for line in lines]
+            lines += [f"upper face: {upper.attrs['preparation']}"] if "preparation" in upper.attrs else []
+        facts: dict[str, str | float] = {}
+        if text := "; ".join(line for line in lines if line):
+            facts["preparation"] = text
+        if self.scene.is_pressed and height.ndim == 2:
+            facts["plane_share"] = plane_share(height)
+        return facts
 
     @property
     def seconds(self) -> dict[str, float]:

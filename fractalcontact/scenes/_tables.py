@@ -89,6 +89,8 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
     chosen = dataset[names].drop_vars(
         [name for name, coord in dataset.coords.items() if not set(coord.dims) <= set(dims)], errors="ignore"
     )
+    # a load that can be selected would be no column
+    chosen = chosen.drop_indexes([name for name in chosen.xindexes if name not in chosen.dims])
     if not dims:
         chosen = chosen.expand_dims("row")
     frame = (

@@ -20,6 +20,8 @@ JRC_LAG = 0.508e-3  # m: the interval of the readings of Tse and Cruden
 JRC_LENGTHS = 10  # least number of intervals along a surface
 LIGHT, FULL = 1e-3, 0.2  # fractions of true contact of the default loads
 PRESSURES = (1e5, 1e7)  # Pa: usual loads of a joint
+TESTED = (1e6, 3e6)  # Pa: further loads of a shear test
+TRAVEL_POINTS = 60  # of a curve of the rigid dilatancy, which costs milliseconds
 
 
 def template(
@@ -30,8 +32,12 @@ def template(
     young: float | None = None,
     poisson: float = 0.2,
     folder: str | os.PathLike[str] = ".",
+    level: int | None = None,
     despike: bool = False,
     register: bool = True,
+    turn_upper: str | None = None,
+    friction_angle: float | None = None,
+    wall_strength: float | None = None,
     **reading: Any,
 ) -> str:
     """Return a scene that answers a usual question to a measured surface.
@@ -47,10 +53,19 @@ def template(
         Young's modulus (Pa) and Poisson's ratio of both bodies, for "contact" and "joint".
     folder : path-like
         Folder of the scene; the files are named relative to it.
+    level : int, optional
+        Degree of the polynomial that is removed from a single face; 0 keeps its tilt. Default: 1, the mean
+        plane, unless the surface is periodic, or a cloud of points, which is gridded above its own plane. The
+        faces of a joint are never levelled one by one.
     despike : bool
-        Remove spikes from the surfaces before they are pressed, see `fractalcontact.surfaces.despike`.
+        Remove spikes from the surfaces, see `fractalcontact.surfaces.despike`.
     register : bool
         Of a joint: move the upper face into mated position. False: leave the faces as they were scanned.
+    turn_upper : {"x", "y"}, optional
+        Of a joint: turn an upper body that was scanned face up over about this axis.
+    friction_angle, wall_strength : float, optional
+        Of a joint: basic friction angle (degree) and compressive strength of its walls, JCS (Pa). With both
+        the scene computes the strength, by the criteria and by a shear test with wear, and the datasheet.
     **reading
         Arguments of `fractalcontact.surfaces.read` for both files: spacing, units, plane ...
 
@@ -77,6 +92,7 @@ def template(
     <BLANKLINE>
     [surface]
     read = "scan.nc"
+    level = 1
     <BLANKLINE>
     <BLANKLINE>
     """
@@ -87,19 +103,25 @@ def template(
         problems.path("folder", folder, what="the path of a folder")
         if problems.path("scan", scan):
             problems.require(Path(scan).is_file(), "scan", "an existing file", Path(scan).name)
+        problems.boolean("despike", despike)
+        problems.integer("level", level, at_least=0, at_most=2, optional=True)
+        if is_joint:
+            problems.require(level is None, "level", "a single face, not those of a joint", level)
+            problems.choice("turn_upper", turn_upper, ("x", "y"), optional=True)
+            problems.number("friction_angle", friction_angle, at_least=0, below=90, optional=True)
+            problems.number("wall_strength", wall_strength, above=0, optional=True)
         if is_pressed:
             problems.number("young", young, above=0)
-            problems.boolean("despike", despike)
             problems.boolean("register", register)
             problems.number("poisson", poisson, above=-1, at_most=0.5)
         if is_joint and problems.path("upper", upper):
             problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
     facts = _facts(scan, options)
-    prepared = {}
-    if is_pressed and despike:
-        prepared = {"despike": True, "fill": True}
-    elif is_pressed and facts["missing"]:
-        prepared = {"fill": True}
+    prepared: dict[str, Any] = {"despike": True} if despike else {}
+    if is_pressed and (despike or facts["missing"]):
+        prepared["fill"] = True
+    if not is_joint and (level is not None or not (facts["periodic"] or facts["in_plane"])):
+        prepared["level"] = 1 if level is None else level
     tables = [("surface", _file_table(scan, folder, options | prepared))]
     if is_joint:
         if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
@@ -108,9 +130,12 @@ def template(
             }
         tables.append(("upper", _file_table(str(upper), folder, options | prepared)))
     if is_pressed:
-        tables.append(("material", {"young": float(young or 0.0), "poisson": float(poisson)}))
+        angle = {} if friction_angle is None else {"basic_friction_angle": float(friction_angle)}
+        material = {"young": float(young or 0.0), "poisson": float(poisson)}
+        tables.append(("material", material | (angle if is_joint else {})))
     if is_joint:
-        tables += _joint(facts, register)
+        strength = wall_strength if friction_angle is not None else None
+        tables += _joint(facts, register, turn_upper, strength)
     else:
         tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
     files = Path(scan).name + (f" and {Path(str(upper)).name}" if is_joint else "")
@@ -125,7 +150,9 @@ def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str
     from fractalcontact import surfaces
 
     surface = surfaces.read(scan, **options)
-    if "y" not in surface.dims:
+    if "y" not in surface.dims or surface.ndim > 2:
+        if surface.ndim > 2:
+            raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
         message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
         raise InvalidInput(WHERE, [message])
     steps = [float(surface[dim][1] - surface[dim][0]) for dim in ("y", "x")]
@@ -136,6 +163,7 @@ def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str
         "extent": extent,
         "slope": float(statistics["rms_slope"]),
         "missing": bool(surface.isnull().any()),
+        "periodic": any("period" in surface[dim].attrs for dim in ("y", "x")),
         "in_plane": "gridding" in provenance_of(surface),
     }
 
@@ -173,21 +201,37 @@ def _contact(facts: Mapping[str, Any], young: Any, poisson: float) -> list[tuple
     return [("contact", {"nominal_pressure": loads}), ("want", want)]
 
 
-def _joint(facts: Mapping[str, Any], register: bool) -> list[tuple[str, dict[str, Any]]]:
+def _joint(
+    facts: Mapping[str, Any], register: bool, turn_upper: str | None, strength: float | None
+) -> list[tuple[str, dict[str, Any]]]:
     step = facts["spacing"]
     block = step * math.floor(0.6 * facts["extent"] / step)
     farthest = step * math.floor(0.15 * facts["extent"] / step)
     shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]
     joint = {"block": float(f"{block:.9g}"), "register": register, "shear": sorted(set(shears))}
+    joint |= {} if turn_upper is None else {"turn_upper": turn_upper}
     loads = {"nominal_pressure": {"first": PRESSURES[0], "last": PRESSURES[1], "count": 6}}
-    dilatancy = {"direction": ["E", "N", "W", "S"]}
-    want = {
+    travel = {"start": 0.0, "stop": _rounded(farthest), "step": _rounded(max(step, farthest / TRAVEL_POINTS))}
+    dilatancy = {"direction": ["E", "N", "W", "S"], "shear": travel}
+    want: dict[str, Any] = {
         "surfaces": ["height", "describe"],
         "joints": ["closure", "rigid_dilatancy", "transmissivity"],
         "keep": ["state"],
         "figures": True,
     }
-    return [("joint", joint), ("joint.closure", loads), ("joint.rigid_dilatancy", dilatancy), ("want", want)]
+    tables: list[tuple[str, dict[str, Any]]] = [
+        ("joint", joint),
+        ("joint.closure", loads),
+        ("joint.rigid_dilatancy", dilatancy),
+    ]
+    if strength is not None:
+        criteria = {"wall_strength": float(strength), **loads}
+        ends = [_rounded(pressure) for pressure in PRESSURES[1:] + TESTED]
+        test = {"path": _rounded(farthest), "nominal_pressure": sorted(ends), "hardness": float(strength)}
+        tables += [("joint.strength_envelope", criteria), ("joint.direct_shear", test)]
+        want["joints"] += ["strength_envelope", "direct_shear"]
+        want["datasheet"] = True
+    return [*tables, ("want", want)]
 
 
 def _rounded(value: float) -> float:

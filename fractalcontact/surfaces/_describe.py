@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.construction import make_dataset
 from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.polynomial import scaled_slopes, shifted
@@ -110,8 +109,8 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     values = {name: np.array([row[name] for row in rows]).reshape(lengths) for name in rows[0]}
     values["missing_points"] = values["missing_points"].astype(np.int64)
     by_modes = all(grid.periodic) and not np.isnan(planes).any()
-    result = make_dataset(
-        {name: (leading, value) for name, value in values.items()} | {"run_time": np.nan},  # is set later
+    result = xr.Dataset(
+        {name: (leading, value) for name, value in values.items()},
         leading_coords(surface, leading, _result_names(len(grid.shape))),
         {"derivatives": "modes" if by_modes else "differences"},
     )
@@ -126,7 +125,7 @@ def _result_names(axes: int) -> list[str]:
 
 def _explain_missing(result: xr.Dataset, planes: Array) -> None:
     """Set the attribute `reason` of every statistic that is NaN."""
-    variables = {name: result.variables[name] for name in result.data_vars if name != "run_time"}
+    variables = {name: result.variables[name] for name in result.data_vars}
     undefined = [name for name, variable in variables.items() if np.isnan(variable.values).any()]
     if not undefined:
         return

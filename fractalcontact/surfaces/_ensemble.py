@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import rng as streams
-from fractalcontact.base.memory import Estimate, Plane
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._grid_input import axis_sizes, surface_array
+from fractalcontact.surfaces._grid_input import surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -22,20 +20,6 @@ def check_ensemble(problems: Problems, members: Any, rng: Any) -> None:
     problems.integer("members", members, at_least=1, optional=True)
     with problems.collect():
         streams.generator(rng)
-
-
-def ensemble_memory(arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of the members of an ensemble: twice their heights while they are stacked."""
-    return 16.0 * math.prod(axis_sizes(arguments["shape"])) * int(arguments["members"] or 0)
-
-
-def drawing_memory(work: float) -> Estimate:
-    """Return the estimate of a generator that takes `work` bytes for each point of a member."""
-
-    def memory(_: Plane, arguments: Mapping[str, Any]) -> float:
-        return work * math.prod(axis_sizes(arguments["shape"])) + ensemble_memory(arguments)
-
-    return memory
 
 
 def draw_ensemble(
@@ -70,8 +54,12 @@ def draw_ensemble(
     if members is None:
         heights, entries = draw(stream)
     else:
-        drawn = [draw(child) for child in stream.spawn(members)]
-        heights, entries = np.stack([plane for plane, _ in drawn]), drawn[0][1]
+        drawn = map(draw, stream.spawn(members))
+        first, entries = next(drawn)
+        heights = np.empty((members, *first.shape))
+        heights[0] = first
+        for number, (plane, _) in enumerate(drawn, 1):
+            heights[number] = plane
     leading = None if members is None else {"member": None}
     surface = surface_array(heights, spacing, (periodic,) * len(spacing), leading)
     surface.attrs = {"random": record, **entries}

@@ -1,4 +1,4 @@
-"""Filling of small gaps by least bending energy."""
+"""Filling of small gaps by least bending energy, within the heights around each gap."""
 
 from __future__ import annotations
 
@@ -65,9 +65,12 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # no
     Notes
     -----
     The filled points minimise the bending energy of a thin plate, the sum of the squares of the second
-    differences in x, y and xy, each over its spacings; observed points do not change. A plane is continued
-    exactly, and a periodic axis across its edge. Time and memory grow with the largest gap: about 2 s for
-    one of 300 x 300 points, 10 s and 1.5 GiB for 600 x 600.
+    differences in x, y and xy, each over its spacings; observed points do not change. A plate can rise above
+    all heights around a gap, or sink below them: such a gap is filled by a stretched membrane (least sum of
+    the squares of the slopes), which cannot. So no filled height exceeds the observed ones beside its gap. A
+    plane is continued exactly, except at an edge towards which it rises or falls, and a periodic axis across
+    its edge. Time and memory grow with the largest gap: about 2 s for one of 300 x 300 points, 10 s and 1.5
+    GiB for 600 x 600.
 
     References
     ----------
@@ -104,42 +107,96 @@ def _spans_plane(observed: Array) -> bool:
 
 
 def _filled(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> Array:
-    """Return heights, shape (ny, nx) or (nx,), with NaN replaced by the minimum of the bending energy."""
+    """Return heights, shape (ny, nx) or (nx,), with NaN replaced by plates, or by membranes."""
     missing = np.isnan(heights)
     if not missing.any():
         return heights
+    values, reference, scale = shifted(heights)
+    gaps = _gaps(missing, periodic)
+    low, high = _rims(values, gaps, periodic)
+    unit = math.ldexp(1.0, math.frexp(min(spacing))[1])
+    steps = [step / unit for step in spacing]
+    plates = missing.copy()
+    while plates.any():
+        values = _least_energy(values, plates, list(_second_differences(steps)), periodic)
+        outside = plates & ((values < low) | (values > high))
+        membranes = plates & np.isin(gaps, gaps[outside])
+        if not membranes.any():
+            break
+        # the plates beside a new membrane move with it, so all are solved again
+        plates &= ~membranes
+        values = _least_energy(values, membranes, list(_first_differences(steps)), periodic)
+    result = heights.copy()
+    # a membrane exceeds its rim by rounding at most
+    result[missing] = reference + scale * np.clip(values, low, high)[missing]
+    return result
+
+
+def _gaps(missing: Array, periodic: Sequence[bool]) -> Array:
+    """Return the number of the gap at each missing point, 0 elsewhere; diagonal neighbours are of one gap."""
+    from scipy.ndimage import label
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    wrapped = np.pad(missing, [(1, 1) if wraps else (0, 0) for wraps in periodic], mode="wrap")
+    numbers, count = label(wrapped, np.ones((3,) * missing.ndim))
+    inner = numbers[tuple(slice(1, -1) if wraps else slice(None) for wraps in periodic)]
+    # a point of the border and the point that it repeats belong to one gap
+    repeated = np.pad(inner, [(1, 1) if wraps else (0, 0) for wraps in periodic], mode="wrap")
+    pairs = np.unique(np.stack([numbers[wrapped], repeated[wrapped]]), axis=1)
+    graph = coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(count + 1, count + 1))
+    return np.asarray(np.where(missing, connected_components(graph, directed=False)[1][inner] + 1, 0))
+
+
+def _rims(values: Array, gaps: Array, periodic: Sequence[bool]) -> tuple[Array, Array]:
+    """Return the lowest and the highest observed height beside the gap of each missing point."""
+    from scipy import ndimage
+
+    modes = ["wrap" if wraps else "nearest" for wraps in periodic]
+    numbers = np.arange(gaps.max() + 1)
+    observed = gaps == 0
+    low = ndimage.minimum_filter(np.where(observed, values, np.inf), 3, mode=modes)
+    high = ndimage.maximum_filter(np.where(observed, values, -np.inf), 3, mode=modes)
+    return (
+        np.asarray(ndimage.minimum(low, gaps, numbers))[gaps],
+        np.asarray(ndimage.maximum(high, gaps, numbers))[gaps],
+    )
+
+
+Stencil = tuple[tuple[tuple[int, ...], ...], tuple[float, ...]]  # offsets and weights of a difference
+
+
+def _least_energy(
+    values: Array, unknown: Array, differences: Sequence[Stencil], periodic: Sequence[bool]
+) -> Array:
+    """Return values whose unknown points minimise the sum of the squared differences."""
     from scipy.sparse.linalg import splu  # loads slowly, and few surfaces have gaps
 
-    values, reference, scale = shifted(heights)
-    values[missing] = 0.0
-    rows = _bending(missing, spacing, periodic)
-    unknown = rows[:, missing.ravel()].tocsc()
+    values = np.where(unknown, 0.0, values)
+    rows = _difference_matrix(unknown, differences, periodic)
+    columns = rows[:, unknown.ravel()].tocsc()
     # positive definite: pivoting is not needed and would add fill-in to the factors
     factors = splu(
-        (unknown.T @ unknown).tocsc(),
+        (columns.T @ columns).tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
     for _ in range(2):  # the second pass removes the rounding error of the first
-        values[missing] -= factors.solve(unknown.T @ (rows @ values.ravel()))
-    result = heights.copy()
-    result[missing] = reference + scale * values[missing]
-    return result
+        values[unknown] -= factors.solve(columns.T @ (rows @ values.ravel()))
+    return values
 
 
-def _bending(missing: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> Any:
-    """Return the second differences that involve a missing point, one in each row of a sparse matrix."""
+def _difference_matrix(unknown: Array, differences: Sequence[Stencil], periodic: Sequence[bool]) -> Any:
+    """Return the differences that involve an unknown point, one in each row of a sparse matrix."""
     from scipy.sparse import coo_array
 
-    index = np.arange(missing.size).reshape(missing.shape)
-    unit = math.ldexp(1.0, math.frexp(min(spacing))[1])
-    steps = [step / unit for step in spacing]
+    index = np.arange(unknown.size).reshape(unknown.shape)
     row_parts, column_parts, weight_parts, count = [], [], [], 0
-    for offsets, weights in _stencils(steps):
+    for offsets, weights in differences:
         points = [_offset_index(index, offset, offsets, periodic) for offset in offsets]
         points = [part.ravel() for part in points]
-        involved = np.any([missing.ravel()[part] for part in points], axis=0)
+        involved = np.any([unknown.ravel()[part] for part in points], axis=0)
         number = int(np.count_nonzero(involved))
         for part, weight in zip(points, weights, strict=True):
             row_parts.append(count + np.arange(number))
@@ -147,21 +204,27 @@ def _bending(missing: Array, spacing: Sequence[float], periodic: Sequence[bool])
             weight_parts.append(np.full(number, weight))
         count += number
     entries = (np.concatenate(weight_parts), (np.concatenate(row_parts), np.concatenate(column_parts)))
-    return coo_array(entries, shape=(count, missing.size)).tocsr()
+    return coo_array(entries, shape=(count, unknown.size)).tocsr()
 
 
-Stencil = tuple[tuple[tuple[int, ...], ...], tuple[float, ...]]
-
-
-def _stencils(steps: Sequence[float]) -> Iterator[Stencil]:
-    """Yield offsets and weights of the second differences; the mixed one counts twice in the energy."""
-    axes = len(steps)
+def _first_differences(steps: Sequence[float]) -> Iterator[Stencil]:
+    """Yield the slope along each axis: their squares are the energy of a membrane."""
     for axis, step in enumerate(steps):
-        offsets = tuple(tuple(k if own == axis else 0 for own in range(axes)) for k in range(3))
+        yield tuple(_along(axis, k, len(steps)) for k in range(2)), (-1.0 / step, 1.0 / step)
+
+
+def _second_differences(steps: Sequence[float]) -> Iterator[Stencil]:
+    """Yield the second differences: their squares are the energy of a plate, the mixed one counted twice."""
+    for axis, step in enumerate(steps):
+        offsets = tuple(_along(axis, k, len(steps)) for k in range(3))
         yield offsets, (1.0 / step**2, -2.0 / step**2, 1.0 / step**2)
-    if axes == 2:
+    if len(steps) == 2:
         weight = math.sqrt(2.0) / (steps[0] * steps[1])
         yield ((0, 0), (0, 1), (1, 0), (1, 1)), (weight, -weight, -weight, weight)
+
+
+def _along(axis: int, offset: int, axes: int) -> tuple[int, ...]:
+    return tuple(offset if own == axis else 0 for own in range(axes))
 
 
 def _offset_index(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.lengths import UNITS, in_metres
-from fractalcontact.base.memory import Plane
 from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
@@ -64,17 +63,12 @@ def _check(problems: Problems, *, heights: Any, spacing: Any, periodic: Any, uni
     problems.require(valid, "periodic", expected, periodic)
 
 
-def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of the copy, twice with another unit of length."""
-    return plane.cells * (9.0 if arguments["units"] == "m" else 17.0)
-
-
 @public_result(
     title="Surface heights",
     achieved_error="exact: heights as given",
     check=_check,
     in_blocks=True,
-    memory=_memory,
+    memory=17.0,
 )
 def from_array(
     heights: Any,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.construction import make_array
 from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
@@ -91,4 +90,4 @@ def surface_array(
     coords: dict[str, Any] = plane_coords(heights.shape[len(leading) :], spacing, periodic, core)
     for (name, values), size in zip(leading.items(), heights.shape, strict=False):
         coords[name] = (name, np.arange(size) if values is None else np.asarray(values))
-    return make_array(heights, (*leading, *core), coords, "height")
+    return xr.DataArray(heights, coords, (*leading, *core), name="height")

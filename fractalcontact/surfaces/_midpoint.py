@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble, drawing_memory
+from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
 FOURNIER = (
@@ -46,7 +46,7 @@ def _check(
     title="Surface by random midpoint displacement",
     references=FOURNIER,
     check=_check,
-    memory=drawing_memory(17.0),
+    memory=17.0,
 )
 def midpoint(
     shape: Sequence[int],

@@ -16,7 +16,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
 from fractalcontact.base.validation import NONE, Problems, given_option
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble, drawing_memory
+from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import (
     axis_sizes,
     axis_spacing,
@@ -108,7 +108,7 @@ def _check_order(
     title="Self-affine surface from its power spectrum",
     references=JACOBS,
     check=_check,
-    memory=drawing_memory(17.0),
+    memory=17.0,
 )
 def spectral(
     shape: int | Sequence[int],

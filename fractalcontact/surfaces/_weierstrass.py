@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble, drawing_memory
+from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
 from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
 AUSLOOS = (
@@ -47,7 +47,7 @@ def _check(
     references=AUSLOOS,
     achieved_error="exact to rounding: the rms height and the sum of the waves",
     check=_check,
-    memory=drawing_memory(17.0),
+    memory=17.0,
 )
 def weierstrass(
     shape: int | Sequence[int],

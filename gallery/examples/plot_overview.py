@@ -31,7 +31,7 @@ overview = plt.figure(figsize=(12.4, 3.7), layout="constrained")
 left, middle, right = overview.subplots(1, 3)
 fc.plotting.surface(surface, title="rough surface", ax=left)
 fc.plotting.field(pressed["pressure"], title="contact pressure under load", ax=middle)
-fc.plotting.island_map(islands, title="islands of contact", ax=right)
+fc.plotting.field(islands["label"], title="islands of contact", ax=right)
 
 # %%
 # The picture of the first page is this figure with fewer colours.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fractalcontact.accuracy import _estimators as cramer_rao
+from fractalcontact.accuracy import _cramer_rao as cramer_rao
 
 
 def test_brownian_bound_matches_the_table():

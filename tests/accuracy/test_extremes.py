@@ -7,9 +7,7 @@ import sys
 import time
 from functools import partial
 
-import numpy as np
 import pytest
-import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact import cli
@@ -74,22 +72,6 @@ def test_stop_keeps_the_cases_that_are_done():
 def test_unknown_case_is_refused():
     with pytest.raises(InvalidInput, match="did you mean 'one cell'"):
         fc.accuracy.extremes("one cel")
-
-
-def test_worst_result_is_one_that_failed_else_the_largest_error():
-    names = ["area", "wide", "gone", "near", "far"]
-    columns = {
-        "case": ["by hand"] * 3 + ["good"] * 2,
-        "quantity": names,
-        "error": [0.5, 1.0, np.nan, 1e-9, 1e-8],
-        "passed": [False, False, True, True, True],
-        "run_time": [1.0, 2.0, 3.0, 5.0, 4.0],
-    }
-    worst = fc.accuracy.worst_results(xr.Dataset({key: ("result", v) for key, v in columns.items()}))
-    assert worst["quantity"].values[0] in ("area", "wide")
-    assert worst["quantity"].values[1] == "far"
-    assert worst["passed"].values.tolist() == [False, True]
-    assert worst["run_time"].values.tolist() == [3.0, 5.0]
 
 
 def test_command_writes_the_results(tmp_path, monkeypatch, capsys, compliance, two):

@@ -11,6 +11,7 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.file_contents import file_contents
 from fractalcontact.base.grid import plane_coords
 
 
@@ -138,9 +139,20 @@ def test_flipped_bit_of_one_number_is_found(tmp_path):
     path.write_bytes(content)
     with xr.open_dataset(path) as dataset:
         assert float(dataset["run_time"]) != 0.123456789  # the NetCDF library does not find it
-    for read in (fc.open, fc.scenes.contents):
+    for read in (fc.open, file_contents):
         with pytest.raises(UnreadableFile, match="'number.nc' is damaged"):
             read(path)
+
+
+def test_packing_of_another_file_is_refused_and_left_behind(tmp_path):
+    heights = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    for name, value in {"scale_factor": 2.0, "_FillValue": 0.0, "add_offset": 1.0}.items():
+        with pytest.raises(InvalidInput, match=f"{name}: expected values that are unpacked"):
+            fc.save(heights.assign_attrs({name: value}), tmp_path / "a.nc")
+    packed = heights.copy()
+    packed.encoding = {"dtype": "int16", "scale_factor": 1e-7, "_FillValue": np.int16(-1)}
+    path = fc.save(packed, tmp_path / "b.nc")
+    np.testing.assert_array_equal(fc.open(path), heights)
 
 
 def test_file_changed_by_another_program_is_read(tmp_path, result):
@@ -175,7 +187,7 @@ THREADS = """
 import os, sys, threading
 import xarray as xr
 import fractalcontact as fc
-from fractalcontact.scenes import contents
+from fractalcontact.base.file_contents import file_contents
 
 folder = sys.argv[1]
 surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=5e-6, rng=11)
@@ -192,7 +204,7 @@ def save(number):
 
 def read(number):
     assert fc.surfaces.read(folder + "/surface.nc").equals(surface)
-    assert "joints/closure" in contents(path)
+    assert "joints/closure" in file_contents(path)
 
 def read_lazily(number):
     for column in range(20):
@@ -262,6 +274,19 @@ def test_unreadable_files_are_refused(tmp_path, result):
     (tmp_path / "text.nc").write_text("hello")
     with pytest.raises(UnreadableFile, match="complete"):
         fc.open(tmp_path / "text.nc")
+
+
+@pytest.mark.parametrize("chunks", ["auto", 1, {"step": 1}])
+def test_words_are_opened_in_blocks(tmp_path, result, chunks):
+    """Dask cannot size words: they are read, beside numbers in blocks."""
+    pytest.importorskip("dask")
+    result["reason"] = "step", ["none", "a long reason"]
+    result = result.assign_coords(outcome=("step", ["one", "other"]))
+    path = fc.save(result, tmp_path / "words.nc")
+    opened = fc.open(path, chunks=chunks)
+    assert opened["gap"].chunks is not None
+    assert opened["reason"].chunks is None
+    xr.testing.assert_identical(opened.compute(), fc.open(path))
 
 
 def test_open_in_blocks(tmp_path):

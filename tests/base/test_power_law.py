@@ -40,3 +40,15 @@ def test_units_change_no_bit_of_a_slope(powers):
     assert other.intercept == pytest.approx(
         ours.intercept + (powers[1] - other.slope * powers[0]) * np.log(2.0), rel=1e-9
     )
+
+
+def test_values_of_rounding_beside_large_ones_do_not_overflow():
+    """As in the spectrum of a parabola: the slope is that of the values that are not rounding."""
+    scale = np.arange(1.0, 7.0)
+    value = np.array([1e-320, 5e-324, *(1e3 * scale[2:] ** 2)])
+    with np.errstate(all="raise", under="ignore"):
+        logarithm, unit = power_law.logarithm(value)
+        slope = power_law.fit_line(scale, value, weights=np.where(scale > 2, 1.0, 0.0)).slope
+    assert np.isfinite(logarithm[2:]).all()
+    np.testing.assert_allclose(logarithm[2:] + unit * np.log(2.0), np.log(value[2:]))
+    assert slope == pytest.approx(2.0)

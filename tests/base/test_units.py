@@ -8,9 +8,6 @@ from fractalcontact.base.units import (
     fixed,
     number,
     quantity_text,
-    recorded_scales,
-    replayed_scales,
-    scale_for,
 )
 
 FACTORS = {"P": 1e15, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "": 1, "m": 1e-3, "µ": 1e-6}
@@ -51,11 +48,3 @@ def test_zero_has_no_sign():
     assert fixed(0.5, 2, sign=True) == "+0.50"
     assert fixed(float("nan"), 2) == "nan"
     assert number(-0.0) == "0"
-
-
-def test_replayed_scale_does_not_follow_the_values():
-    with recorded_scales() as record:
-        assert scale_for("m", 2.0).unit == "m"
-    with replayed_scales(record):
-        assert scale_for("m", 2e-6).unit == "m"
-    assert scale_for("m", 2e-6).unit == "µm"

@@ -33,7 +33,7 @@ def total(pressed, name):
 
 def test_ball_has_the_stiffness_of_hertz_and_the_conductance_of_holm():
     closure = np.array([1e-6, 2e-6, 4e-6])
-    pressed = press(ball(), closure=closure, also=["stiffness"])
+    pressed = press(ball(), closure=closure, include=["stiffness"])
     radius = np.sqrt(closure)  # of the contact, in closed form, for a ball of radius 1 m
     np.testing.assert_allclose(total(pressed, "contact_stiffness"), 2 * radius * MODULUS, rtol=0.02)
     resistivities = 2e-8 + 5e-8
@@ -50,7 +50,7 @@ def test_stiffness_is_the_derivative_of_the_force_by_the_closure(periodic, metho
     step = 1e-5 * top
     middle = 0.6 * top
     options = {"closure": [middle - step, middle, middle + step], "method": method, "tolerance": 1e-11}
-    pressed = press(surface, also="stiffness", **options)
+    pressed = press(surface, include="stiffness", **options)
     force = pressed["nominal_pressure"].values
     slope = (force[2] - force[0]) / (2 * step)
     assert float(pressed["contact_stiffness"][1]) == pytest.approx(slope, rel=2e-4)
@@ -58,7 +58,7 @@ def test_stiffness_is_the_derivative_of_the_force_by_the_closure(periodic, metho
 
 def test_stiffness_of_unloading_where_cells_have_yielded():
     surface = wavy((32, 32))
-    options = {"hardness": 0.06 * MODULUS, "tolerance": 1e-10, "also": "stiffness"}
+    options = {"hardness": 0.06 * MODULUS, "tolerance": 1e-10, "include": "stiffness"}
     pressed = press(surface, nominal_pressure=[1e7, 1e7 - 1e3], **options)
     assert int((press(surface, nominal_pressure=1e7, hardness=0.06 * MODULUS)["state"] == 2).sum()) > 20
     secant = 1e3 / float(pressed["closure"][0] - pressed["closure"][1])
@@ -73,7 +73,7 @@ def test_bounds_of_barber():
     """
     roughness, closure = 2e-7, 3e-6
     rough = ball(roughness=roughness)
-    pressed = press(rough, closure=closure, also="stiffness")
+    pressed = press(rough, closure=closure, include="stiffness")
     start = roughness - float((rough.values + SQUARE / 2).max() + roughness)  # depth of the highest point
     force, stiffness = float(pressed["normal_force"][0]), float(total(pressed, "contact_stiffness")[0])
 
@@ -94,7 +94,7 @@ def test_bounds_of_barber():
 
 def test_complete_contact_and_no_contact():
     surface = wavy()
-    pressed = press(surface, nominal_pressure=[0.0, 1e7, 1e9], also=["stiffness", "pressure_distribution"])
+    pressed = press(surface, nominal_pressure=[0.0, 1e7, 1e9], include=["stiffness", "pressure_distribution"])
     stiffness = pressed["contact_stiffness"].values
     assert stiffness[0] == 0
     assert stiffness[1] > 0
@@ -106,7 +106,7 @@ def test_complete_contact_and_no_contact():
 
 def test_distribution_on_a_ball_is_that_of_hertz():
     """Area with less than x p0: pi a^2 x^2 of the contact; load: x^3."""
-    pressed = press(ball(), closure=4e-6, also="pressure_distribution").isel(step=0)
+    pressed = press(ball(), closure=4e-6, include="pressure_distribution").isel(step=0)
     assert float(pressed["maximum_pressure"]) == pytest.approx(2 * MODULUS * 2e-3 / math.pi, rel=0.01)
     upper = pressed["pressure_class"].values + 0.01
     area = pressed["area_share"].cumsum().values * float(pressed["nominal_area"])
@@ -120,7 +120,7 @@ def test_distribution_in_complete_contact_is_that_of_persson():
     surface = wavy((128, 128), rolloff=1.6e-3)
     slope = math.sqrt(2 * float(fc.contact.theories(surface, contact_modulus=1.0, nominal_pressure=1.0).m2))
     spread, mean = MODULUS * slope / 2, 6 * MODULUS * slope / 2
-    pressed = press(surface, nominal_pressure=mean, also="pressure_distribution").isel(step=0)
+    pressed = press(surface, nominal_pressure=mean, include="pressure_distribution").isel(step=0)
     assert float(pressed["contact_fraction"]) == 1
     pressure = pressed["pressure_class"].values * float(pressed["maximum_pressure"])
     share = pressed["area_share"].values
@@ -132,7 +132,7 @@ def test_distribution_in_complete_contact_is_that_of_persson():
 
 
 def test_distribution_adds_up_to_the_nominal_pressure_and_the_contact():
-    pressed = press(wavy(), nominal_pressure=[1e6, 1e7], also="pressure_distribution", keep="pressure")
+    pressed = press(wavy(), nominal_pressure=[1e6, 1e7], include="pressure_distribution", keep="pressure")
     area, classes = pressed["area_share"], pressed["pressure_class"]
     np.testing.assert_allclose(area.sum("pressure_class"), pressed["contact_fraction"], rtol=1e-12)
     np.testing.assert_allclose(pressed["load_share"].sum("pressure_class"), 1.0, rtol=1e-12)
@@ -144,12 +144,12 @@ def test_distribution_adds_up_to_the_nominal_pressure_and_the_contact():
 
 def test_nothing_more_is_computed_unless_asked_for():
     surface = wavy()
-    plain, more = (press(surface, nominal_pressure=[1e6, 1e7], also=also) for also in ((), ["stiffness"]))
+    plain, more = (press(surface, nominal_pressure=[1e6, 1e7], include=also) for also in ((), ["stiffness"]))
     assert not {"contact_stiffness", "maximum_pressure", "pressure_class"} & set(plain.variables)
     for name in ("closure", "contact_fraction", "transforms", "iterations"):
         np.testing.assert_array_equal(plain[name], more[name])
 
 
 def test_unknown_word_is_refused():
-    with pytest.raises(ValueError, match="also: expected any of"):
-        press(wavy(), nominal_pressure=1e6, also="stifness")
+    with pytest.raises(ValueError, match="include: expected any of"):
+        press(wavy(), nominal_pressure=1e6, include="stifness")

@@ -46,7 +46,7 @@ def corner_operator(spacing, contact, poisson):
 @pytest.mark.parametrize(("periodic", "influence"), [(True, "spectral"), (False, "disc"), (False, "square")])
 def test_full_is_the_superposition_without_poisson_effect(periodic, influence):
     forces = [0.1, 0.3, -0.1, 0.2]
-    given = {"poisson": 0.0, "azimuth": 25.0, "tolerance": 1e-10, "influence": influence}
+    given = {"poisson": 0.0, "direction": 25.0, "tolerance": 1e-10, "influence": influence}
     simple, full = (
         sheared(rough(periodic=periodic), forces, method=method, **given)
         for method in ("superposition", "full")
@@ -148,8 +148,8 @@ def test_full_against_dense_operator(poisson, periodic):
 def test_full_rotates_with_the_surface(periodic):
     surface = rough(32, periodic=periodic)
     turned = fc.surfaces.from_array(np.rot90(surface.values, -1), 1e-5, periodic=periodic)
-    one = sheared(surface, [0.2, -0.1], azimuth=30.0, method="full", tolerance=1e-10)
-    other = sheared(turned, [0.2, -0.1], azimuth=120.0, method="full", tolerance=1e-10)
+    one = sheared(surface, [0.2, -0.1], direction=30.0, method="full", tolerance=1e-10)
+    other = sheared(turned, [0.2, -0.1], direction=120.0, method="full", tolerance=1e-10)
     for name in ("tangential_displacement", "dissipated_energy"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-5)
     x, y = (np.rot90(one[name].values, -1, axes=(1, 2)) for name in ("traction_x", "traction_y"))
@@ -337,7 +337,7 @@ def test_tamaas(direction):
     result = sheared(
         surface,
         shear * (n * spacing) ** 2,
-        azimuth=0 if direction == "x" else 90,
+        direction=0 if direction == "x" else 90,
         nominal_pressure=pressure,
         poisson=0.5,
         method="full",

@@ -8,7 +8,8 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.contact import ContactOptions, LoadPath
+from fractalcontact.base.grid import read_grid
+from fractalcontact.contact.solver import ContactOptions, LoadPath, solve
 
 MODULUS = 1e9
 
@@ -21,21 +22,24 @@ def free(n=24):
     return fc.surfaces.from_array(rough(n).values, 1e-4)
 
 
-def test_keywords_reproduce_the_call():
-    options = ContactOptions(influence="square", tolerance=1e-10, hardness=5e8)
-    load = LoadPath("nominal_pressure", [1e6, 2e6])
-    assert load.keywords() == {"nominal_pressure": (1e6, 2e6)}
-    direct = fc.contact.press(
-        free(),
-        contact_modulus=MODULUS,
-        influence="square",
-        tolerance=1e-10,
-        hardness=5e8,
-        nominal_pressure=[1e6, 2e6],
+def test_solver_on_arrays_is_press():
+    given = {"influence": "square", "tolerance": 1e-10, "hardness": 5e8}
+    labelled = fc.contact.press(
+        free(), contact_modulus=MODULUS, nominal_pressure=[1e6, 2e6], include="stiffness", **given
     )
-    by_keywords = fc.contact.press(free(), contact_modulus=MODULUS, **options.keywords(), **load.keywords())
-    np.testing.assert_array_equal(by_keywords["closure"], direct["closure"])
-    np.testing.assert_array_equal(by_keywords["state"], direct["state"])
+    load = LoadPath("nominal_pressure", [1e6, 2e6])
+    pressed = solve(
+        free().values,
+        read_grid(free()),
+        MODULUS,
+        ContactOptions(**given),
+        load,
+        keep=("state",),
+        include=("stiffness",),
+    )
+    for name in ("closure", "contact_stiffness", "plastic_work", "contact_fraction"):
+        np.testing.assert_array_equal(pressed.columns[name], labelled[name])
+    np.testing.assert_array_equal(pressed.maps["state"], labelled["state"])
 
 
 def test_options_are_frozen_and_comparable():

@@ -1,5 +1,6 @@
 """Partial slip: Cattaneo's ball, a dense reference, full slip, nested stick sets, rotation, bad input."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +22,7 @@ from slip_cases import (
 )
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import AnisotropyWarning, InvalidInput
 
 
 def sheared_ball(cells, shares, keep=()):
@@ -223,8 +224,8 @@ def test_cycles_repeat():
 def test_rotation_of_surface_and_force():
     surface = rough(periodic=False)
     turned = fc.surfaces.from_array(np.rot90(surface.values, -1), 1e-5)  # row 0 is the south edge
-    one = sheared(surface, [0.2, -0.1], azimuth=30.0, tolerance=1e-11)
-    other = sheared(turned, [0.2, -0.1], azimuth=120.0, tolerance=1e-11)
+    one = sheared(surface, [0.2, -0.1], direction=30.0, tolerance=1e-11)
+    other = sheared(turned, [0.2, -0.1], direction=120.0, tolerance=1e-11)
     for name in ("tangential_displacement", "dissipated_energy", "tangential_stiffness"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-6)
     np.testing.assert_array_equal(other["slip_state"], np.rot90(one["slip_state"].values, -1, axes=(1, 2)))
@@ -235,10 +236,10 @@ def test_rotation_of_surface_and_force():
 
 
 @pytest.mark.parametrize(
-    ("azimuth", "name", "sign"), [(0, "x", 1), (90, "y", 1), (180, "x", -1), (-90, "y", -1)]
+    ("direction", "name", "sign"), [(0, "x", 1), ("N", "y", 1), (180, "x", -1), (-90, "y", -1)]
 )
-def test_force_along_an_axis(azimuth, name, sign):
-    result = sheared(rough(), 0.1, azimuth=azimuth)
+def test_force_along_an_axis(direction, name, sign):
+    result = sheared(rough(), 0.1, direction=direction)
     other = {"x": "y", "y": "x"}[name]
     assert not result[f"traction_{other}"].any()
     assert float(result[f"traction_{name}"].sum()) * 1e-10 == pytest.approx(sign * 0.1)
@@ -255,6 +256,7 @@ def test_loads_given_three_ways():
             assert float(other[name].squeeze()) == pytest.approx(float(force[name].squeeze()), rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.AnisotropyWarning")  # of this surface at .5
 def test_stiffness_ratio_of_stuck_contact():
     """k_t / k_n = 2 (1 - nu)/(2 - nu)."""
     surface = rough()
@@ -332,7 +334,7 @@ def test_one_node_in_contact():
         ({"friction_coefficient": -0.1}, "friction_coefficient"),
         ({"friction_coefficient": np.nan}, "friction_coefficient"),
         ({"poisson": 0.6}, "poisson"),
-        ({"azimuth": np.nan}, "azimuth"),
+        ({"direction": np.nan}, "direction"),
         ({"method": "fast"}, "method"),
         ({"keep": ("state",)}, "keep"),
         ({"normal_force": [1.0, 2.0]}, "the normal load is constant"),
@@ -361,3 +363,41 @@ def test_bad_input_with_imposed_closure():
 def test_surface_with_gaps_is_refused():
     with pytest.raises(InvalidInput, match="surface"):
         sheared(rough(12).where(rough(12).x > 2e-5), 0.1)
+
+
+@pytest.mark.parametrize("poisson", [0.2, 0.5])
+@pytest.mark.parametrize("periodic", [True, False])
+def test_bound_of_the_superposition_under_a_lay(poisson, periodic):
+    """Across ridges the displacement is lambda times too great, along them 1 - nu/2 times the true one."""
+    x = 1e-5 * np.arange(128)
+    ridges = 1e-5 * np.cos(2 * np.pi * x / 64e-5) * np.ones((8 if periodic else 128, 1))
+    surface = fc.surfaces.from_array(ridges, 1e-5, periodic=periodic)
+    given = {"poisson": poisson, "keep": (), "normal_force": 5e5 * ridges.size * 1e-10}
+    force = 0.1 * FRICTION * given["normal_force"]
+    bounds = {"E": (2 - poisson) / (2 - 2 * poisson), "N": 1 - poisson / 2}
+    for direction, bound in bounds.items():
+        with pytest.warns(AnisotropyWarning, match="use method='full'"):
+            simple = sheared(surface, force, direction=direction, **given)
+        chosen = sheared(surface, force, direction=direction, method=None, **given)
+        full = sheared(surface, force, direction=direction, method="full", **given)
+        ratio = float(simple["tangential_displacement"][0] / full["tangential_displacement"][0])
+        np.testing.assert_array_equal(chosen["tangential_displacement"], full["tangential_displacement"])
+        assert json.loads(chosen.attrs["provenance"])["method"] == "full"
+        error = float(simple["superposition_error"])
+        if periodic:
+            assert ratio == pytest.approx(bound, rel=1e-6)
+            assert error == pytest.approx(bound - 1, rel=1e-6)
+        else:  # ridges of finite length are between
+            assert min(bound, 1) < ratio < max(bound, 1)
+            assert error == pytest.approx(ratio - 1, abs=0.25 * abs(bound - 1))
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.2])
+def test_superposition_is_the_choice_without_a_lay(poisson):
+    for surface in (ball(12), rough(64)):
+        chosen = sheared(surface, [0.1, -0.1], method=None, poisson=poisson, keep=())
+        simple = sheared(surface, [0.1, -0.1], poisson=poisson, keep=())
+        assert json.loads(chosen.attrs["provenance"])["method"] == "superposition"
+        np.testing.assert_array_equal(chosen["tangential_displacement"], simple["tangential_displacement"])
+        assert abs(float(chosen["superposition_error"])) < (0.03 if poisson else 1e-15)
+    assert float(sheared(ball(12), 0.1, keep=())["superposition_error"]) == pytest.approx(0, abs=1e-3)

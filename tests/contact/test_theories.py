@@ -231,7 +231,7 @@ def test_hertz_on_an_ellipsoid_by_the_published_table(theta):
 def test_hertz_agrees_with_the_solver_on_an_ellipsoid():
     surface, pressure = summit(10.0, 30.0), 5e4
     pressed = fc.contact.press(
-        surface, contact_modulus=MODULUS, nominal_pressure=pressure, also="stiffness"
+        surface, contact_modulus=MODULUS, nominal_pressure=pressure, include="stiffness"
     ).isel(step=0)
     found = hertz(surface, pressure).isel(step=0)
     assert float(pressed.corrected_contact_fraction) == pytest.approx(float(found.contact_fraction), rel=0.02)
@@ -296,3 +296,24 @@ def test_work_of_persson_in_complete_contact():
     stiffness = theories(waves((4, a)), pressure)["interface_stiffness"].sel(theory="persson").values
     work = np.nansum(pressure / stiffness) * (pressure[1] - pressure[0])
     assert work == pytest.approx(MODULUS * q * a**2 / 8, rel=1e-3)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_cylinder_has_no_summit(turned):
+    for n in range(16, 48):
+        heights = -((np.arange(float(n)) - n // 2) ** 2) * np.ones((n, 1)) * 1e-8
+        surface = fc.surfaces.from_array(heights.T if turned else heights, 1e-4)
+        result = fc.contact.theories(surface, contact_modulus=1e9, nominal_pressure=[1e4])
+        assert np.isnan(result["contact_fraction"].sel(theory="hertz")).all()
+        assert "no cylinder" in result["contact_fraction"].attrs["reason"]
+
+
+@pytest.mark.parametrize("exponent", range(-8, 1))
+def test_long_summits_keep_their_hertz(exponent):
+    """Down to a ratio of the curvatures of 1e-8 an ellipse is none of a cylinder."""
+    x = np.linspace(-1, 1, 41)
+    heights = -1e-6 * (x**2 + 10.0**exponent * x[:, None] ** 2)
+    result = fc.contact.theories(
+        fc.surfaces.from_array(heights, 5e-5), contact_modulus=1e9, nominal_pressure=[1e-9]
+    ).sel(theory="hertz")
+    assert float(result["contact_fraction"][0]) > 0

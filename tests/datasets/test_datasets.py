@@ -96,12 +96,12 @@ def test_land_surface_has_no_single_exponent():
     default = fc.dimensions.estimate(land).isel(method=0)
     by_octave = fc.dimensions.scaling(land).sortby("wavelength")
     assert float(default.hurst) == pytest.approx(float(by_octave.window_hurst))
-    assert default.ci_low <= max(by_octave.window_ci_low, 0.0) < by_octave.window_ci_high <= default.ci_high
-    assert "the longest run of octaves" in default.hurst.attrs["comment"]
+    assert default.ci_low <= by_octave.window_ci_low < by_octave.window_ci_high <= default.ci_high
+    assert "blur" in str(default.note.values)
+    assert "another exponent" in str(default.note.values)
     assert by_octave.ci_low[0] > 1
-    assert by_octave.ci_low[-1] < 0 < by_octave.ci_high[-1]
-    published = (0.414, 0.513)  # Huang and Turcotte (1990), of Oregon
-    assert by_octave.window_hurst < published[0] < by_octave.window_ci_high < published[1]
+    longest = by_octave.isel(wavelength=np.isfinite(by_octave.hurst.values)).isel(wavelength=-1)
+    assert longest.ci_low < 0 < longest.ci_high
 
 
 def test_unknown_sample_is_refused():
@@ -131,14 +131,6 @@ PAPER = {
 def test_scene_of_1998_has_every_part_of_the_paper():
     stages = {stage.name for stage in fc.scenes.plan(fc.scenes.load("concrete_crack_1998"))}
     assert set(PAPER) <= stages
-
-
-@pytest.mark.slow
-def test_scene_of_1998_tests_every_claim_of_the_paper():
-    tree = fc.scenes.run("concrete_crack_1998", progress=False)
-    table = fc.scenes.paper_table(tree)
-    assert "not tested" not in table
-    assert {"yes", "no"} <= {line.split()[-1] for line in table.splitlines() if line.strip()}
 
 
 @pytest.mark.parametrize("name", ["freiberg_gneiss_side_a", "freiberg_gneiss_side_b", "afm_10um_di3"])

@@ -94,7 +94,9 @@ def test_noise_of_a_tenth_of_the_variogram(hurst):
         surface.copy(data=surface.values + np.sqrt(0.05) * 1e-6 * rng.standard_normal(surface.shape))
         for surface, rng in sample((n, n), hurst, members, 2)
     )
-    result = [fc.dimensions.estimate(surface, noise=True).isel(method=0) for surface in surfaces]
+    result = [
+        fc.dimensions.estimate(surface, noise=np.sqrt(0.05) * 1e-6).isel(method=0) for surface in surfaces
+    ]
     error = np.array([float(dataset.hurst) for dataset in result]) - hurst
     least = bound(hurst, 0.1) / n
     assert abs(error.mean()) < 0.02

@@ -1,5 +1,7 @@
 """Properties that every curve over scale shares: symmetry, units, stacks, labels, files."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -14,16 +16,24 @@ def rough():
     return fc.surfaces.fbm((48, 40), (2e-3, 1e-3), hurst=0.6, rms_increment=1e-4, rng=1)
 
 
-CURVES = (
-    "spectrum",
-    "variogram",
-    "madogram",
-    "second_variogram",
-    "roughness_length",
-    "variation",
-    "cube_counts",
-    "covering",
-)
+CURVES = {
+    name: getattr(fc.dimensions, name)
+    for name in (
+        "spectrum",
+        "variogram",
+        "roughness_length",
+        "variation",
+        "cube_counts",
+        "covering",
+        "higuchi",
+        "detrended_fluctuation",
+        "divider",
+        "height_lacunarity",
+    )
+}
+CURVES["madogram"] = partial(fc.dimensions.variogram, increments="absolute")
+CURVES["second_variogram"] = partial(fc.dimensions.variogram, increments="second")
+NATURAL = ("covering", "divider")  # depend on the unit of height
 
 
 def test_mirror_changes_no_value(rough):
@@ -34,13 +44,13 @@ def test_mirror_changes_no_value(rough):
         np.testing.assert_allclose(second[value], first[value], rtol=1e-9)
 
 
-# the area of the covering depends on the unit of height
-@pytest.mark.parametrize("name", [name for name in CURVES if name != "covering"])
+@pytest.mark.parametrize("name", [name for name in CURVES if name not in NATURAL])
 def test_powers_of_two_change_no_bit(rough, name):
-    curve = getattr(fc.dimensions, name)
+    curve = CURVES[name]
     first, second = curve(rough), curve(rough * 2.0**-30)
     value = next(iter(first.data_vars))
-    power = {"cube_counts": 0, "madogram": 1, "roughness_length": 1, "variation": 1}.get(name, 2)
+    power = 0 if name in ("cube_counts", "height_lacunarity") else 1
+    power = 2 if name in ("spectrum", "variogram", "second_variogram") else power
     np.testing.assert_array_equal(first[value] * 2.0 ** (-30 * power), second[value])
     np.testing.assert_array_equal(first.local_slope.isnull(), second.local_slope.isnull())
 
@@ -48,7 +58,7 @@ def test_powers_of_two_change_no_bit(rough, name):
 @pytest.mark.parametrize("name", CURVES)
 def test_stack_equals_single_results(name):
     stack = fc.surfaces.fbm((24, 20), 1e-3, hurst=0.5, rms_increment=1e-5, members=3, rng=8)
-    curve = getattr(fc.dimensions, name)
+    curve = CURVES[name]
     complete, first = curve(stack), curve(stack.isel(member=1))
     for key in first.data_vars:
         if key != "run_time":
@@ -58,7 +68,7 @@ def test_stack_equals_single_results(name):
 
 @pytest.mark.parametrize("name", CURVES)
 def test_units_and_round_trip(rough, name, tmp_path):
-    curve = getattr(fc.dimensions, name)(rough)
+    curve = CURVES[name](rough)
     for key, variable in curve.variables.items():
         assert variable.attrs["units"] == QUANTITIES[key].units
     assert provenance_of(curve)["periodic_axes"] == "none"

@@ -136,14 +136,14 @@ def test_smooth_isotropic_surface_is_isotropic(gaps):
     assert "smoother" in result["anisotropy_ratio"].attrs["reason"]
 
 
-def test_band_limited_surface_with_gaps_widens_interval():
+def test_band_limited_surface_with_gaps_has_no_interval():
     """No waves below the grid spacing: the exponent changes with the lag, the directions do not differ."""
     surface = fc.surfaces.spectral((256, 256), SPACING, hurst=0.6, rms_height=1e-6, rng=5)
     heights = np.where(np.random.default_rng(2).random((256, 256)) < 0.1, np.nan, surface.values)
     result = fc.dimensions.directions(fc.surfaces.from_array(heights, SPACING))
     assert float(result["isotropy_p_value"]) > 0.01
-    assert "changes with the lag" in result["hurst"].attrs["reason"]
-    assert (result["ci_high"] - result["ci_low"] > 6 * result["standard_error"]).all()
+    assert "changes with the lag" in result["ci_low"].attrs["reason"]
+    assert np.isnan(result["ci_low"]).all()
 
 
 def test_dtype_and_level_do_not_matter():
@@ -218,19 +218,20 @@ def test_noise_and_blur_give_one_exponent_in_all_directions(hurst, noise, blur):
     for result in results:
         assert np.isfinite(result["isotropy_p_value"])
         assert float(result["isotropy_p_value"]) > 1e-4
-        assert np.isfinite(result["ci_low"].values).all()
         common = float(result["hurst"].median())
-        assert bool(((result["ci_low"] <= common) & (result["ci_high"] >= common)).all())
+        held = (result["ci_low"] <= common) & (result["ci_high"] >= common)
+        assert bool((held | np.isnan(result["ci_low"])).all())
 
 
 @pytest.mark.parametrize(("noise", "blur"), [(0.3, 0.0), (0.0, 0.5), (0.05, 1.0)])
-def test_blur_and_noise_are_taken_out(noise, blur):
-    """The exponent is that of the surface: with them it was .65 (noise of 0.3), .88 (blur of 0.5)."""
-    results = [fc.dimensions.directions(measured(128, 0.7, seed, noise, blur)) for seed in range(20, 28)]
-    assert np.mean([result["fitted_hurst"].mean() for result in results]) == pytest.approx(0.7, abs=0.045)
-    inside = [((r["ci_low"] <= 0.7) & (r["ci_high"] >= 0.7)).mean() for r in results]
-    assert np.mean(inside) > 0.85
-    assert sum("corrected for" in result["hurst"].attrs["reason"] for result in results) >= 6
+def test_no_interval_where_blur_or_noise_bends_the_lags(noise, blur):
+    """The exponent would be .65 (noise of 0.3), .88 (blur of 0.5), without a sign of it."""
+    for seed in range(20, 28):
+        result = fc.dimensions.directions(measured(128, 0.7, seed, noise, blur))
+        assert np.isnan(result["ci_low"]).all()
+        assert np.isnan(result["anisotropy_ratio"])
+        reason = result["ci_low"].attrs["reason"]
+        assert "give longer `scales`" in reason or "does not fit the model" in reason
 
 
 @pytest.mark.slow
@@ -344,13 +345,12 @@ def test_marks_are_taken_out_of_all_directions():
     assert "wave" in result.hurst.attrs["reason"]
 
 
-def test_intervals_hold_that_of_the_modes_where_the_lags_are_bent():
+def test_no_interval_where_the_lags_are_bent():
     """A ratio of 2 with a blur of 0.7 spacings: the lags alone have narrow intervals at other exponents."""
     stretched = fc.surfaces.fbm((140, 140), (2.0, 1.0), hurst=0.3, rms_increment=1.0, rng=7)
     blurred = gaussian_filter(stretched.values, 0.7)[6:-6, 6:-6]
     result = fc.dimensions.directions(fc.surfaces.from_array(blurred, 1.0))
-    held = (result.ci_low < 0.3) & (result.ci_high > 0.3)
-    assert (held | np.isnan(result.ci_low)).mean() > 0.7
+    assert np.isnan(result.ci_low).all()
     assert np.isnan(result.anisotropy_ratio)  # the blur makes it 1.35
-    assert "no power law" in result.anisotropy_ratio.attrs["reason"]
+    assert "give longer `scales`" in result.anisotropy_ratio.attrs["reason"]
     assert result.isotropy_p_value < 0.01

@@ -23,9 +23,11 @@ def test_dask_surface_gives_same_results(rough, monkeypatch):
     pytest.importorskip("dask")
     monkeypatch.setattr("fractalcontact.dimensions._surface_input.SLAB", 400)
     lazy = rough.chunk({"y": 7})
-    for name in ("variogram", "madogram", "second_variogram"):
-        curve = getattr(fc.dimensions, name)
-        first, second = curve(rough, max_lag=8e-3), curve(lazy, max_lag=8e-3)
+    for increments in ("square", "absolute", "second"):
+        first, second = (
+            fc.dimensions.variogram(surface, increments=increments, max_lag=8e-3) for surface in (rough, lazy)
+        )
+        name = next(iter(first.data_vars))
         np.testing.assert_allclose(second[name], first[name], rtol=1e-12)
         assert (second.pair_count == first.pair_count).all()
     tiles = [fc.dimensions.spectrum(s, tile=16).power_spectral_density for s in (rough, lazy)]
@@ -60,7 +62,7 @@ def test_invalid_arguments_of_curves(rough):
     with pytest.raises(ValueError, match="vertical_scale"):
         fc.dimensions.covering(rough, vertical_scale=-1.0)
     with pytest.raises(ValueError, match="nothing but NaN"):
-        fc.dimensions.madogram(rough * np.nan)
+        fc.dimensions.variogram(rough * np.nan, increments="absolute")
     with pytest.raises(ValueError, match="infinite"):
         fc.dimensions.cube_counts(rough.where(rough.x > 5e-3, np.inf))
 

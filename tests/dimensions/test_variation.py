@@ -33,7 +33,7 @@ def test_variation_is_mean_range_of_segments(shape, spacing):
         assert int(number) == len(ranges)
         assert float(value) == pytest.approx(np.mean(ranges), rel=1e-12)
     once, pairs_of = (
-        fc.dimensions.madogram(surface_of(heights[0], 1e-3)),
+        fc.dimensions.variogram(surface_of(heights[0], 1e-3), increments="absolute"),
         fc.dimensions.variation(surface_of(heights[0], 1e-3)),
     )
     assert float(pairs_of.variation[0]) == pytest.approx(2.0 * float(once.madogram[0]), rel=1e-12)

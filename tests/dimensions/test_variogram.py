@@ -76,13 +76,13 @@ def test_variogram_of_plane_wave_and_plane():
     np.testing.assert_allclose(tilted.local_slope[:3], 2.0, atol=0.35)
 
 
-@pytest.mark.parametrize("name", ["madogram", "second_variogram"])
+@pytest.mark.parametrize(("increments", "name"), [("absolute", "madogram"), ("second", "second_variogram")])
 @pytest.mark.parametrize("periodic", [False, True])
-def test_increments_along_axes_equal_numpy(name, periodic):
+def test_increments_along_axes_equal_numpy(increments, name, periodic):
     rng = np.random.default_rng(3)
     heights = rng.standard_normal((33, 41))
     heights[rng.random(heights.shape) < 0.05] = np.nan
-    curve = getattr(fc.dimensions, name)(surface_of(heights, 1e-3, periodic))
+    curve = fc.dimensions.variogram(surface_of(heights, 1e-3, periodic), increments=increments)
     order = 2 if name == "second_variogram" else 1
     for lag in (1, 2, 3):
         values = []
@@ -100,10 +100,10 @@ def test_increments_along_axes_equal_numpy(name, periodic):
         assert int(at.pair_count) == values.size
 
 
-@pytest.mark.parametrize("name", ["variogram", "madogram", "second_variogram"])
-def test_periodic_lags_end_at_half_period(name):
+@pytest.mark.parametrize("increments", ["square", "absolute", "second"])
+def test_periodic_lags_end_at_half_period(increments):
     surface = fc.surfaces.spectral(60, 1e-3, hurst=0.6, rms_height=1e-5, rng=3)
-    curve = getattr(fc.dimensions, name)(surface, max_lag=0.05)
+    curve = fc.dimensions.variogram(surface, increments=increments, max_lag=0.05)
     assert 0.02 < float(curve.lag.max()) <= 0.03 * (1 + 1e-9)
 
 
@@ -122,10 +122,10 @@ def test_slender_surface_uses_all_pairs():
     assert float((2 * curve.variogram * curve.pair_count).sum()) == pytest.approx(squares, rel=1e-10)
 
 
-def test_second_variogram_ignores_plane(rough):
+def test_second_differences_ignore_plane(rough):
     tilted = rough + 0.3 * rough.x - 0.2 * rough.y
     tilted.attrs = rough.attrs
-    first, second = fc.dimensions.second_variogram(rough), fc.dimensions.second_variogram(tilted)
+    first, second = (fc.dimensions.variogram(z, increments="second") for z in (rough, tilted))
     np.testing.assert_allclose(second.second_variogram, first.second_variogram, rtol=1e-8)
 
 

@@ -114,7 +114,7 @@ def test_lattice_sets_are_exact_on_their_grid(name):
     level, ratio = SIDE[name], ratio_of(name)
     scales = [ratio**k for k in range(level + 1)]
     for cover in ("minimum", "aligned"):
-        result = fc.domains.box_dimension(as_mask(lattice_set(name, level)), scales=scales, cover=cover)
+        result = fc.domains.box_dimension(as_mask(lattice_set(name, level)), box_sizes=scales, cover=cover)
         n_copies = int(GENERATORS[name].sum())
         assert np.array_equal(result.box_count, [n_copies ** (level - k) for k in range(level + 1)])
         assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-13)
@@ -124,7 +124,7 @@ def test_lattice_sets_are_exact_on_their_grid(name):
 def test_lattice_sets_off_the_grid_are_exact_at_powers_of_their_ratio(name):
     level, ratio = SIDE[name], ratio_of(name)
     plane = placed(lattice_set(name, level), 1024, np.random.default_rng(5))
-    result = fc.domains.box_dimension(as_mask(plane), scales=[ratio**k for k in range(level + 1)])
+    result = fc.domains.box_dimension(as_mask(plane), box_sizes=[ratio**k for k in range(level + 1)])
     assert float(result.box_dimension) == pytest.approx(DIMENSION[name], abs=1e-10)
 
 
@@ -242,12 +242,68 @@ def test_narrow_masks_are_nan_with_a_reason():
 def test_stack_equals_its_planes():
     rng = np.random.default_rng(7)
     planes = np.array([level_set(48, 0.8, c, rng) for c in (0.05, 0.2, 0.5)]).reshape(1, 3, 48, 48)
-    stack = fc.domains.box_dimension(as_mask(planes, dims=("seed", "step", "y", "x")))
+    stack = fc.domains.box_dimension(as_mask(planes, dims=("seed", "step", "y", "x")), window="each")
     assert stack.box_count.dims == ("seed", "step", "box_size")
     for k in range(3):
         alone = fc.domains.box_dimension(as_mask(planes[0, k]))
         for name in ("box_dimension", "ci_low", "null_dimension", "null_spread", "box_measure"):
             assert np.array_equal(stack[name].values[0, k], alone[name].values)
+
+
+def test_one_window_serves_a_stack():
+    """It ends where half of the boxes meet the islands of the fullest plane."""
+    rng = np.random.default_rng(7)
+    planes = np.array([np.zeros((256, 256)), *(level_set(256, 0.8, c, rng) for c in (0.01, 0.03, 0.06))])
+    result = fc.domains.box_dimension(as_mask(planes))
+    low, high = (np.unique(result[name].values[1:]) for name in ("window_low", "window_high"))
+    assert low.size == high.size == 1
+    assert np.isnan(result.window_low[0])
+    assert not result.is_saturated.any()
+    counts = fc.domains.box_counts(as_mask(planes), [round(high[0] / 1e-3)]).box_measure
+    assert (counts * (high / 1e-3) ** 2 / 256**2 < 0.5).all()
+    np.testing.assert_allclose(result.scale_max[1:], high.item() / 1e-3)
+
+
+def test_no_default_window_is_saturated():
+    """The steadiest slopes of all are those of saturated boxes, 2 without scatter."""
+    for count, radius in ((100, 6), (300, 3)):
+        cells = np.zeros((512, 512), bool)
+        for y, x in np.random.default_rng(1).integers(10, 500, (count, 2)):
+            rows, columns = np.ogrid[:512, :512]
+            cells |= (rows - y) ** 2 + (columns - x) ** 2 <= radius**2
+        for window in (None, "each"):
+            result = fc.domains.box_dimension(as_mask(cells), window=window)
+            assert not result.is_saturated
+            assert float(result.box_dimension) < 1.9
+            assert float(fc.domains.box_dimension(as_mask(cells)).window_high) < 0.06
+    full = fc.domains.box_dimension(as_mask(np.random.default_rng(2).random((128, 128)) < 0.4))
+    assert bool(full.is_saturated)
+
+
+def test_window_in_metres_does_not_depend_on_the_grid():
+    n = 1024
+    q = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.rfftfreq(n)[None]) * n
+    amplitude = np.where((q > 0) & (q < 32), np.maximum(q, 8.0) ** -1.8, 0)
+    draws = np.random.default_rng(1).standard_normal((n, n))
+    heights = np.fft.irfft2(amplitude * np.fft.rfft2(draws), s=(n, n))
+    cells = heights > np.quantile(heights, 0.97)
+    found = []
+    for k in (4, 2, 1):
+        mask = as_mask(cells[::k, ::k], (k / n, k / n), (True, True))
+        result = fc.domains.box_dimension(mask, window=(1 / 32, 1 / 8), cover="mean")
+        assert float(result.window_low) == pytest.approx(1 / 32)
+        assert float(result.window_high) == pytest.approx(1 / 8)
+        found.append(float(result.box_dimension))
+    assert np.ptp(found) < 0.07  # boxes of whole cells; `signature` interpolates
+
+
+def test_wrong_windows_are_refused():
+    mask = as_mask(np.ones((32, 32)))
+    for window in ("all", (1e-3,), (8e-3, 2e-3), (1e-3, 20e-3)):
+        with pytest.raises(ValueError, match="window: expected"):
+            fc.domains.box_dimension(mask, window=window)
+    with pytest.raises(ValueError, match="None beside `box_sizes`"):
+        fc.domains.box_dimension(mask, window=(2e-3, 8e-3), box_sizes=[1, 2])
 
 
 def test_transposed_and_mirrored_masks_have_the_same_counts():
@@ -324,7 +380,7 @@ def test_window_of_a_percolating_cluster_leaves_out_the_lattice():
     assert float(result.scale_max) >= 8 * float(result.scale_min)
     assert float(result.box_dimension) == pytest.approx(91 / 48, abs=0.07)
     assert float(result.ci_low) <= 91 / 48 <= float(result.ci_high)
-    small = fc.domains.box_dimension(as_mask(cells), scales=[1, 2, 3, 4, 6, 8, 9, 12, 16, 18])
+    small = fc.domains.box_dimension(as_mask(cells), box_sizes=[1, 2, 3, 4, 6, 8, 9, 12, 16, 18])
     assert float(small.box_dimension) < 91 / 48 - 0.1
     # the null of equal coverage is fitted in the same window
     inside = (result.box_size >= result.scale_min) & (result.box_size <= result.scale_max)
@@ -374,7 +430,7 @@ def test_intervals_stay_within_zero_and_two(cover):
 
 
 def test_chosen_scales_and_labels():
-    result = fc.domains.box_dimension(as_mask(lattice_set("carpet", 3)), scales=[9, 1, 3, 3])
+    result = fc.domains.box_dimension(as_mask(lattice_set("carpet", 3)), box_sizes=[9, 1, 3, 3])
     assert result.box_size.values.tolist() == [1, 3, 9]
     assert (float(result.scale_min), float(result.scale_max)) == (1, 9)
     assert result.scale_min.attrs["units"] == "1"
@@ -386,7 +442,12 @@ def test_chosen_scales_and_labels():
 def test_all_invalid_arguments_are_reported():
     mask = as_mask(np.ones((8, 8)))
     with pytest.raises(fc.base.errors.InvalidInput) as caught:
-        fc.domains.box_dimension(mask, scales=[0, 2.5, 99], cover="most", periodic=True)
+        fc.domains.box_dimension(mask, box_sizes=[0, 2.5, 99], cover="most", periodic=True)
     text = str(caught.value)
-    for word in ("cover", "periodic", "scales: expected a finite number >= 1 and <= 16", "expected integers"):
+    for word in (
+        "cover",
+        "periodic",
+        "box_sizes: expected a finite number >= 1 and <= 16",
+        "expected integers",
+    ):
         assert word in text

@@ -33,14 +33,16 @@ def test_mean_mass_matches_pairs_one_by_one(wraps):
             expected += part * pairs / observed_pairs
     expected *= valid.sum() / cells.sum()
     mask, observed = as_mask(cells, periodic=wraps), as_mask(valid, periodic=wraps)
-    result = fc.domains.correlation_dimension(mask, scales=sizes, valid=observed)
+    result = fc.domains.correlation_dimension(mask, box_sizes=sizes, valid=observed)
     assert result.mean_mass.values == pytest.approx(expected, rel=1e-13)
 
 
 def test_mean_mass_of_a_lattice():
     cells = np.zeros((48, 48))
     cells[::4, ::4] = 1
-    mass = fc.domains.correlation_dimension(as_mask(cells, periodic=(True, True)), scales=[1, 3, 7, 8, 9, 15])
+    mass = fc.domains.correlation_dimension(
+        as_mask(cells, periodic=(True, True)), box_sizes=[1, 3, 7, 8, 9, 15]
+    )
     # every fourth row and column: one cell, then a part of the outline, then 3 x 3
     assert mass.mean_mass.values == pytest.approx([1, 1, 1, 4, 9, 9])
 
@@ -54,8 +56,8 @@ def test_one_scale_gives_no_slope():
 
 
 def test_scales_must_be_integers():
-    with pytest.raises(ValueError, match="scales: expected integers, got 1.5"):
-        fc.domains.correlation_dimension(as_mask(np.ones((5, 9))), scales=[1.5])
+    with pytest.raises(ValueError, match="box_sizes: expected integers, got 1.5"):
+        fc.domains.correlation_dimension(as_mask(np.ones((5, 9))), box_sizes=[1.5])
 
 
 def test_interval_stays_within_zero_and_two():
@@ -69,4 +71,4 @@ def test_interval_stays_within_zero_and_two():
     lattice = np.zeros((48, 48))
     lattice[::4, ::4] = 1  # the mass jumps from 1 to 4 and 9: slopes above 2
     mask = as_mask(lattice, periodic=(True, True))
-    assert float(fc.domains.correlation_dimension(mask, scales=[6, 9, 10]).correlation_dimension) == 2.0
+    assert float(fc.domains.correlation_dimension(mask, box_sizes=[6, 9, 10]).correlation_dimension) == 2.0

@@ -22,9 +22,10 @@ def test_description_repeats_the_single_functions():
     for name in ("box_dimension", "null_dimension", "differs_from_random"):
         assert np.array_equal(result[name], boxes[name], equal_nan=True)
     assert np.array_equal(result.boundary_dimension_low, edge.ci_low, equal_nan=True)
-    gaps = fc.domains.lacunarity(mask, [8]).lacunarity[:, 0]
-    assert np.array_equal(result.lacunarity, gaps, equal_nan=True)
-    assert int(result.box_size) == 8
+    signature = fc.domains.signature(mask, connectivity=2)
+    for name in ("gap_size", "domain_dimension", "signature_flag", "clustering", "integral_range_low"):
+        assert np.array_equal(result[name], signature[name], equal_nan=True)
+    assert not {"side", "box_size", "radius"} & set(result.dims)
     perimeter = (
         islands.perimeter.groupby(islands.island_step).sum() if "island_step" in islands.coords else None
     )
@@ -41,4 +42,4 @@ def test_periodic_plane_may_be_declared_free():
     free = fc.domains.describe(as_mask(cells))
     for name in declared.data_vars:
         if name != "run_time":
-            assert np.array_equal(declared[name], free[name], equal_nan=True), name
+            np.testing.assert_array_equal(declared[name], free[name], err_msg=name)

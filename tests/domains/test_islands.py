@@ -110,13 +110,13 @@ def test_table_has_the_wanted_columns(monkeypatch):
 
     mask = as_mask(np.random.default_rng(9).random((2, 30, 20)) < 0.4, periodic=(True, False))
     complete = fc.domains.islands(mask, keep=()).drop_vars("run_time")
-    none = fc.domains.islands(mask, keep=(), table=()).drop_vars("run_time")
+    none = fc.domains.islands(mask, keep=(), include=()).drop_vars("run_time")
     assert none.identical(complete.drop_dims("island").assign_attrs(none.attrs))
     for columns in (["area"], ["y_max", "cells"], ["perimeter"]):
-        some = fc.domains.islands(mask, keep=(), table=columns).drop_vars("run_time")
+        some = fc.domains.islands(mask, keep=(), include=columns).drop_vars("run_time")
         assert some.identical(complete.drop_vars(set(TABLE) - set(columns)).assign_attrs(some.attrs))
-    with pytest.raises(ValueError, match="table: expected any of 'cells', 'area'"):
-        fc.domains.islands(mask, table=["hue"])
+    with pytest.raises(ValueError, match="include: expected any of 'cells', 'area'"):
+        fc.domains.islands(mask, include=["hue"])
     most = int(complete.n_islands.max())
     with monkeypatch.context() as patch:
         patch.setattr(_connected_components, "BAND_CELLS", 3 * 20)
@@ -125,7 +125,7 @@ def test_table_has_the_wanted_columns(monkeypatch):
         assert "name the columns" in few.n_islands.comment
         del few.n_islands.attrs["comment"]
         assert few.identical(complete.drop_vars(TABLE[2:]).assign_attrs(few.attrs))
-        all_of_them = fc.domains.islands(mask, keep=(), table=TABLE).drop_vars("run_time")
+        all_of_them = fc.domains.islands(mask, keep=(), include=TABLE).drop_vars("run_time")
         assert all_of_them.identical(complete.assign_attrs(all_of_them.attrs))
 
 
@@ -176,13 +176,15 @@ def test_table_of_a_stack_has_coordinates_of_the_plane():
         assert result[name].attrs["long_name"]
 
 
-def test_lengths_are_nan_without_coordinates():
+def test_lengths_are_in_cells_without_coordinates():
     mask = xr.DataArray(np.eye(5, dtype=bool), dims=("y", "x"))
     result = fc.domains.islands(mask, connectivity=2)
     assert result.cells.values.tolist() == [5]
-    assert np.isnan(result.area).all()
-    assert np.isnan(result.largest_island)
-    assert "no coordinates" in result.largest_island.attrs["comment"]
+    assert result.area.values.tolist() == [5]
+    assert float(result.largest_island) == 5
+    for name in ("area", "largest_island", "perimeter"):
+        assert result[name].attrs["units"] == "1"
+        assert result[name].attrs["comment"] == "in cells"
     assert int(fc.domains.islands(mask, connectivity=1).n_islands) == 5
     assert (
         int(fc.domains.islands(xr.where(mask, 1, 0).roll(x=1), connectivity=2, periodic=True).n_islands) == 1
@@ -223,3 +225,55 @@ def test_sizes_are_those_of_the_map(share):
     cells = np.random.default_rng(2).random((150, 170)) < share
     found = fc.domains.islands(as_mask(cells), periodic=False)
     np.testing.assert_array_equal(found.cells.values, np.bincount(found.label.values.ravel())[1:])
+
+
+SHAPES = ("orientation", "eccentricity", "gyration_radius", "solidity")
+
+
+@pytest.mark.parametrize("spacing", [(1e-3, 1e-3), (2e-3, 1e-3)])
+def test_shapes_match_scikit_image(spacing):
+    cells = level_set(80, 0.6, 0.2, np.random.default_rng(12))
+    mask = as_mask(cells, spacing)
+    result = fc.domains.islands(mask, connectivity=2, include=("cells", *SHAPES))
+    properties = measure.regionprops(measure.label(cells, connectivity=2), spacing=spacing)
+    assert result.cells.values.tolist() == [int(each.num_pixels) for each in properties]
+    expected = {name: np.array([getattr(each, name) for each in properties]) for name in SHAPES[:2]}
+    # an ellipse without a long axis has no orientation, and one of a single row has rounding alone across
+    is_long = expected["eccentricity"] > 0.1
+    difference = np.rad2deg(expected["orientation"]) - result.orientation.values
+    assert np.abs((difference[is_long] + 90) % 180 - 90).max() < 1e-6
+    np.testing.assert_allclose(result.eccentricity, expected["eccentricity"], atol=1e-6)
+    radius = [np.sqrt(np.trace(each.inertia_tensor)) for each in properties]
+    np.testing.assert_allclose(result.gyration_radius, radius, rtol=1e-9, atol=1e-12)
+    solidity = [each.num_pixels / each.image_convex.sum() for each in properties]
+    np.testing.assert_allclose(result.solidity, solidity, rtol=1e-12)
+
+
+def test_shapes_follow_islands_across_periodic_edges():
+    cells = level_set(60, 0.9, 0.1, np.random.default_rng(4))
+    at_home = as_mask(cells, periodic=(True, True))
+    moved = as_mask(np.roll(cells, (17, 31), (0, 1)), periodic=(True, True))
+    first, second = (
+        fc.domains.islands(mask, include=("cells", "perimeter", *SHAPES)) for mask in (at_home, moved)
+    )
+    assert fc.domains.islands(at_home, periodic=False, keep=()).n_islands > first.n_islands
+    for name in ("gyration_radius", "eccentricity", "solidity"):
+        np.testing.assert_allclose(np.sort(first[name]), np.sort(second[name]), rtol=1e-9, atol=1e-9)
+    band = np.zeros((12, 12), bool)
+    band[4:6] = True
+    wrapped = fc.domains.islands(as_mask(band, periodic=(True, True)), include=SHAPES)
+    assert all(np.isnan(wrapped[name]).all() for name in SHAPES)
+
+
+def test_shape_of_a_tilted_ellipse():
+    y, x = np.indices((201, 201)) - 100.0
+    along, across = (
+        x * np.cos(np.pi / 6) + y * np.sin(np.pi / 6),
+        y * np.cos(np.pi / 6) - x * np.sin(np.pi / 6),
+    )
+    ellipse = (along / 80) ** 2 + (across / 40) ** 2 <= 1
+    result = fc.domains.islands(ellipse, keep=(), include=SHAPES)
+    assert float(result.orientation[0]) == pytest.approx(60.0, abs=0.5)  # from y; 30 from x
+    assert float(result.eccentricity[0]) == pytest.approx(np.sqrt(3) / 2, abs=0.005)
+    assert float(result.gyration_radius[0]) == pytest.approx(np.hypot(80, 40) / 2, rel=0.01)
+    assert float(result.solidity[0]) > 0.97

@@ -180,7 +180,6 @@ def test_fixed_grid_lacunarity_of_lattice_sets():
         result = fc.domains.lacunarity(as_mask(lattice_set(name, level)), sizes, boxes="fixed")
         expected = (ratio**level / sizes) ** (2 - DIMENSION[name])
         assert result.lacunarity.values == pytest.approx(expected, rel=1e-12)
-        assert float(result.lacunarity_slope) == pytest.approx(DIMENSION[name] - 2, abs=1e-12)
         assert "fixed grid" in result.lacunarity.attrs["long_name"]
 
 
@@ -193,20 +192,86 @@ def test_fixed_grid_counts_fully_observed_boxes():
     assert float(result.lacunarity[0]) == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-13)
 
 
-def test_slope_area_and_normalisation():
+def test_normalisation():
     cells = np.zeros((64, 64))
     cells[::8, ::8] = 1
     result = fc.domains.lacunarity(as_mask(cells, periodic=(True, True)), [1, 2, 4, 8])
     # m^2 / r^2 up to the period m = 8
-    assert float(result.lacunarity_slope) == pytest.approx(-2.0, abs=1e-13)
-    assert float(result.lacunarity_area) == pytest.approx(np.log(8) ** 2, rel=1e-13)
     assert result.normalised_lacunarity.values == pytest.approx((64 / np.array([1, 4, 16, 64]) - 1) / 63)
-    assert result.relative_lacunarity.values == pytest.approx(
-        (result.lacunarity / result.null_lacunarity).values
-    )
+    expected = (64 / np.array([1, 4, 16, 64]) - 1) / 64 * (np.array([1, 2, 4, 8]) * 1e-3) ** 2
+    assert result.integral_range.values == pytest.approx(expected, rel=1e-12)
     full = fc.domains.lacunarity(as_mask(np.ones((16, 16))))
-    assert (float(full.lacunarity_slope), float(full.lacunarity_area)) == (0.0, 0.0)
     assert np.isnan(full.normalised_lacunarity).all()
+    assert (full.integral_range == 0).all()
+
+
+@pytest.mark.parametrize("wraps", [(False, False), ROUND])
+def test_boxes_along_one_axis_match_slow_windows(wraps):
+    cells = np.random.default_rng(1).random((30, 23)) < 0.2
+    sizes = [1, 2, 7, 16]
+    mask = as_mask(cells, periodic=wraps)
+    for boxes, lines in (("along_x", cells), ("along_y", cells.T)):
+        result = fc.domains.lacunarity(mask, sizes, boxes=boxes)
+        for size, value in zip(sizes, result.lacunarity.values, strict=True):
+            grown = np.pad(lines.astype(float), ((0, 0), (0, size - 1 if wraps[0] else 0)), mode="wrap")
+            mass = np.lib.stride_tricks.sliding_window_view(grown, size, 1).sum(-1)
+            assert value == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-13)
+        assert boxes.replace("_", " ") in result.lacunarity.attrs["long_name"]
+        assert "integral_range" not in result
+
+
+def test_stripes_have_their_lacunarity_across():
+    cells = np.zeros((32, 32), bool)
+    cells[:, ::4] = True
+    mask = as_mask(cells, periodic=ROUND)
+    along, across = (fc.domains.lacunarity(mask, [4], boxes=f"along_{axis}") for axis in "yx")
+    assert float(along.lacunarity[0]) == 4.0
+    assert float(across.lacunarity[0]) == 1.0
+
+
+@pytest.mark.parametrize("wraps", [(False, False), ROUND])
+@pytest.mark.parametrize("has_gaps", [False, True])
+def test_lacunarity_of_a_field(wraps, has_gaps):
+    rng = np.random.default_rng(2)
+    pressure = np.where(rng.random((24, 31)) < 0.3, rng.exponential(3e6, (24, 31)), 0.0)
+    valid = rng.random((24, 31)) < (0.95 if has_gaps else 2.0)
+    field = as_mask(pressure, periodic=wraps).astype(float) * pressure
+    result = fc.domains.lacunarity(field, [1, 2, 3], valid=as_mask(valid, periodic=wraps))
+    for size, value in zip([1, 2, 3], result.lacunarity.values, strict=True):
+        pad = [(0, size - 1 if wrap else 0) for wrap in wraps]
+        windows = [
+            np.lib.stride_tricks.sliding_window_view(np.pad(each, pad, mode="wrap"), (size, size))
+            for each in (pressure, valid)
+        ]
+        mass = windows[0].sum((-1, -2))[windows[1].all((-1, -2))]
+        assert value == pytest.approx((mass**2).mean() / mass.mean() ** 2, rel=1e-12)
+    seen = pressure[valid]
+    p = seen.mean() ** 2 / (seen**2).mean()
+    assert float(result.lacunarity[0]) == pytest.approx(1 / p, rel=1e-12)
+    assert float(result.normalised_lacunarity[0]) == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(ValueError, match="none negative"):
+        fc.domains.lacunarity(-field, [1, 2])
+
+
+def test_field_of_one_value_is_a_set():
+    cells = np.random.default_rng(3).random((40, 40)) < 0.2
+    mask = as_mask(cells, periodic=ROUND)
+    of_set, of_field = (fc.domains.lacunarity(each, [1, 4, 9]) for each in (mask, mask * 7e6))
+    for name in ("lacunarity", "lacunarity_low", "null_lacunarity", "integral_range", "coverage"):
+        np.testing.assert_allclose(of_field[name], of_set[name], rtol=1e-11)
+
+
+def test_intervals_hold_the_lacunarity_of_random_cells():
+    """1 + (1 - p) / (p r^2), of 40 planes of 128 x 128 at three sizes."""
+    planes = np.random.default_rng(4).random((40, 128, 128)) < 0.1
+    result = fc.domains.lacunarity(as_mask(planes, periodic=ROUND), [4, 8, 16])
+    truth = 1 + 0.9 / (0.1 * np.array([4, 8, 16]) ** 2)
+    inside = (result.lacunarity_low <= truth) & (truth <= result.lacunarity_high)
+    assert (inside.mean("step") >= 0.85).all()
+    width = np.log((result.lacunarity_high - 1) / (result.lacunarity_low - 1)).mean("step")
+    assert (width < 1.0).all()
+    fixed = fc.domains.lacunarity(as_mask(planes[:1]), [4], boxes="fixed")
+    assert np.isnan(fixed.lacunarity_low).all()
 
 
 def box_variance(covariance, r):

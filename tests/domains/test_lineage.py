@@ -48,7 +48,7 @@ def test_lineage_and_evolution_agree():
     planes = np.array([[level_set(48, 0.4, c, rng) for c in (0.2, 0.25, 0.2)] for _ in range(2)])
     mask = as_mask(planes, periodic=(True, True), dims=("shear", "step", "y", "x"))
     mask = mask.assign_coords(shear=[1e-3, 2e-3])
-    counts = fc.domains.evolution(mask, want=["changes", "islands"])
+    counts = fc.domains.evolution(mask)
     table = fc.domains.lineage(mask)
     for i, shear in enumerate(mask.shear.values):
         for step in (1, 2):

@@ -45,7 +45,7 @@ def test_dimension_falls_with_the_order_and_is_continuous_at_one():
 
 def test_cascade_by_three():
     weights = np.array([[1, 2, 1], [3, 0, 3], [1, 2, 1]]) / 14
-    result = fc.domains.generalised_dimensions(cascade(5, weights), Q, scales=[1, 3, 9, 27, 81])
+    result = fc.domains.generalised_dimensions(cascade(5, weights), Q, box_sizes=[1, 3, 9, 27, 81])
     positive = weights[weights > 0][:, None]
     tau = -np.log((positive**Q).sum(0)) / np.log(3)
     assert result.mass_exponent.values == pytest.approx(tau, abs=1e-12)
@@ -54,15 +54,15 @@ def test_cascade_by_three():
 def test_monofractal_sets_have_one_dimension():
     for name, scales in (("gasket", [1, 2, 4, 8, 16]), ("carpet", [1, 3, 9, 27])):
         level = 6 if name == "gasket" else 4
-        result = fc.domains.generalised_dimensions(as_mask(lattice_set(name, level)), scales=scales)
+        result = fc.domains.generalised_dimensions(as_mask(lattice_set(name, level)), box_sizes=scales)
         assert result.generalised_dimension.values == pytest.approx(np.full(5, DIMENSION[name]), abs=1e-13)
 
 
 def test_order_zero_is_the_aligned_box_count():
     mask = as_mask(level_set(64, 0.5, 0.1, np.random.default_rng(1)))
     scales = [1, 2, 4, 8]
-    boxes = fc.domains.box_dimension(mask, scales=scales, cover="aligned")
-    result = fc.domains.generalised_dimensions(mask, 0, scales=scales)
+    boxes = fc.domains.box_dimension(mask, box_sizes=scales, cover="aligned")
+    result = fc.domains.generalised_dimensions(mask, 0, box_sizes=scales)
     assert float(result.generalised_dimension[0]) == pytest.approx(float(boxes.box_dimension), abs=1e-13)
     assert float(result.ci_low[0]) == pytest.approx(float(boxes.ci_low), abs=1e-12)
 

@@ -18,7 +18,7 @@ def test_null_counts_match_exact_fractions():
         observed, size = ny * nx, int(rng.integers(1, min(ny, nx, 8) + 1))
         cells, region = int(rng.integers(0, observed + 1)), size**2
         mask = as_mask((rng.permutation(observed) < cells).reshape(ny, nx))
-        result = fc.domains.box_dimension(mask, scales=[size], cover="aligned")
+        result = fc.domains.box_dimension(mask, box_sizes=[size], cover="aligned")
         missed = 1.0 - float(result.null_count[0]) * region / observed
         exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
         assert missed == pytest.approx(exact, rel=1e-11, abs=1e-14)
@@ -28,7 +28,7 @@ def test_null_counts_and_spread_match_realisations():
     rng = np.random.default_rng(12)
     planes = np.array([random_null(64, 200, rng) for _ in range(400)])
     scales = [1, 2, 4, 8, 16]
-    result = fc.domains.box_dimension(as_mask(planes), scales=scales, cover="aligned")
+    result = fc.domains.box_dimension(as_mask(planes), box_sizes=scales, cover="aligned")
     measured = result.box_count.values
     error = measured.std(0) / 20
     assert np.all(np.abs(measured.mean(0) - result.null_count.values[0]) <= 4 * error + 1e-4)
@@ -74,7 +74,7 @@ def test_null_with_unobserved_cells_matches_realisations(wraps, coverage):
         plane[rng.choice(places, int(coverage * places.size), replace=False)] = True
     masks = as_mask(planes.reshape(-1, n, n), periodic=wraps)
     seen = as_mask(valid, periodic=wraps)
-    result = fc.domains.box_dimension(masks, scales=sizes, cover="mean", valid=seen)
+    result = fc.domains.box_dimension(masks, box_sizes=sizes, cover="mean", valid=seen)
     counts, null = result.box_measure.values, result.null_count.values[0]
     error = counts.std(0, ddof=1) / np.sqrt(len(counts))
     assert np.all(np.abs(counts.mean(0) - null) <= 4 * error + 1e-9)

@@ -12,23 +12,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from fuzz_calls import (
+from calls import (
     CALLS,
     LEFT_OUT,
     REFUSED,
     closed,
-    damaged_call,
     estimators,
-    fault_of,
     file,
     function_of,
     periodic,
     pressed,
     rough,
-    silently_accepted,
     slid,
-    unexplained,
 )
+from fuzz_faults import damaged_call, fault_of, silently_accepted, unexplained
 from fuzz_values import SETTINGS, VALUES
 from hypothesis import given, settings, strategies
 
@@ -39,9 +36,9 @@ QUICK, LONG = 400, 60_000
 
 
 # errors of these name what the argument stands for, the file, or the first argument, refused as it stands
-UNNAMED = (*REFUSED, "contact.LoadPath", "plotting.paper_figure", "scenes.load", "scenes.template")
+UNNAMED = (*REFUSED, "scenes.load", "scenes.template")
 # these return what a file or an argument holds
-AS_GIVEN = ("open", "scenes.reproduce", "accuracy.worst_results")
+AS_GIVEN = ("open", "scenes.reproduce")
 
 
 def check(pick):
@@ -118,7 +115,7 @@ KEPT = {
     "a Dataset as a number": ("contact.effective_modulus", "poisson", xr.Dataset, "poisson"),
     "a date as a number": ("surfaces.fbm", "lag", lambda: np.datetime64("2026-01-01"), "lag"),
     "words that are numbers": ("joints.dilatancy", "shear", lambda: ["1e-4"], "shear"),
-    "a list in itself": ("joints.size_effect", "scale", VALUES["itself"], "scale"),
+    "a list in itself": ("joints.size_effect", "size_ratio", VALUES["itself"], "size_ratio"),
     "ragged loads": ("joints.bandis_closure", "nominal_pressure", VALUES["ragged"], "nominal_pressure"),
     "masked loads": ("contact.press", "nominal_pressure", VALUES["masked array"], "nominal_pressure"),
     "members beyond memory": ("surfaces.midpoint", "members", lambda: 10**12, "memory"),
@@ -134,13 +131,13 @@ KEPT = {
     "a word as units of figures": ("plotting.draw", "units", lambda: "no", "units"),
     "an object that is no array as axes": ("plotting.curves", "axes", VALUES["class without array"], "axes"),
     "a list as axes": ("plotting.contact_area", "ax", list, "ax"),
-    "another unit in a figure": ("plotting.rigid_dilatancy", "dilatancy", lambda: slid().assign(
+    "another unit in a figure": ("plotting.dilatancy", "dilatancy", lambda: slid().assign(
         shear=slid()["shear"].assign_attrs(units="mm")), "dilatancy.shear.units"),
     "descending in a figure": ("plotting.surface", "surface", lambda: rough()[:, ::-1], "surface.x"),
     "no steps in a figure": ("plotting.closure_laws", "closure", lambda: closed().isel(step=slice(0)),
                              "closure.step"),
     "bytes as a model": ("joints.hydraulic_aperture", "model", lambda: np.void(b"abc"), "model"),
-    "a wall without strength": ("joints.bandis_aperture", "wall_strength", lambda: 5e-324, "wall_strength"),
+    "a wall without strength": ("joints.bandis_closure", "wall_strength", lambda: 5e-324, "wall_strength"),
     "a number as the file of a report": ("scenes.report", "path", lambda: 3, "path"),
     "a list as a study": ("scenes.report", "result", list, "result"),
     "a file that is missing among figures": ("scenes.report", "figures", lambda: ["nowhere.png"], "figures"),
@@ -152,7 +149,6 @@ KEPT = {
     "two fields as heights": ("plotting.surface", "surface", lambda: pressed()[["gap", "pressure"]],
                               "surface"),
     "a blur of a million kilometres": ("dimensions.estimate", "psf", lambda: 1e9, "psf"),
-    "a list as results": ("accuracy.worst_results", "results", list, "results"),
     "results without the truth": ("accuracy.summary", "results", lambda: estimators().drop_vars("bias"),
                                   "results.bias"),
     "triangles nested too deeply": ("surfaces.from_points", "triangles", VALUES["deep"], "triangles"),
@@ -213,4 +209,4 @@ def test_several_wrong_arguments_are_all_listed():
     with pytest.raises(InvalidInput) as caught:
         fc.domains.box_counts(rough().values, "x", periodic="no", valid=3, cover="y")
     named = {line.partition(":")[0] for line in caught.value.problems}
-    assert named == {"mask", "sizes", "periodic", "valid", "cover"}
+    assert named == {"mask", "box_sizes", "periodic", "valid", "cover"}

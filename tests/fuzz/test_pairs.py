@@ -7,7 +7,7 @@ import warnings
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from fuzz_calls import CALLS, REFUSED, function_of, rough
+from calls import CALLS, REFUSED, function_of, rough
 from fuzz_scenes import SCENES, toml_of
 from fuzz_values import VALUES
 

@@ -4,7 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from fuzz_calls import CALLS, fault_of, function_of
+from calls import CALLS, function_of
+from fuzz_faults import fault_of
 
 
 def parts(data):

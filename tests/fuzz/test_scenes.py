@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz_calls import rough
+from calls import rough
 from fuzz_scenes import SCENES, damaged_text, fault_of_scene, toml_of
 from fuzz_values import SETTINGS
 from hypothesis import given, settings, strategies
@@ -128,7 +128,7 @@ def test_scene_beyond_the_memory_is_planned_and_not_run(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["deep = " + "[" * 3000 + "]" * 3000, "[" + ".".join(["a"] * 3000) + "]", "budget = " + "9" * 5000],
+    ["deep = " + "[" * 3000 + "]" * 3000, "[" + ".".join(["a"] * 3000) + "]", "title = " + "9" * 5000],
 )
 def test_extreme_toml_is_refused(tmp_path, text):
     (tmp_path / "study.toml").write_text(toml_of(SCENES["roughness"]) + text + "\n", encoding="utf-8")

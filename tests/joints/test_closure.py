@@ -229,3 +229,18 @@ def test_mated_faces_have_no_slope_and_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert fc.joints.closure(crack, shear=0.0, normal_force=1.0).rms_slope.item() == 0
+
+
+@pytest.mark.parametrize("load", ["closure", "normal_force", "nominal_pressure"])
+def test_a_prescribed_load_can_be_selected(crack, tmp_path, load):
+    values = {"closure": 1e-5, "normal_force": 300.0, "nominal_pressure": 1e6 / 7}
+    path = values[load] * np.array([1.0, 2.0, 1.0])
+    result = fc.joints.closure(crack, shear=[0.0, 8e-5], **{load: path})
+    assert result[load].dims == ("step",)
+    for stored in (result, fc.open(fc.save(result, tmp_path / "closure.nc"))):
+        chosen = stored.sel(**{load: path[1]})
+        np.testing.assert_array_equal(chosen.interface_closure, result.interface_closure[:, 1])
+        assert stored.sel(**{load: path[0]}, shear=8e-5).step.values.tolist() == [0, 2]  # loaded and unloaded
+    assert "state" in result  # as `press` returns by default
+    slid = fc.joints.dilatancy(crack, shear=[0.0, 8e-5], direction="E", normal_force=[10.0, 300.0])
+    np.testing.assert_array_equal(slid.dilatancy.sel(normal_force=300), slid.dilatancy[..., 1])

@@ -27,7 +27,7 @@ def test_exponential_joint():
 def test_hyperbolic_joint():
     p = np.geomspace(1e5, 3e7, 12)
     constants = {"initial_stiffness": 20.35e9, "greatest_closure": 0.136871e-3}
-    result = fc.joints.closure_laws(law(p, fc.joints.bandis_closure(p, **constants)))
+    result = fc.joints.closure_laws(law(p, hyperbola(p, *constants.values())))
     for name, value in constants.items():
         assert result[name] == pytest.approx(value, rel=1e-6)
     assert result.hyperbolic_misfit < 1e-12

@@ -155,3 +155,25 @@ def test_incompressible_bodies_deform(make_face, rough):
         half, shear=2e-4, normal_force=10.0, tangential_force=[1.0, 2.0], friction_coefficient=0.6
     )
     assert bool(slipped["converged"].all())
+
+
+def test_one_rigid_face(make_face, rough):
+    face = make_face(1e-5 * rough((48, 48), 3), 1e-4)
+    elastic = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
+    for young in ((30e9, np.inf), (np.inf, 30e9)):
+        joint = fc.joints.Crack(face, young=young, poisson=0.2, block=3.2e-3)
+        assert joint.contact_modulus == pytest.approx(2 * elastic.contact_modulus, rel=1e-15)
+        assert joint.contact_poisson == pytest.approx(0.2, rel=1e-15)
+        assert "rigid" in repr(joint)
+    # twice the stiffness: half the closure under the same force
+    forces = [50.0, 100.0]
+    half = fc.joints.closure(joint, shear=2e-4, normal_force=np.multiply(forces, 2))
+    np.testing.assert_array_equal(
+        half.closure, fc.joints.closure(elastic, shear=2e-4, normal_force=forces).closure
+    )
+    assert pickle.loads(pickle.dumps(joint)).young == (np.inf, 30e9)
+    for young in (np.inf, (np.inf, np.inf)):
+        with pytest.raises(ValueError, match="young: expected an elastic body"):
+            fc.joints.Crack(face, young=young, poisson=0.2, block=3.2e-3)
+    with pytest.raises(ValueError, match="young"):
+        fc.joints.Crack(face, young=(-np.inf, 1e9), poisson=0.2, block=3.2e-3)

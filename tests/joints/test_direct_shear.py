@@ -148,6 +148,35 @@ def test_cycle_reverses_the_stress_and_wears_the_peak(rough_crack):
     assert 0 < second < first
 
 
+@pytest.mark.parametrize("hardness", [1e24, 1e30])
+def test_any_hardness_beyond_reach_means_no_wear(make_face, rough, hardness):
+    """The load on the contacts falls as the block turns back, whatever the hardness."""
+    face = make_face(5e-6 * rough((16, 16), 5), 1e-4, periodic=True)
+    crack = fc.joints.Crack(face, face * 0.9, young=1e9, poisson=0.25, basic_friction_angle=FRICTION)
+    hard = sheared(crack, [2e-4, 0], 2e6, hardness=hardness)
+    assert (hard.wear_depth == 0).all()
+    softer = sheared(crack, [2e-4, 0], 2e6, hardness=1e20)
+    np.testing.assert_allclose(hard.shear_stress, softer.shear_stress, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("young", "hardness", "locks"), [(3e10, 1e9, False), (1e18, 1e18, False), (1e22, 1e24, True)]
+)
+def test_normal_stress_is_met_on_slopes_that_lock(make_face, young, hardness, locks):
+    """Flanks of slope 2, beyond 90 degrees less the friction angle: all but rigid ones lock the block."""
+    x = np.arange(40) % 20
+    steep = make_face(
+        np.where(x < 5, 2.0 * x, (20 - x) * 2 / 3) * 1e-4 * np.ones((8, 1)), 1e-4, periodic=True
+    )
+    crack = fc.joints.Crack(steep, young=young, poisson=0.2, basic_friction_angle=FRICTION)
+    with pytest.warns(SmallStrainWarning):
+        test = sheared(crack, 3e-4, 1e6, hardness=hardness).isel(nominal_pressure=0)
+    is_known = np.isfinite(test.normal_stress.values)
+    assert is_known.tolist() == [True] + [not locks] * 4
+    np.testing.assert_allclose(test.normal_stress.values[is_known], 1e6, rtol=1e-3)
+    assert ("locks" in test.shear_stress.attrs.get("reason", "")) == locks
+
+
 def test_spring(rough_crack):
     stiffness = 1e11
     test = sheared(rough_crack, 4e-4, [1e6, 1e7], normal_stiffness=stiffness)

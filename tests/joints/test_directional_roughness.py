@@ -27,7 +27,7 @@ def waves():
 
 
 def test_symmetric_teeth(teeth):
-    result = fc.joints.directional_roughness(teeth, azimuth=[0, 180, 60, 90])
+    result = fc.joints.directional_roughness(teeth, direction=[0, "W", 60, "N"])
     np.testing.assert_allclose(result.area_fraction, [0.5, 0.5, 0.5, 0.0], atol=1e-12)
     oblique = np.degrees(np.arctan(np.tan(np.radians(30)) * 0.5))
     np.testing.assert_allclose(result.theta_max, [30, 30, oblique, 0], rtol=1e-9, atol=1e-9)
@@ -43,7 +43,7 @@ def test_asymmetric_teeth_are_measured_from_their_mean_plane(make_face, tilt):
     x = np.arange(101)
     height = np.minimum(x % 20, (20 - x % 20) / 3.0) + tilt * x
     result = fc.joints.directional_roughness(
-        make_face(np.broadcast_to(S * height, (8, 101)), S), azimuth=[0.0, 180.0]
+        make_face(np.broadcast_to(S * height, (8, 101)), S), direction=[0.0, 180.0]
     )
     plane = np.degrees(np.arctan(np.polyfit(x, height, 1)[0]))
     rise, fall = np.degrees(np.arctan([1 + tilt, 1 / 3 - tilt]))
@@ -73,7 +73,7 @@ def test_exact_law_gives_its_own_parameters(make_face):
     heights = np.zeros(80001)
     heights[1::2] = S * np.tan(np.random.default_rng(1).permutation(dips))
     result = fc.joints.directional_roughness(
-        make_face(np.broadcast_to(heights, (3, 80001)), S), azimuth=[0, 180]
+        make_face(np.broadcast_to(heights, (3, 80001)), S), direction=["E", "W"]
     )
     np.testing.assert_allclose(result["shape"], shape, rtol=0.03)
     np.testing.assert_allclose(result.theta_max, 40, rtol=0.02)
@@ -92,18 +92,18 @@ PEER = {
 
 
 def test_values_of_the_peer_package(make_face):
-    result = fc.joints.directional_roughness(make_face(waves(), S), azimuth=np.arange(0, 360, 45))
+    result = fc.joints.directional_roughness(make_face(waves(), S), direction=np.arange(0, 360, 45))
     for name, expected in PEER.items():
         np.testing.assert_allclose(result[name], expected, rtol=1e-3, err_msg=name)
 
 
 def test_east_and_west_differ_and_change_places_in_the_mirror(make_face):
     azimuth = np.arange(0.0, 360.0, 15.0)
-    result = fc.joints.directional_roughness(make_face(waves(), S), azimuth=azimuth)
+    result = fc.joints.directional_roughness(make_face(waves(), S), direction=azimuth)
     metric = result.roughness_metric
     assert metric.sel(azimuth=180) > 1.1 * metric.sel(azimuth=0)
     for heights, back in ((waves()[:, ::-1], 180 - azimuth), (waves().T, 90 - azimuth)):
-        mirrored = fc.joints.directional_roughness(make_face(heights, S), azimuth=back)
+        mirrored = fc.joints.directional_roughness(make_face(heights, S), direction=back)
         for name in MEASURES:
             np.testing.assert_allclose(mirrored[name], result[name], rtol=1e-9, err_msg=name)
 
@@ -111,8 +111,8 @@ def test_east_and_west_differ_and_change_places_in_the_mirror(make_face):
 def test_opposite_fractions_add_up_to_one(make_face, rough):
     azimuth = np.arange(0.0, 180.0, 20.0)
     face = make_face(1e-4 * rough((50, 70), 4), (1e-4, 2e-4))
-    there = fc.joints.directional_roughness(face, azimuth=azimuth).area_fraction
-    back = fc.joints.directional_roughness(face, azimuth=azimuth + 180).area_fraction
+    there = fc.joints.directional_roughness(face, direction=azimuth).area_fraction
+    back = fc.joints.directional_roughness(face, direction=azimuth + 180).area_fraction
     np.testing.assert_allclose(there.values + back.values, 1.0, rtol=1e-12)
 
 
@@ -127,7 +127,7 @@ def test_unit_of_length_and_origin_change_nothing(make_face, rough):
 def test_cells_beside_a_gap_are_left_out(teeth):
     holed = teeth.copy()
     holed[5:7, 40:121] = np.nan  # symmetric, so that the mean plane stays level
-    result = fc.joints.directional_roughness(holed, azimuth=[0, 180])
+    result = fc.joints.directional_roughness(holed, direction=["E", "W"])
     np.testing.assert_allclose(result.area_fraction, 0.5, rtol=1e-9)
     np.testing.assert_allclose(result.roughness_metric, 30.0, rtol=1e-9)
     sparse = teeth.where(teeth.x < teeth.x[1])
@@ -135,7 +135,15 @@ def test_cells_beside_a_gap_are_left_out(teeth):
         fc.joints.directional_roughness(sparse)
 
 
-@pytest.mark.parametrize("azimuth", ["E", [], np.nan, [[0.0, 90.0]]])
-def test_wrong_azimuth_is_refused(teeth, azimuth):
-    with pytest.raises(ValueError, match="azimuth"):
-        fc.joints.directional_roughness(teeth, azimuth=azimuth)
+@pytest.mark.parametrize("direction", ["up", [], np.nan, [[0.0, 90.0]], ["E", 0.0]])
+def test_wrong_direction_is_refused(teeth, direction):
+    with pytest.raises(ValueError, match="direction"):
+        fc.joints.directional_roughness(teeth, direction=direction)
+
+
+def test_words_and_degrees_are_the_same_directions(make_face):
+    words = fc.joints.directional_roughness(make_face(waves(), S), direction=["NE", "W", "S"])
+    degrees = fc.joints.directional_roughness(make_face(waves(), S), direction=[45, -180, 270.0])
+    np.testing.assert_array_equal(words.azimuth, [45, 180, 270])
+    for name in MEASURES:
+        np.testing.assert_array_equal(words[name], degrees[name])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import AnisotropyWarning, InvalidInput
 
 FORCE, FRICTION = 200.0, 0.7
 
@@ -37,7 +37,7 @@ def test_is_that_of_the_delta_surface(method, direction):
         friction_coefficient=FRICTION,
         normal_force=FORCE,
         tangential_force=forces,
-        azimuth={"E": 0.0, "N": 90.0}.get(direction, direction),
+        direction=direction,
         method=method,
         keep=("slip_state", "traction_x"),
     )
@@ -139,3 +139,22 @@ def test_bad_input(wrong, message):
 def test_crack_without_friction_needs_a_coefficient():
     with pytest.raises(InvalidInput, match="basic_friction_angle"):
         pushed(0.0, crack(basic_friction_angle=0.0), friction_coefficient=None)
+
+
+def test_ridged_faces_are_solved_fully():
+    """Sheared ridges touch along lines: by superposition the stiffness is off by lambda, and it says so."""
+    x = np.arange(64) * 1e-4
+    ridges = 2e-5 * (np.cos(2 * np.pi * x / 32e-4) + 0.3 * np.cos(2 * np.pi * x / 16e-4)) * np.ones((8, 1))
+    joint = fc.joints.Crack(fc.surfaces.from_array(ridges, 1e-4, periodic=True), young=30e9, poisson=0.4)
+    force = 2e6 * joint.nominal_area
+    given = {"joint": joint, "shear": [3e-4, 6e-4], "normal_force": force}
+    chosen = pushed(0.2 * FRICTION * force, **given)
+    full = pushed(0.2 * FRICTION * force, method="full", **given)
+    np.testing.assert_array_equal(chosen["slip_method"], 1)
+    np.testing.assert_array_equal(chosen["tangential_displacement"], full["tangential_displacement"])
+    with pytest.warns(AnisotropyWarning, match="use method='full'"):
+        simple = pushed(0.2 * FRICTION * force, method="superposition", **given)
+    np.testing.assert_allclose(simple["superposition_error"], 1.6 / 1.2 - 1, rtol=1e-6)
+    ratio = simple["tangential_displacement"] / full["tangential_displacement"]
+    np.testing.assert_allclose(ratio, 1.6 / 1.2, rtol=1e-5)
+    np.testing.assert_array_equal(simple["slip_method"], 0)

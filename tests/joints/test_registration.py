@@ -306,3 +306,44 @@ def test_motion_is_recovered_with_noise_and_gaps(make_face, rough, seed):
     assert 0.6 * noise * 1e-3 < result.mismatch < 1.3 * noise * 1e-3
     assert result.correlation > 0.995
     assert 0.5 < result.common_fraction < 0.75
+
+
+def test_swapped_faces_are_refused(make_face, rough):
+    lower, upper = (make_face(face, S) for face in moved_pair(rough, (3.0, -2.0), noise=0.02))
+    assert fc.joints.register(lower, upper).aperture.mean() > 0
+    with pytest.raises(ValueError, match=r"swap lower and upper.*mean aperture of -0\.0005 m"):
+        fc.joints.register(upper, lower)
+    # faces without an aperture are mated, whatever the sign of the rest
+    for rest in (1e-9, -1e-9):
+        assert fc.joints.register(lower, upper - 5e-4 + rest).converged
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_face_scanned_face_up_is_recognised_and_turned_over(make_face, rough, axis):
+    lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02)
+    turned = -upper[::-1] if axis == "x" else -upper[:, ::-1]
+    faces = make_face(lower, S), make_face(turned, S)
+    with pytest.raises(ValueError, match=f"scanned face up: it fits with turn_upper='{axis}'"):
+        fc.joints.register(*faces)
+    result = fc.joints.register(*faces, turn_upper=axis)
+    plain = fc.joints.register(faces[0], make_face(upper, S))
+    np.testing.assert_allclose(result.height, plain.height, atol=1e-12)
+    assert result.shift_x / S == pytest.approx(-2.0, abs=0.05)
+
+
+def test_faces_of_different_joints_fit_neither_way(make_face, rough):
+    faces = make_face(1e-3 * rough((80, 80), 1), S), make_face(1e-3 * rough((80, 80), 2), S)
+    with pytest.raises((ValueError, ConvergenceWarning), match="position"):
+        fc.joints.register(*faces)
+
+
+@measured
+def test_swapped_and_turned_gneiss_is_refused():
+    lower, upper = (
+        fc.surfaces.fill(fc.surfaces.read(Path(DATA) / f"freiberg_gneiss_side_{side}.npy", spacing=S))
+        for side in "ab"
+    )
+    with pytest.raises(ValueError, match="swap lower and upper"):
+        fc.joints.register(upper, lower)
+    with pytest.raises(ValueError, match="turn_upper='y'"):
+        fc.joints.register(lower, upper.copy(data=-upper.values[:, ::-1]))

@@ -48,6 +48,15 @@ def test_dilation_starts_after_three_tenths_of_the_peak(surface):
     assert curve(surface, peak).dilatancy.item() == pytest.approx(dilatancy[-1], rel=1e-3)
 
 
+def test_roughness_coefficient_takes_the_place_of_a_surface(surface):
+    displacement = np.linspace(0, 4e-3, 9)
+    own = curve(surface, displacement)
+    given = curve(None, displacement, roughness_coefficient=10.0)
+    np.testing.assert_allclose(given.shear_stress, own.shear_stress, rtol=1e-7)
+    with pytest.raises(ValueError, match="surface: expected heights, or a roughness_coefficient"):
+        curve(None, displacement)
+
+
 def test_damage_coefficient_divides_the_dilation_only(surface):
     options = {"displacement": [0.5e-3, 2e-3]}
     strong, weak = (curve(surface, **options, damage_coefficient=m) for m in (1, 2))

@@ -78,6 +78,54 @@ def test_barton_bandis_takes_the_length(surface):
     assert short == pytest.approx(plain, rel=1e-12)
 
 
+def of_barton(pressure, roughness, wall_strength, residual, **options):
+    return fc.joints.strength_envelope(
+        nominal_pressure=pressure,
+        wall_strength=wall_strength,
+        basic_friction_angle=residual,
+        roughness_coefficient=roughness,
+        **options,
+    )
+
+
+def test_joint_that_is_known_by_its_roughness_coefficient():
+    result = of_barton([0.744e6, 30e6], 10, 30e6, 26)
+    assert result.criterion.values.tolist() == ["barton_choubey"]
+    expected = [0.67121e6, 30e6 * np.tan(np.radians(26))]
+    np.testing.assert_allclose(result.shear_strength[0], expected, rtol=1e-5)
+    assert result.friction_angle[0, 0].item() == pytest.approx(42.0555, abs=1e-4)
+    assert "direction" not in result.coords
+    assert "reason" in result.asperity_angle.attrs
+
+
+def test_strength_is_positive_at_any_stress():
+    # 90 degrees where log10(JCS / sigma) = 60 / 20, far beyond the limit of 70
+    result = of_barton([1e2, 1e3, 1.01e5, 1e6], 20, 100e6, 30)
+    assert (result.shear_strength > 0).all()
+    assert result.friction_angle.max().item() == pytest.approx(70)
+    assert not result.in_range[0, :3].any()
+
+
+def test_scaled_constants_decrease_with_length():
+    sample, longer = (of_barton(1e6, 10, 50e6, 30, length=length) for length in (0.1, 1.0))
+    assert sample.scaled_roughness_coefficient.item() == pytest.approx(10)
+    assert sample.scaled_wall_strength.item() == pytest.approx(50e6)
+    assert sample.peak_displacement.item() == pytest.approx(0.914e-3, rel=1e-3)  # 0.2 mm times 100^0.33
+    assert longer.scaled_roughness_coefficient.item() == pytest.approx(10 * 10**-0.2)
+    assert longer.scaled_wall_strength.item() == pytest.approx(50e6 * 10**-0.3)
+    # the strength at the length is that of a sample with the constants of the length
+    jrc, jcs = longer.scaled_roughness_coefficient.item(), longer.scaled_wall_strength.item()
+    same = of_barton(1e6, jrc, jcs, 30).shear_strength.item()
+    assert longer.shear_strength.sel(criterion="barton_bandis").item() == pytest.approx(same, rel=1e-12)
+
+
+def test_asperity_angle_is_enough_without_a_surface():
+    result = fc.joints.strength_envelope(
+        nominal_pressure=MPA, wall_strength=100 * MPA, basic_friction_angle=30, asperity_angle=20, cohesion=0
+    )
+    assert result.criterion.values.tolist() == ["patton", "ladanyi_archambault"]
+
+
 def test_default_criteria_are_those_with_their_arguments(surface):
     options = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30}
     assert fc.joints.strength_envelope(surface, **options).criterion.values.tolist() == [
@@ -105,15 +153,42 @@ def test_xia_on_teeth_of_one_dip(make_face):
 
 
 def test_grasselli_egger_on_dips_spread_evenly(make_face):
-    # equal areas at all dips up to 10 degrees: C = 1, A0 = 1/2, and exp(-10/18) = 0.573753 at sigma_t
+    # equal areas at all dips up to 10 degrees: C = 1, A0 = 1/2, and exp(-10/4.5) = 0.108368 at sigma_t
     dips = np.radians(np.linspace(0, 10, 400))
     arch = np.concatenate([[0], np.cumsum(np.tan(np.concatenate([dips, -dips[::-1]])))]) * S
     found, _ = strength(
         make_face(arch * np.ones((4, 1)), S), "grasselli_egger", [5, 1e-9],
         residual_friction_angle=35, tensile_strength=5 * MPA,
     )  # fmt: skip
-    expected = np.tan(np.radians(35)) * np.array([5 * 1.573753, 2e-9])
+    expected = np.tan(np.radians(35)) * np.array([5 * 1.108368, 2e-9])
     np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_grasselli_egger_and_xia_have_one_exponent(surface, make_face, rough):
+    """C + 1 in place of C, and A0 in the denominator of both: worked from `directional_roughness`."""
+    face = make_face(4e-5 * rough((48, 60), 2), 1.3e-4)
+    facets = fc.joints.directional_roughness(face).isel(azimuth=0)
+    theta, share, shape = (float(facets[name]) for name in ("theta_max", "area_fraction", "shape"))
+    pressure, tensile = np.array([0.5, 2.0, 5.0]), 5.0
+    options = {"residual_friction_angle": 28, "tensile_strength": tensile * MPA}
+    found, _ = strength(face, "grasselli_egger", pressure, **options)
+    decay = np.exp(-theta / (9 * share * shape) * pressure / tensile)
+    np.testing.assert_allclose(found, pressure * np.tan(np.radians(28)) * (1 + decay), rtol=1e-12)
+    found, _ = strength(face, "xia", pressure, **options)
+    decay = np.exp(-theta / (9 * share * (shape + 1)) * pressure / tensile)
+    angle = 30 + 4 * share * theta / (shape + 1) * (1 + decay)
+    np.testing.assert_allclose(found, pressure * np.tan(np.radians(angle)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("direction", "share"), [("E", 0.27), ("W", 0.73)])
+def test_xia_is_out_of_range_far_from_one_half_of_facing_area(make_face, direction, share):
+    x = np.arange(401) % 20
+    teeth = make_face(np.where(x < 5, 3 * x, 20 - x) * 1e-4 * np.ones((5, 1)), 1e-3)
+    even = make_face(np.minimum(x, 20 - x) * 1e-4 * np.ones((5, 1)), 1e-3)
+    facets = fc.joints.directional_roughness(teeth, direction=direction)
+    assert float(facets.area_fraction[0]) == pytest.approx(share, abs=0.02)
+    assert strength(teeth, "xia", [1.0], direction=direction)[1].tolist() == [False]
+    assert strength(even, "xia", [1.0], direction=direction)[1].tolist() == [True]
 
 
 def test_xia_has_no_strength_on_a_surface_too_rough_for_it(make_face):
@@ -167,9 +242,17 @@ def test_a_plane_has_the_basic_strength(make_face):
         ({"criterion": []}, "at least one"),
         ({"nominal_pressure": 0.0}, "nominal_pressure: expected .*>= 1e-30"),
         ({"direction": "up"}, "direction"),
+        ({"surface": None}, "surface: expected heights, or"),
+        ({"surface": None, "criterion": "xia"}, "surface: expected a value, for criterion 'xia'"),
+        ({"roughness_coefficient": 30, "wall_strength": -1}, "(?s)wall_strength.*roughness_coefficient"),
     ],
 )
 def test_wrong_arguments_are_named(surface, options, message):
-    given = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30} | options
+    given = {
+        "surface": surface,
+        "nominal_pressure": MPA,
+        "wall_strength": 100 * MPA,
+        "basic_friction_angle": 30,
+    }
     with pytest.raises(ValueError, match=message):
-        fc.joints.strength_envelope(surface, **given)
+        fc.joints.strength_envelope(**given | options)

@@ -79,14 +79,17 @@ def test_local_slopes_and_null():
         },
         coords={"box_size": sizes, "box_length": ("box_size", sizes * 1e-3, {"units": "m"})},
     )
-    (ax,) = plotting.local_slopes(result)
-    lines = [line.get_ydata() for line in ax.lines]
-    for line, want in zip(lines, (1.2, 0.5, 1.5, 1.0), strict=True):
-        assert line == pytest.approx(np.full(4, want))
+    (ax,) = plotting.signature(result)
+    lines = {line.get_label(): line.get_ydata() for line in ax.lines}
+    wanted = {"contact domain, step = 0": 1.2, "random null, step = 0": 0.5,
+              "contact domain, step = 1": 1.5, "random null, step = 1": 1.0}  # fmt: skip
+    assert set(lines) == set(wanted)
+    for name, want in wanted.items():
+        assert lines[name] == pytest.approx(np.full(4, want))
     low, high = ax.get_ylim()
     assert low < 0
     assert high > 2
     steep = result.assign(local_slope=result["local_slope"] * [[1.0, 1.0, 3.5, -1.0]])
-    (ax,) = plotting.local_slopes(steep)
+    (ax,) = plotting.signature(steep)
     assert ax.get_ylim() == pytest.approx((-0.05, 2.05))  # no dimension is beyond 0 ... 2
     assert ax.texts[0].get_text().endswith("-1.5 to 5.2")

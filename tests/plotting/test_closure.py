@@ -27,7 +27,7 @@ def test_closure_fits_are_the_laws():
     p = np.geomspace(1e5, 1e7, 9)
     curves = [
         3e-5 * np.log(p / 2e3),
-        fc.joints.bandis_closure(p, initial_stiffness=2e10, greatest_closure=1e-4),
+        p * 1e-4 / (2e6 + p),
     ]
     closure = xr.Dataset(
         {"interface_closure": (("shear", "step"), np.array(curves))},
@@ -39,19 +39,19 @@ def test_closure_fits_are_the_laws():
     )
     for seat in (None, float(p[1])):
         laws = fc.joints.closure_laws(closure, seating_pressure=seat)
-        ax = plotting.closure_fits(closure, laws)
+        ax = plotting.closure_laws(closure, laws=laws)
         lines = [(line.get_xdata(), line.get_ydata(), line.get_linewidth()) for line in ax.lines]
-        for i, preferred in enumerate((1, 2)):  # exponential, then hyperbolic: after the points of the shear
-            x, y, width = lines[3 * i + preferred]
-            assert width > lines[3 * i + 3 - preferred][2]
+        for i, preferred in enumerate((0, 1)):  # exponential, then hyperbolic: after the points of all shears
+            x, y, width = lines[2 + 2 * i + preferred]
+            assert width > lines[3 + 2 * i - preferred][2]
             origin = 0.0 if seat is None else curves[i][1]
-            np.testing.assert_allclose(lines[3 * i][1], (curves[i] - origin) * 1e6, atol=1e-9)
+            np.testing.assert_allclose(lines[i][0], (curves[i] - origin) * 1e6, atol=1e-9)
             shown = slice(0 if seat is None else 2, None)
-            found = np.interp(np.log(p[shown] / 1e6), np.log(x), y)
+            found = np.interp(np.log(p[shown] / 1e6), np.log(y), x)
             np.testing.assert_allclose(found, (curves[i][shown] - origin) * 1e6, rtol=2e-3)
     render(ax.figure)
     with pytest.raises(InvalidInput, match="laws: expected 2 shears"):
-        plotting.closure_fits(closure, laws.isel(shear=[0]))
+        plotting.closure_laws(closure, laws=laws.isel(shear=[0]))
 
 
 def test_marked_points(closed):
@@ -109,7 +109,7 @@ def test_missing_variables_are_listed():
     with pytest.raises(InvalidInput, match="labelled result"):
         plotting.box_dimension([1, 2, 3])
     with pytest.raises(InvalidInput, match="one of 'E', 'N', 'W', 'S', got 'Q'"):
-        plotting.elastic_dilatancy(synthetic.dilatancy(), direction="Q")
+        plotting.dilatancy(synthetic.dilatancy(), direction="Q")
 
 
 def test_theories_beside_the_contact_area():
@@ -122,7 +122,7 @@ def test_theories_beside_the_contact_area():
             expected = theory.contact_fraction.sel(theory=name)
             assert holds(drawn(ax), expected[against], expected)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
-    assert "Bush,\nGibson,\nThomas" in named
+    assert "Bush, Gibson, Thomas" in named
     with pytest.raises(InvalidInput, match="'closure'"):
         plotting.contact_area(pressed, against="closure", theory=theory)
 

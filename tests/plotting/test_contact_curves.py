@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from plotting_figures import drawn, holds, render
 
 import fractalcontact as fc
@@ -20,7 +21,7 @@ def surface():
 
 @pytest.fixture(scope="module")
 def pressed(surface):
-    return fc.contact.press(surface, also=["stiffness", "pressure_distribution"], **LOADS)
+    return fc.contact.press(surface, include=["stiffness", "pressure_distribution"], **LOADS)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def values(ax):
 
 
 def test_mean_gap_beside_theories(pressed, theory):
-    ax = plotting.mean_gap(pressed, theory=theory)
+    ax = plotting.path(pressed, "mean_gap", against="nominal_pressure", theory=theory)
     assert ax.get_ylabel() == "mean gap (µm)"
     curves = values(ax)
     np.testing.assert_allclose(curves[0][1], pressed["mean_gap"] * 1e6)
@@ -45,7 +46,7 @@ def test_mean_gap_beside_theories(pressed, theory):
 
 
 def test_stiffness_in_the_unit_of_practice(pressed, theory):
-    ax = plotting.stiffness(pressed, theory=theory)
+    ax = plotting.path(pressed, "contact_stiffness", against="nominal_pressure", theory=theory)
     curves = values(ax)
     np.testing.assert_allclose(curves[0][0], pressed["nominal_pressure"] / 1e6)
     np.testing.assert_allclose(curves[0][1], pressed["contact_stiffness"] / 1e9)
@@ -57,7 +58,7 @@ def test_stiffness_of_closure_laws(surface):
     crack = fc.joints.Crack(surface, young=1e9, poisson=0.2)
     closed = fc.joints.closure(crack, shear=[5e-5, 1e-4], nominal_pressure=[1e5, 1e6, 3e6, 1e7])
     laws = fc.joints.closure_laws(closed)
-    curves = values(plotting.stiffness(laws))
+    curves = values(plotting.path(laws, "stiffness", against="nominal_pressure"))
     assert len(curves) == 2
     np.testing.assert_allclose(curves[1][1], laws["stiffness"].isel(shear=1) / 1e9)
 
@@ -81,14 +82,46 @@ def test_curves_are_in_a_figure_of_the_user(pressed):
 
     sheet = Figure()
     ax = sheet.add_subplot()
-    assert plotting.mean_gap(pressed, against="normal_force", ax=ax) is ax
+    assert plotting.path(pressed, "mean_gap", against="normal_force", ax=ax) is ax
     assert holds(drawn(ax), pressed["normal_force"], pressed["mean_gap"])
 
 
-@pytest.mark.parametrize("draw", [plotting.mean_gap, plotting.stiffness, plotting.pressure_distribution])
-def test_missing_variables_are_named(draw, pressed):
-    with pytest.raises(InvalidInput, match="result"):
-        draw(pressed[["residual"]])
+def test_missing_variables_are_named(pressed):
+    with pytest.raises(InvalidInput, match="result: expected the variable 'area_share'"):
+        plotting.pressure_distribution(pressed[["residual"]])
+    with pytest.raises(InvalidInput, match="result: expected the variable 'mean_gap'"):
+        plotting.path(pressed[["residual"]], "mean_gap")
+    with pytest.raises(InvalidInput, match="against: expected a variable of every step"):
+        plotting.path(pressed, "mean_gap", against="pressure_class")
+
+
+def test_any_variables_against_shear_with_an_interval():
+    shear = np.array([1e-4, 2e-4, 4e-4])
+    path = xr.Dataset(
+        {
+            name: (("shear", "step"), np.multiply.outer(shear, factors))
+            for name, factors in (
+                ("spot", [1.0, 2.0]),
+                ("reach", [3.0, 4.0]),
+                ("spot_low", [0.5, 1.0]),
+                ("spot_high", [2.0, 3.0]),
+            )
+        },
+        {"shear": ("shear", shear, {"units": "m"}), "normal_force": ("step", [10.0, 20.0], {"units": "N"})},
+    )
+    ax = plotting.path(path, ["spot", "reach"], against="shear")
+    assert ax.get_xlabel() == "shear displacement $v$ (µm)"
+    for name in ("spot", "reach"):
+        for step in range(2):
+            assert any(np.allclose(y, path[name][:, step]) for _, y in values(ax))
+    named = plotting.curves(ax)["curve"].unique().tolist()
+    assert named == [f"{name}, normal force F = {load} N" for name in ("spot", "reach") for load in (10, 20)]
+    alone = plotting.path(path.isel(step=0), "spot")  # a single curve has its band
+    (band,) = alone.collections
+    ends = band.get_paths()[0].vertices[:, 1]
+    assert (ends.min(), ends.max()) == pytest.approx((0.5e-4, 8e-4))
+    render(ax)
+    render(alone)
 
 
 @pytest.mark.parametrize("chosen", [0, slice(0)])

@@ -28,7 +28,7 @@ def test_every_figure_names_its_curves(study):
     """Every line that shows data has a name; the others are marks, limits and scale bars."""
     figures = {
         "contact_area": plotting.contact_area(study["joints/closure"]),
-        "rigid_dilatancy": plotting.rigid_dilatancy(study["joints/rigid_dilatancy"]),
+        "rigid_dilatancy": plotting.dilatancy(study["joints/rigid_dilatancy"]),
         "box_dimension": plotting.box_dimension(study["domains/box_dimension"]),
         "hydraulic_aperture": plotting.hydraulic_aperture(study["joints/transmissivity"]),
         "dimensions": plotting.dimensions(study["dimensions"]),
@@ -82,10 +82,9 @@ def test_csv_beside_the_figures(study, tmp_path):
     files = plotting.draw(tree, tmp_path, formats=["png", "csv"], units={"normal_force": "N"})
     tables = {file.stem: pd.read_csv(file) for file in files if file.suffix == ".csv"}
     assert set(tables) < {file.stem for file in files if file.suffix == ".png"}
-    assert "figure_3_closure" in tables
-    assert "figure_4_contact_domains" not in tables  # maps alone
-    loads = tables["figure_3_closure"]
-    assert set(loads.loc[loads["panel"] == "a closure laws", "y_axis"]) == {"normal force F (N)"}
+    assert "joint_closure" in tables
+    assert "joint_contact_domains" not in tables  # maps alone
+    assert set(tables["joint_closure"]["y_axis"]) == {"normal force F (N)"}
 
 
 @pytest.mark.parametrize("axes", [None, [], "closure", Figure()])

@@ -10,7 +10,7 @@ from fractalcontact.base.errors import InvalidInput
 
 def test_rigid_dilatancy_curves():
     opening = synthetic.dilatancy(forces=())
-    ax = plotting.rigid_dilatancy(opening)
+    ax = plotting.dilatancy(opening)
     for word in "ENWS":
         expected = opening.sel(direction=word)
         assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
@@ -20,7 +20,7 @@ def test_rigid_dilatancy_curves():
 
 def test_elastic_dilatancy_curves():
     opening = synthetic.dilatancy()
-    ax = plotting.elastic_dilatancy(opening, direction="N", reach=8e-4)
+    ax = plotting.dilatancy(opening, direction="N", reach=8e-4)
     expected = opening.sel(direction="N").where(opening.shear < 8.1e-4, drop=True)
     assert holds(drawn(ax), expected.shear, expected.rigid_dilatancy)
     for step in range(3):
@@ -30,12 +30,12 @@ def test_elastic_dilatancy_curves():
 
 def test_several_directions_are_refused():
     with pytest.raises(InvalidInput, match=r"one direction; choose with \.sel or \.isel, got 4"):
-        plotting.elastic_dilatancy(synthetic.dilatancy())
+        plotting.dilatancy(synthetic.dilatancy())
 
 
 def test_direction_names_and_styles():
     opening = synthetic.dilatancy(forces=(), directions=("E", "NE", "30", "33.5"))
-    ax = plotting.rigid_dilatancy(opening)
+    ax = plotting.dilatancy(opening)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert named[:4] == ["East", "NE", "30°", "33.5°"]
     styles = [(line.get_color(), line.get_linestyle()) for line in ax.lines[:8:2]]
@@ -44,5 +44,5 @@ def test_direction_names_and_styles():
 
 
 def test_single_shear():
-    render(plotting.rigid_dilatancy(synthetic.dilatancy(shears=[8e-4], forces=())))
-    render(plotting.elastic_dilatancy(synthetic.dilatancy(shears=[0.0], directions=("W",))))
+    render(plotting.dilatancy(synthetic.dilatancy(shears=[8e-4], forces=())))
+    render(plotting.dilatancy(synthetic.dilatancy(shears=[0.0], directions=("W",))))

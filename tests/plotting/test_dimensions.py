@@ -114,7 +114,7 @@ def test_an_estimate_at_its_limit_is_no_point_and_the_band_is_named(study):
     assert list(by_marker["<"]) == [2.0]
     assert 2.0 not in [*by_marker.get("o", ())]
     words = [text.get_text() for text in ax.artists[0].get_texts()]
-    assert "at the limit:\nno dimension" in words
+    assert "at the limit: no\ndimension" in words
     assert "1998 paper" in words
 
 

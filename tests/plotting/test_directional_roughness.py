@@ -36,7 +36,7 @@ def test_labels_of_the_rings_stay_apart(surface, factor):
 
 
 def test_a_sector_stays_open_and_is_drawn_in_order(surface):
-    result = fc.joints.directional_roughness(surface, azimuth=[40.0, 0.0, 20.0])
+    result = fc.joints.directional_roughness(surface, direction=[40.0, 0.0, 20.0])
     angle, radius = plotting.directional_roughness(result).lines[0].get_data()
     np.testing.assert_allclose(np.degrees(angle), [0, 20, 40], atol=1e-12)
     np.testing.assert_allclose(radius, result.roughness_metric[[1, 2, 0]])
@@ -45,7 +45,7 @@ def test_a_sector_stays_open_and_is_drawn_in_order(surface):
 def test_axes_that_are_not_polar_are_refused(surface):
     from matplotlib.figure import Figure
 
-    result = fc.joints.directional_roughness(surface, azimuth=[0.0, 90.0])
+    result = fc.joints.directional_roughness(surface, direction=[0.0, 90.0])
     with pytest.raises(ValueError, match="polar axes"):
         plotting.directional_roughness(result, ax=Figure().add_subplot())
     polar = Figure().add_subplot(projection="polar")

@@ -7,24 +7,29 @@ import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import fractalcontact as fc
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.schema import label
 
-PAPER = [
-    "figure_1_surface",
-    "figure_2_sliding_scheme",
-    "figure_3_closure",
-    "figure_4_contact_domains",
-    "figure_5_dilatancy",
-]
-OTHERS = [
+FIGURES = [
+    "surface",
+    "delta_surface",
+    "joint_closure",
+    "joint_contact_area",
+    "joint_contact_domains",
+    "joint_contact_domains_along_shear",
+    "joint_first_contact",
+    "rigid_dilatancy",
+    "joint_dilatancy",
     "dimensions",
     "dimension_curves",
     "friction",
     "box_dimension",
     "lacunarity",
+    "lacunarity_maps",
     "islands",
     "hydraulic_aperture",
 ]
@@ -40,29 +45,27 @@ def part(tree, *paths):
 
 def test_complete_study(study, tmp_path):
     written = plotting.draw(study, tmp_path / "new")
-    assert names(written) == PAPER + OTHERS
+    assert names(written) == FIGURES
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == sorted(p.name for p in written)
     for path in written:
         assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
         assert path.stat().st_size < 600_000
 
 
-def test_study_that_is_not_compared_with_the_paper(study, tmp_path):
-    tree = part(study, "surfaces", "joints/closure")
-    expected = ["surface", "joint_closure", "joint_contact_domains"]
-    assert names(plotting.draw(tree, tmp_path, paper=False)) == expected
-
-
 @pytest.mark.parametrize(
     ("paths", "expected"),
     [
-        (("surfaces",), ["figure_1_surface"]),
-        (("surfaces", "joints/delta_surface"), ["figure_1_surface", "figure_2_sliding_scheme"]),
-        (("joints/rigid_dilatancy",), ["figure_5_dilatancy"]),
-        (("joints/elastic_dilatancy",), ["figure_5_dilatancy"]),
-        (("joints/closure",), ["figure_3_closure", "figure_4_contact_domains"]),
+        (("surfaces",), ["surface"]),
+        (("surfaces", "joints/delta_surface"), ["surface", "delta_surface"]),
+        (("joints/rigid_dilatancy",), ["rigid_dilatancy"]),
+        (("joints/elastic_dilatancy",), ["joint_dilatancy"]),
+        (
+            ("joints/closure",),
+            [name for name in FIGURES if name.startswith(("joint_closure", "joint_contact", "joint_first"))],
+        ),
         (("dimensions",), ["dimensions"]),
-        (("domains/lacunarity",), ["lacunarity"]),
+        (("dimensions/variogram",), ["dimension_curves"]),
+        (("domains/lacunarity",), ["lacunarity", "lacunarity_maps"]),
         ((), []),
     ],
 )
@@ -73,7 +76,8 @@ def test_part_of_a_study(study, tmp_path, paths, expected):
 def test_study_without_a_joint(study, tmp_path):
     pressed = study["joints/closure"].to_dataset().isel(shear=0, drop=True)
     tree = xr.DataTree.from_dict({"/contact": pressed})
-    assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area", "contact_domains"]
+    expected = ["closure_law", "contact_area", "contact_domains", "first_contact"]
+    assert names(plotting.draw(tree, tmp_path)) == expected
     tree = xr.DataTree.from_dict({"/contact": pressed.drop_vars("state")})
     assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area"]
 
@@ -81,7 +85,34 @@ def test_study_without_a_joint(study, tmp_path):
 def test_closure_without_maps(study, tmp_path):
     tree = part(study, "joints/closure")
     tree["joints/closure"] = tree["joints/closure"].to_dataset().drop_vars("state")
-    assert names(plotting.draw(tree, tmp_path)) == ["figure_3_closure"]
+    assert names(plotting.draw(tree, tmp_path)) == ["joint_closure", "joint_contact_area"]
+
+
+def test_letters_match_between_curve_and_maps(study, tmp_path, monkeypatch):
+    """The steps that are marked on the closure law are those of the maps of contact domains."""
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")
+    shown, print_png = {}, FigureCanvasAgg.print_png
+
+    def keep(canvas, path, **options):
+        figure = canvas.figure
+        letters = [text.get_text() for ax in figure.axes for text in ax.texts if len(text.get_text()) == 1]
+        titles = [ax.get_title(loc="left") for ax in figure.axes]
+        shown[len(shown)] = letters, [title[5] for title in titles if title.startswith(r"$\bf{")]
+        print_png(canvas, path, **options)
+
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", keep)
+    plotting.draw(part(study, "joints/closure"), tmp_path)
+    (on_the_curve, _), _, (_, on_the_maps), *_ = shown.values()
+    assert on_the_curve == on_the_maps == list("ABCD")
+
+
+def test_shear_curve_of_tests_and_of_the_criterion(tmp_path):
+    dims = ("nominal_pressure", "shear_displacement")
+    coords = {"nominal_pressure": [1e6], "shear_displacement": [0.0, 1e-3]}
+    curve = label(xr.Dataset({name: (dims, [[0.0, 1.0]]) for name in ("shear_stress", "dilatancy")}, coords))
+    both = {"/joints/direct_shear": curve, "/joints/shear_curve": curve}
+    for groups in (both, {"/joints/shear_curve": curve}):
+        assert names(plotting.draw(xr.DataTree.from_dict(groups), tmp_path)) == ["shear_curve"]
 
 
 def test_several_directions_under_force(tmp_path):
@@ -89,12 +120,10 @@ def test_several_directions_under_force(tmp_path):
     tree = xr.DataTree.from_dict(
         {"/joints/elastic_dilatancy": opening, "/joints/friction": synthetic.friction(opening)}
     )
-    assert names(plotting.draw(tree, tmp_path)) == ["figure_5_dilatancy", "friction"]
+    assert names(plotting.draw(tree, tmp_path)) == ["joint_dilatancy", "friction"]
 
 
 def test_failed_write_keeps_old_file(study, tmp_path, monkeypatch):
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     (tmp_path / "lacunarity.png").write_bytes(b"old")
 
     def fails(canvas, path, **options):
@@ -115,7 +144,7 @@ def test_lazy_imports_and_no_pyplot(tmp_path, study):
         "import fractalcontact as fc\n"
         "import fractalcontact.plotting\n"
         "assert not {'matplotlib', 'xarray', 'numba'} & set(sys.modules)\n"
-        "from fractalcontact.plotting import draw, paper_figure\n"
+        "from fractalcontact.plotting import draw, surface\n"
         "assert not {'matplotlib', 'numba'} & set(sys.modules)\n"
         f"tree = fc.open({str(path)!r})\n"
         f"for _ in range(3): draw(tree, {str(tmp_path)!r})\n"

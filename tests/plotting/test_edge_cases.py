@@ -39,8 +39,8 @@ def test_all_nan(study):
     for path, drawing in (
         ("joints/closure", plotting.closure_laws),
         ("joints/closure", plotting.contact_area),
-        ("joints/rigid_dilatancy", plotting.rigid_dilatancy),
-        ("joints/elastic_dilatancy", plotting.elastic_dilatancy),
+        ("joints/rigid_dilatancy", plotting.dilatancy),
+        ("joints/elastic_dilatancy", plotting.dilatancy),
         ("joints/friction", plotting.friction),
         ("joints/transmissivity", plotting.hydraulic_aperture),
         ("domains/box_dimension", plotting.box_dimension),
@@ -74,7 +74,3 @@ def test_any_size(size):
         surface.copy(data=surface.values * size).assign_coords(x=surface.x * size, y=surface.y * size)
     )
     render(plotting.surface(grown))
-    slid = synthetic.delta(surface, shears=(8e-3,))
-    scaled = slid.copy(data=slid.values * size)
-    grown_slid = label(scaled.assign_coords(x=slid.x * size, y=slid.y * size, shear=slid.shear * size))
-    render(plotting.sliding_scheme(grown, grown_slid))

@@ -19,12 +19,13 @@ def test_points_and_window(result):
     window = next(line for line in ax.lines if np.ptp(line.get_xdata()) > 0 and len(line.get_xdata()) == 2)
     assert window.get_ydata()[0] == pytest.approx(float(result.window_hurst))
     assert ax.get_xlabel() == "wavelength (mm)"
-    assert len(ax.containers[0][0].get_xdata()) == result.sizes["wavelength"]
+    (octaves,) = [line for line in ax.lines if line.get_label() == "octave, 95 %"]
+    assert len(octaves.get_xdata()) == result.sizes["wavelength"]
 
 
 def test_no_window_is_drawn_where_there_is_none(result):
     ax = plotting.scaling(result.assign(window_hurst=np.nan))
-    assert ax.get_legend_handles_labels()[1] == ["octave, 95 %"]
+    assert ax.get_legend_handles_labels()[1] == ["octave, 95 %, interval", "octave, 95 %"]
 
 
 @pytest.mark.parametrize("name", ["hurst", "ci_low", "ci_high"])

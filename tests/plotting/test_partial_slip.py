@@ -24,7 +24,7 @@ def sheared():
 
 def test_each_state_has_its_colour(sheared):
     step = sheared.isel(step=2)
-    image = colours(plotting.slip_domains(step)[0]).reshape(-1, 3)
+    image = colours(plotting.contact_domains(step)[0]).reshape(-1, 3)
     flags = step["slip_state"].values.ravel()
     shown = [np.unique(image[flags == flag], axis=0) for flag in (0, 1, 2)]
     assert [len(colour) for colour in shown] == [1, 1, 1]
@@ -34,7 +34,7 @@ def test_each_state_has_its_colour(sheared):
 
 
 def test_titles_and_legend(sheared):
-    figure = figure_of(plotting.slip_domains(sheared))
+    figure = figure_of(plotting.contact_domains(sheared))
     titles = [ax.get_title(loc="left") for ax in figure.axes][:5]
     share = 100 * float(sheared["stick_area"][1] / sheared["contact_area"])
     assert "0 N" in titles[0]
@@ -47,10 +47,10 @@ def test_titles_and_legend(sheared):
 
 
 def test_fewer_panels_and_no_contact(sheared):
-    assert sum(ax.axison for ax in plotting.slip_domains(sheared, panels=3)) == 3
+    assert sum(ax.axison for ax in plotting.contact_domains(sheared, panels=3)) == 3
     empty = sheared.isel(step=[0]).copy()
     empty["slip_state"] = empty["slip_state"] * 0
-    assert "no contact" in plotting.slip_domains(empty)[0].get_title(loc="left")
+    assert "no contact" in plotting.contact_domains(empty)[0].get_title(loc="left")
 
 
 def test_loops_are_the_values_of_the_result(sheared):
@@ -77,7 +77,7 @@ def test_loops_of_a_joint():
 def test_bad_input(sheared):
     with pytest.raises(InvalidInput, match="stick_area"):
         plotting.slip_loops(sheared.drop_vars("stick_area"))
-    with pytest.raises(InvalidInput, match="slip_state"):
-        plotting.slip_domains(sheared.drop_vars("slip_state"))
+    with pytest.raises(InvalidInput, match="'state'"):
+        plotting.contact_domains(sheared.drop_vars("slip_state"))
     with pytest.raises(InvalidInput, match="panels"):
-        plotting.slip_domains(sheared, panels=0)
+        plotting.contact_domains(sheared, panels=0)

@@ -58,7 +58,9 @@ def test_an_unknown_normal_stress_has_its_own_colour(test_result, criterion):
         for i in range(result.sizes["nominal_pressure"]):
             one = result.isel(nominal_pressure=i)
             assert holds(drawn(stress), one.shear_displacement, one.shear_stress)
-        assert stress.lines[result.sizes["nominal_pressure"] - 1].get_label().endswith("normal stress -")
+        assert (
+            stress.lines[result.sizes["nominal_pressure"] - 1].get_label().endswith("normal stress = - MPa")
+        )
     first, second, beside, _ = figure_of(plotting.shear_curve(unknown, beside=criterion)).axes[0].lines
     assert first.get_color() == beside.get_color() != second.get_color()
 

@@ -24,24 +24,22 @@ def calls(study):
     """Return for every figure of the synthetic study the function and its data."""
     closed = study["joints/closure"].to_dataset()
     opening = study["joints/elastic_dilatancy"].to_dataset()
-    lower, slid = study["surfaces"].to_dataset(), study["joints/delta_surface"].to_dataset()
+    lower = study["surfaces"].to_dataset()
     return {
         "surface": (plotting.surface, (lower,), {}),
-        "sliding_scheme": (plotting.sliding_scheme, (lower, slid), {}),
         "closure_laws": (plotting.closure_laws, (closed,), {"marked": (1, 2)}),
         "contact_area": (plotting.contact_area, (closed,), {}),
         "contact_domains": (plotting.contact_domains, (closed,), {"shear": 8e-4}),
-        "rigid_dilatancy": (plotting.rigid_dilatancy, (study["joints/rigid_dilatancy"],), {}),
-        "elastic_dilatancy": (plotting.elastic_dilatancy, (opening.isel(direction=0),), {}),
+        "path": (plotting.path, (closed, "contact_fraction"), {}),
+        "dilatancy": (plotting.dilatancy, (opening.isel(direction=0),), {}),
         "friction": (plotting.friction, (study["joints/friction"].to_dataset().isel(direction=0),), {}),
         "hydraulic_aperture": (plotting.hydraulic_aperture, (study["joints/transmissivity"],), {}),
         "box_dimension": (plotting.box_dimension, (study["domains/box_dimension"],), {}),
         "lacunarity": (plotting.lacunarity, (study["domains/lacunarity"],), {}),
         "islands": (plotting.islands, (study["domains/islands"],), {}),
-        "island_map": (plotting.island_map, (study["domains/islands"],), {}),
+        "field": (plotting.field, (study["domains/islands"]["label"],), {}),
         "dimensions": (plotting.dimensions, (study["dimensions"],), {}),
         "dimension_curves": (plotting.dimension_curves, (study["dimensions"],), {}),
-        "paper_figure": (plotting.paper_figure, (study, 5), {}),
     }
 
 
@@ -120,7 +118,7 @@ def test_text_is_readable_in_a_dark_style(study, name):
     shown = [t for t in texts(figure) if not (t.axes is not None and t.axes.images)]  # not on a map
     assert shown
     for text in shown:
-        if text.get_path_effects() or text.get_text() == "upper":  # outlined, or on the block
+        if text.get_path_effects():  # outlined
             continue
         assert contrast(text.get_color(), "black") > 3, text.get_text()
 

@@ -22,7 +22,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -73,13 +73,14 @@ QUANTITIES = {
 # What the wanted results require: by the words of [want] and by the way the surface is made
 
 FFT = "fft"  # stands for the library that does the transforms
-ALWAYS = ("lazy_loader", "numpy", "xarray", "netCDF4", "tabulate")
+ALWAYS = ("lazy_loader", "numpy", "xarray", "netCDF4", "tabulate", "jinja2")  # the report of a folder
 WITH_KERNELS = ("numba", "scipy.linalg")
 
 # group of kernels: subpackage, and how many of them a study compiles at most, from an empty cache
 KERNELS = {
     "contact solver": ("contact", 12),
     "increment sums": ("dimensions", 1),
+    "posterior": ("dimensions", 4),
     "covering area": ("dimensions", 1),
     "dividers": ("dimensions", 1),
     "minimum cover": ("domains", 1),
@@ -88,6 +89,7 @@ KERNELS = {
     "boundary": ("domains", 2),
     "gliding boxes": ("domains", 1),
     "islands": ("domains", 3),
+    "quarters": ("domains", 2),
 }
 OF_MASKS = tuple(name for name, (subpackage, _) in KERNELS.items() if subpackage == "domains")
 
@@ -102,7 +104,7 @@ class Requirement:
 
 _SOLVER = Requirement((FFT, "scipy.special"), ("contact solver",))
 _SUMS = Requirement((FFT,), ("increment sums",))
-_EXACT = Requirement((FFT, "scipy.ndimage", "scipy.special"), ("increment sums",))
+_EXACT = Requirement((FFT, "scipy.ndimage", "scipy.stats"), ("posterior",))
 _LABELS = ("scipy.ndimage", "scipy.special")
 _SPECIAL = ("scipy.special",)
 
@@ -115,18 +117,18 @@ REQUIREMENTS = {
     "dimensions/default": _EXACT,
     "dimensions/likelihood": _EXACT,
     "dimensions/increments": _EXACT,
-    "dimensions/spectrum": Requirement((FFT, "scipy.optimize"), _SUMS.kernels),
-    "dimensions/higuchi": Requirement((FFT,)),
-    "dimensions/detrended_fluctuation": Requirement((FFT, "scipy.optimize")),
+    # the table of methods loads the modules of all curves, and with them the compiler
+    "dimensions/spectrum": Requirement((FFT, "numba", "scipy.optimize")),
+    "dimensions/higuchi": Requirement((FFT, "numba")),
+    "dimensions/detrended_fluctuation": Requirement((FFT, "scipy.optimize"), _SUMS.kernels),
     "dimensions/divider": Requirement((FFT,), ("dividers",)),
     "surfaces/texture": Requirement((FFT, "scipy.ndimage")),
-    "dimensions/variogram": Requirement((FFT,)),
+    "dimensions/variogram": _SUMS,
     "dimensions/madogram": _SUMS,
-    "dimensions/second_variogram": _SUMS,
     "dimensions/roughness_length": Requirement((FFT, "scipy.optimize"), _SUMS.kernels),
-    "dimensions/cube_counts": Requirement((FFT,)),
+    "dimensions/cube_counts": Requirement((FFT, "numba")),
     "dimensions/covering": _SUMS,
-    "dimensions/variation": Requirement((FFT,)),
+    "dimensions/variation": Requirement((FFT, "numba")),
     "contact": _SOLVER,
     # the registration of scikit-image has scipy's transforms of its own
     "joints/register": Requirement((FFT, "skimage.registration", "scipy.ndimage", "scipy.fft")),
@@ -140,7 +142,7 @@ REQUIREMENTS = {
     "partial_slip": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "joints/uplift": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
-    "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover")),
+    "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover", "islands")),
     "domains/box_counts": Requirement(_SPECIAL, ("mean cover",)),
     "domains/box_counts/minimum": Requirement((), ("minimum cover",)),
     "domains/minkowski_dimension": Requirement(_SPECIAL, ("distances",)),
@@ -152,6 +154,8 @@ REQUIREMENTS = {
     "domains/percolation": Requirement(_LABELS, ("islands",)),
     "domains/describe": Requirement(_LABELS, OF_MASKS),
     "domains/evolution": Requirement((*_LABELS, "scipy.spatial"), OF_MASKS),
+    "domains/signature": Requirement(_LABELS, ("islands", "gliding boxes")),
+    "domains/hausdorff_content": Requirement((), ("quarters",)),
     "domains/lineage": Requirement((*_LABELS, "scipy.spatial"), ("islands",)),
     FIGURES: Requirement(("matplotlib.figure", "matplotlib.backends.backend_agg")),
 }
@@ -159,7 +163,6 @@ REQUIREMENTS = {
 
 def requirements(scene):
     """Return what the wanted results of a scene require."""
-    scene = with_choices(scene)
     entries = [REQUIREMENTS[word] for word in _words(scene) if word in REQUIREMENTS]
     libraries = dict.fromkeys([*ALWAYS, *(name for entry in entries for name in entry.libraries)])
     kernels = tuple(dict.fromkeys(name for entry in entries for name in entry.kernels))
@@ -179,7 +182,6 @@ def kernel_limits(requirement):
 
 def required_stages(scene):
     """Return the stages that the wanted words name, and those that these depend on."""
-    scene = with_choices(scene)
     planned = {stage.name: stage for stage in fc.scenes.plan(scene)}
     required = set()
     pending = [name for name in planned if _is_wanted(name, scene)]
@@ -189,21 +191,6 @@ def required_stages(scene):
             required.add(name)
             pending += planned[name].needs
     return required
-
-
-def with_choices(scene):
-    """Return the scene with the methods and tolerances chosen for its `error` or `budget`."""
-    choices = fc.scenes.plan(scene).choices
-    if not choices:
-        return scene
-    tables = json.loads(json.dumps(dict(scene.tables)))
-    for choice in choices:
-        table = tables
-        *path, key = choice.key.split(".")
-        for word in path:
-            table = table.setdefault(word, {})
-        table[key] = choice.option.value
-    return replace(scene, tables={key: v for key, v in tables.items() if key not in ("error", "budget")})
 
 
 def _is_wanted(stage, scene):

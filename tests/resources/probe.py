@@ -25,13 +25,13 @@ SPLIT = ("scipy", "skimage", "matplotlib")  # libraries whose subpackages are li
 
 def main(folder):
     """Load libraries or run a scene, as the task states; run it a second time to trace its arrays."""
+    block_dask_import()  # as the command does for a study without workers
     before = peak_memory()
     task = pickle.loads((folder / TASK).read_bytes())
     for name in task["libraries"]:
         importlib.import_module(name)
     report = {}
     if task["scene"] is not None:
-        block_dask_import()  # as the command does for a study without workers
         report = run_scene(task["scene"], folder / "first")
     report |= {"libraries": libraries(), "memory": peak_memory() - before, "kernels": kernels()}
     if task["traced"]:

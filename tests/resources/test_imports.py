@@ -91,10 +91,10 @@ WANTED = {
 # number of kernels of each subpackage
 COMPILED = {
     "rigid": {},
-    "dimension": {"dimensions": 1},
+    "dimension": {"dimensions": 4},
     "pressed": {"contact": 8},
     "closure": {"contact": 10},
-    "paper": {"dimensions": 1, "domains": 3, "contact": 10},
+    "paper": {"dimensions": 5, "domains": 4, "contact": 10},
 }
 
 

@@ -13,6 +13,7 @@ from study import SOUND, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, UnreadableFile
+from fractalcontact.base.file_contents import file_contents
 from fractalcontact.base.signals import Stopped
 
 resource = pytest.importorskip("resource")  # signals and limits as Unix has them
@@ -203,7 +204,7 @@ def test_contents_of_a_foreign_file(tmp_path):
         file.createVariable("temperature", "f8", ("t",))[:] = 1.0
         file.provenance = "from a boat"
     assert "temperature" in fc.open(tmp_path / "other.nc")
-    assert "temperature" in fc.scenes.contents(tmp_path / "other.nc")
+    assert "temperature" in file_contents(tmp_path / "other.nc")
 
 
 @pytest.mark.parametrize(
@@ -216,7 +217,7 @@ def test_contents_of_a_file_with_foreign_provenance(tmp_path, text):
         file.createVariable("ragged", file.createVLType("f8", "list"), ("t",))
         file.createVariable("word", str, ("t",))[:] = np.array(["a", "b"], dtype=object)
         file.provenance = text
-    assert "temperature" in fc.scenes.contents(tmp_path / "other.nc")
+    assert "temperature" in file_contents(tmp_path / "other.nc")
     assert list(fc.open(tmp_path / "other.nc")["word"].values) == ["a", "b"]
 
 

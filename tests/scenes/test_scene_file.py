@@ -1,6 +1,9 @@
 """Scene files: valid ones are read, and all problems of others are listed at once."""
 
+import re
+import textwrap
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -235,7 +238,7 @@ def test_plan_is_printed_and_nothing_runs(write, tmp_path):
 def test_load_of_the_joint_may_be_a_closure(write):
     scene = fc.scenes.load(write(SOUND.replace("normal_force = [1.0, 10.0]", "closure = [1e-7, 1e-6]")))
     closure = fc.scenes.run(scene, progress=False)["joints/closure"]
-    assert closure["closure"].values.ravel() == pytest.approx([1e-7, 1e-6] * 2)
+    assert closure["closure"].values == pytest.approx([1e-7, 1e-6])  # prescribed: the same at both shears
 
 
 def test_press_takes_its_modulus_from_the_material(write):
@@ -290,3 +293,29 @@ def test_scene_in_words():
     assert "shear = [0, 8e-05 ... 0.01] (126 values)" in repr(scene)
     assert "<td>yield" not in scene._repr_html_()
     assert scene._repr_html_().count("<tr>") == len(scene.tables)
+
+
+FRAGMENTS = [
+    (page.name, textwrap.dedent(block))
+    for page in sorted((Path(__file__).resolve().parents[2] / "gallery").glob("*.rst"))
+    for block in re.findall(r"\.\. code-block:: toml\n\n((?: +.*\n|\n)+)", page.read_text(encoding="utf-8"))
+]
+
+
+@pytest.mark.parametrize(("page", "text"), FRAGMENTS)
+def test_fragments_of_the_documentation_are_valid(write, page, text):
+    """A fragment may lack tables; what it has is as the reader of scenes takes it."""
+    assert len(FRAGMENTS) >= 2
+    whole = text if "[want]" in text else f'{text}\n[want]\nsurfaces = ["height"]\n'
+    scene = fc.scenes.load(write(whole))
+    assert scene.tables
+
+
+def test_key_of_another_table_is_named_first(write):
+    text = SOUND.replace("poisson = 0.2", "poisson = 0.2\nJRC = 10.0").replace("young = 30e9", "young = -1.0")
+    with pytest.raises(InvalidInput) as caught:
+        fc.scenes.load(write(text))
+    first, second = caught.value.problems
+    assert first.startswith("material.JRC: ")
+    assert "an unknown key: 'roughness_coefficient' belongs to [joint." in first
+    assert second.startswith("material.young: ")

@@ -1,6 +1,5 @@
 """The summary: mean and deviation of the members, numbers that can be read, as wide as the screen."""
 
-import json
 import re
 
 import numpy as np
@@ -9,6 +8,8 @@ import xarray as xr
 from study import SOUND, command_here
 
 import fractalcontact as fc
+from fractalcontact.base.file_contents import file_contents
+from fractalcontact.base.units import quantity_text
 
 ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -24,31 +25,46 @@ def ensemble(tmp_path_factory):
     return fc.scenes.run(folder / "study.toml", progress=False)
 
 
-def rows(text, head):
-    """Return the cells of the rows of the table with this head."""
-    lines = text[text.index(head) :].split("\n\n")[0].splitlines()
-    return [re.split(r"  +", line) for line in lines[2:] if not line.startswith("  ")]
+@pytest.fixture(autouse=True)
+def _wide_screen(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "250")
+
+
+def rows(tree, title):
+    """Return the rows of one table of the whole summary, each a dict by the head of the column."""
+    lines = fc.scenes.summary(tree, verbose=True).split(f"\n\n{title}\n")[1].split("\n\n")[0].splitlines()
+    starts = [match.start() for match in re.finditer("-+", lines[1])]
+    ends = [*starts[1:], None]
+    body = [line for line in lines if line[:1].strip()]
+    cut = [[line[a:b].strip() for a, b in zip(starts, ends, strict=True)] for line in body]
+    return [dict(zip(cut[0], cells, strict=True)) for cells in cut[2:] if cells[0]]
+
+
+def remarks(tree):
+    """Return the words of the whole summary."""
+    return " ".join(fc.scenes.summary(tree, verbose=True).split())
 
 
 def test_summary_shows_mean_and_deviation_of_the_members(ensemble):
     text = fc.scenes.summary(ensemble)
     assert "ensemble of 4 members: mean ± standard deviation" in text
     percent = ensemble["joints/closure"].contact_fraction.isel(step=-1).values * 100
-    for column, cells in enumerate(rows(text, "closure at shear")):
-        mean, spread = (float(word) for word in cells[4].removesuffix(" %").split(" ± "))
+    for column, cells in enumerate(rows(ensemble, "closure")):
+        mean, spread = (float(word) for word in cells["contact area"].removesuffix(" %").split(" ± "))
         assert mean == pytest.approx(percent[:, column].mean(), rel=0.05)
         assert spread == pytest.approx(percent[:, column].std(ddof=1), rel=0.05)
     dimension = ensemble["dimensions"].fractal_dimension.values[:, 0]
-    assert rows(text, "fractal dimension")[0][1] == f"{dimension.mean():.3f} ± {dimension.std(ddof=1):.3f}"
+    cell = rows(ensemble, "fractal dimension")[0]["dimension D"]
+    assert cell == f"{dimension.mean():.3f} ± {dimension.std(ddof=1):.3f}"
 
 
 def test_loads_of_all_members_have_no_deviation(ensemble):
-    assert rows(fc.scenes.summary(ensemble), "closure at shear")[0][1] == "10 N"
+    assert rows(ensemble, "closure")[0]["normal force"] == "10 N"
 
 
 def test_peak_strength_states_its_distance_and_its_form(ensemble):
     """The energy form by hand: secants of delta + U/N over the distance, for every member and force."""
-    words = " ".join(fc.scenes.summary(ensemble).split())
+    words = remarks(ensemble)
     friction = ensemble["joints/friction"].to_dataset()
     elastic = ensemble["joints/elastic_dilatancy"].to_dataset()
     distance, shear = float(friction.peak_distance.max()), elastic.shear.values
@@ -79,7 +95,7 @@ def test_strength_near_locking_changes_far_more_than_its_angle():
     rigid = fc.joints.dilatancy(crack, shear=shear, direction="E")
     rigid["rigid_dilatancy"] = rigid["rigid_dilatancy"].copy(data=climb.values[None])
     friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
-    words = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/friction": friction})).split())
+    words = remarks(xr.DataTree.from_dict({"joints/friction": friction}))
     over_two = rise + np.degrees(np.arctan(slopes[:2].mean()))
     change = np.tan(np.radians(88.5)) / np.tan(np.radians(over_two)) - 1
     assert f"The strength changes by up to {100 * change:.0f} %." in words
@@ -93,16 +109,19 @@ def test_nothing_is_said_of_the_peak_of_faces_that_lock():
     rigid = fc.joints.dilatancy(crack, shear=np.arange(9) * 1e-4, direction="E")
     friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
     assert "degree" not in friction["peak_friction_angle"].attrs["comment"]
-    text = fc.scenes.summary(xr.DataTree.from_dict({"joints/friction": friction}))
+    tree = xr.DataTree.from_dict({"joints/friction": friction})
+    text = fc.scenes.summary(tree)
     assert "none: the faces lock" in text
-    assert "distance" not in text
+    assert "distance" not in remarks(tree)
     assert "°" not in text
 
 
 def test_standard_errors_of_the_members_are_a_span(ensemble):
     errors = ensemble["dimensions"].standard_error.values[:, 0]
     ends = dict.fromkeys(f"{end:.4f}" for end in (errors.min(), errors.max()))
-    line = next(line for line in fc.scenes.summary(ensemble).splitlines() if "error of H" in line)
+    line = next(
+        line for line in fc.scenes.summary(ensemble, verbose=True).splitlines() if "error of H" in line
+    )
     assert line.split("standard error of H ")[1].strip() == " to ".join(ends)
 
 
@@ -112,7 +131,7 @@ def test_single_study_names_no_members(ensemble):
     assert "members" not in text
     assert "±" not in text
     fraction = float(single["joints/closure"].contact_fraction[0, -1])
-    assert rows(text, "closure at shear")[0][4] == f"{fraction * 100:.3g} %"
+    assert rows(single, "closure")[0]["contact area"] == f"{fraction * 100:.3g} %"
 
 
 def test_members_without_a_value_are_counted(ensemble):
@@ -121,17 +140,9 @@ def test_members_without_a_value_are_counted(ensemble):
     closing["closure"] = closing["closure"].where(closing["member"] != 2)
     closing["interface_closure"] = closing["interface_closure"].where(False)
     holed["joints/closure"] = xr.DataTree(closing)
-    cells = rows(fc.scenes.summary(holed), "closure at shear")[0]
-    assert cells[2].endswith("µm (3 of 4)")
-    assert cells[3] == "-"
-
-
-def test_member_compared_with_the_paper_is_named(ensemble):
-    tree = ensemble.copy()
-    scene = json.loads(tree.attrs["provenance"])
-    scene["parameters"]["scene"]["paper"] = True
-    tree.attrs["provenance"] = json.dumps(scene)
-    assert "member 0 of 4" in fc.scenes.summary(tree)
+    cells = rows(holed, "closure")[0]
+    assert cells["closure"].endswith("µm (3 of 4)")
+    assert cells["interface closure"] == "-"
 
 
 @pytest.mark.parametrize("columns", [80, 160])
@@ -139,7 +150,8 @@ def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch
     monkeypatch.setenv("COLUMNS", str(columns))
     path = fc.save(ensemble, tmp_path / "result.nc")
     plan = str(fc.scenes.plan(fc.scenes.load("concrete_crack")))
-    for text in (fc.scenes.summary(ensemble), fc.scenes.contents(path), plan):
+    whole = fc.scenes.summary(ensemble, verbose=True)
+    for text in (fc.scenes.summary(ensemble), whole, file_contents(path), plan):
         assert max(map(len, text.splitlines())) <= columns
 
 
@@ -161,38 +173,36 @@ def test_last_line_of_a_run_fits_the_screen(monkeypatch, tmp_path):
     assert "report.html" in " ".join(last)
 
 
-def test_boxes_of_the_dimension_are_named(ensemble):
+def test_window_of_the_dimension_is_named_in_lengths(ensemble):
     boxes = ensemble["domains/box_dimension"].to_dataset().isel(step=-1)
-    expected = [
-        f"{float(each.scale_min.min()):g} ... {float(each.scale_max.max()):g}"
-        for each in (boxes.isel(shear=0), boxes.isel(shear=-1))
-    ]
-    cells = rows(fc.scenes.summary(ensemble), "contact domain, last step")
-    assert [row[3] for row in (cells[0], cells[-1])] == expected
+    cells = rows(ensemble, "box")
+    for each, row in ((boxes.isel(shear=0), cells[0]), (boxes.isel(shear=-1), cells[-1])):
+        low, high = float(each.window_low.min()), float(each.window_high.max())
+        assert row["over"] == f"{quantity_text(low, 'm')} to {quantity_text(high, 'm')}"
 
 
 def test_units_follow_the_values():
     surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
     pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
-    text = fc.scenes.summary(xr.DataTree.from_dict({"contact": pressed}))
-    assert [cells[1] for cells in rows(text, "step")] == ["1 MPa", "10 MPa"]
-    assert rows(text, "step")[0][2].endswith(" nm")
-    assert "e+0" not in text
+    tree = xr.DataTree.from_dict({"contact": pressed})
+    assert [cells["nominal pressure"] for cells in rows(tree, "contact")] == ["1 MPa", "10 MPa"]
+    assert rows(tree, "contact")[0]["closure"].endswith(" nm")
+    assert "e+0" not in fc.scenes.summary(tree)
 
 
 def test_column_has_one_unit_within_three_decades():
     surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
     for pressures, shown in (([4e5, 6e5], ["0.4 MPa", "0.6 MPa"]), ([1e3, 1e7], ["1 kPa", "10 MPa"])):
         pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=pressures)
-        text = fc.scenes.summary(xr.DataTree.from_dict({"contact": pressed}))
-        assert [cells[1] for cells in rows(text, "step")] == shown
+        tree = xr.DataTree.from_dict({"contact": pressed})
+        assert [cells["nominal pressure"] for cells in rows(tree, "contact")] == shown
 
 
 def test_transmissivity_of_parallel_plates_in_two_units():
     """Plates 0.1 mm apart: w^3/12 = 8.33e-14 m3, times 998.2 kg/m3 9.81 m/s2 / 1.002 mPa s = 8.14e-7 m2/s."""
     gap = fc.surfaces.from_array(np.full((8, 8), 1e-4), 1e-3).expand_dims(step=[0])
     flow = fc.joints.transmissivity(gap.assign_coords(normal_force=("step", [5.0], {"units": "N"})))
-    text = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/transmissivity": flow})).split())
+    text = remarks(xr.DataTree.from_dict({"joints/transmissivity": flow}))
     assert "cubed over 12: 8.33e-14 m³; times unit weight over viscosity" in text
     assert "for water at 20 °C, 8.14e-07 m²/s" in text
 
@@ -201,9 +211,11 @@ def test_small_forces_are_not_zero_kilonewton():
     face = fc.surfaces.fbm((32, 32), 1e-7, hurst=0.8, rms_increment=3e-9, rng=1)
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-7)
     closing = fc.joints.closure(crack, shear=[2e-7], normal_force=[2e-6])
-    cells = rows(fc.scenes.summary(xr.DataTree.from_dict({"joints/closure": closing})), "closure at shear")[0]
-    assert cells[:2] == ["200 nm", "2 µN"]
-    text = " ".join(fc.scenes.summary(xr.DataTree.from_dict({"joints/closure": closing})).split())
+    tree = xr.DataTree.from_dict({"joints/closure": closing})
+    cells = rows(tree, "closure")[0]
+    assert next(iter(cells.values())) == "200 nm"
+    assert cells["normal force"] == "2 µN"
+    text = remarks(tree)
     assert f"the last step of the load, {2e-6 / 16e-7**2 / 1e6:.3g} MPa on the area of the block" in text
 
 
@@ -215,9 +227,8 @@ def test_no_negative_zero_and_no_contradiction_beside_the_dimension():
     for dim in ("y", "x"):
         state = state.assign_coords({dim: (dim, np.arange(64) * 1e-5, {"units": "m"})})
     boxes = fc.domains.box_dimension(state)
-    text = fc.scenes.summary(xr.DataTree.from_dict({"domains/box_dimension": boxes}))
-    assert "-0.00" not in text
-    words = " ".join(text.split())
+    words = remarks(xr.DataTree.from_dict({"domains/box_dimension": boxes}))
+    assert "-0.00" not in words
     number = int(boxes.differs_from_random.sum())
     assert f"{number} of 2 sets differ" in words
     assert "yes" not in words
@@ -235,22 +246,74 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
             "/joints/directional_roughness": rose,
         }
     )
-    text = fc.scenes.summary(tree)
-    rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
-    assert rows["Sq"].endswith(f"{float(statistics.rms_height) * 1e6:.3g} µm")
-    assert rows["Sdq"].endswith(f"{float(statistics.rms_slope):.3f}")
-    assert rows["E"].split()[1] == f"{float(jrc.roughness_coefficient[0]):.1f}"
-    assert "Azimuths are from E (+x) anticlockwise" in " ".join(text.split())
+    values = {cells["quantity"]: cells["value"] for cells in rows(tree, "ISO 25178")}
+    assert values["Sq"] == f"{float(statistics.rms_height) * 1e6:.3g} µm"
+    assert values["Sdq"] == f"{float(statistics.rms_slope):.3f}"
+    (east, _) = rows(tree, "joint roughness coefficient (JRC)")
+    assert east["JRC"] == f"{float(jrc.roughness_coefficient[0]):.1f}"
+    assert "Azimuths are from E (+x) anticlockwise" in remarks(tree)
     metric = rose.roughness_metric
-    assert rows["largest"].split()[1:] == [
-        f"{float(metric.azimuth[int(metric.argmax('azimuth'))]):g}°", f"{float(metric.max()):.2f}°"
-    ]  # fmt: skip
+    azimuth = float(metric.azimuth[int(metric.argmax("azimuth"))])
+    assert f"largest roughness metric {float(metric.max()):.2f}° toward {azimuth:g}°" in fc.scenes.summary(
+        tree
+    )
 
 
 @pytest.mark.parametrize(("increment", "outside"), [(1e-8, True), (3e-5, False)])
 def test_coefficient_beyond_the_standard_profiles_is_told(increment, outside):
     surface = fc.surfaces.fbm((64, 64), 2e-4, hurst=0.7, rms_increment=increment, rng=3)
     jrc = fc.joints.roughness_coefficient(surface)
-    text = fc.scenes.summary(xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc}))
+    text = remarks(xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc}))
     assert bool((jrc.scale_position != 0).any()) is outside
-    assert ("is extrapolated" in " ".join(text.split())) is outside
+    assert ("is extrapolated" in text) is outside
+
+
+def test_many_rows_are_thinned_to_fit_the_screen(monkeypatch):
+    """Tables lose rows; the first and the last one stay, and the head says how many are shown."""
+    monkeypatch.setenv("COLUMNS", "80")
+    shears = [1e-4 * k for k in range(1, 31)]
+    face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3, basic_friction_angle=30)
+    rigid = fc.joints.dilatancy(crack, shear=shears[:8], direction=[10.0 * k for k in range(30)])
+    estimates = fc.dimensions.estimate(face, list(fc.dimensions.methods()))
+    tree = xr.DataTree.from_dict({"/joints/rigid_dilatancy": rigid, "/dimensions": estimates})
+    text = fc.scenes.summary(tree)
+    assert len(text.splitlines()) <= 36
+    assert "of 30)" in text
+    assert {"E", "290"} <= {line.split()[0] for line in text.splitlines() if line}
+    whole = fc.scenes.summary(tree, verbose=True)
+    numbers = {f"{10 * k}" for k in range(30) if k % 9}  # the others are compass directions
+    assert numbers <= {line.split()[0] for line in whole.splitlines() if line}
+
+
+def test_tables_over_the_same_rows_are_one_on_the_screen(ensemble):
+    lines = fc.scenes.summary(ensemble).splitlines()
+    (head,) = [line for line in lines if "contact area" in line]
+    assert "box D (random)" in head
+
+
+def test_caveats_on_the_screen_are_three_at_most(ensemble, monkeypatch):
+    limits = [f"limit number {k}" for k in range(5)]
+    monkeypatch.setattr("fractalcontact.scenes._summary.caveats", lambda tree: limits)
+    text = fc.scenes.summary(ensemble)
+    assert [limit in text for limit in limits] == [True] * 3 + [False] * 2
+    assert "caveats left out: 2" in text
+    assert all(limit in fc.scenes.summary(ensemble, verbose=True) for limit in limits)
+
+
+def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):
+    """Islands, percolation, lacunarity and signature that a scene asks for, as the functions give them."""
+    text = SOUND.replace('"closure", "rigid_dilatancy"]', '"closure"]\nkeep = ["state"]')
+    words = '["islands", "percolation", "lacunarity", "signature"]'
+    (tmp_path / "study.toml").write_text(f"{text}domains = {words}\n", encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    shown = fc.scenes.summary(tree)
+    assert len(shown.splitlines()) <= 36
+    for head in ("islands", "contacts cross", "lacunarity (random)", "spot", "gap"):
+        assert head in shown
+    state = tree["joints/closure/state"]
+    alone = fc.domains.signature(state)
+    stored = tree["domains/signature"].to_dataset()
+    np.testing.assert_array_equal(stored["spot_size"], alone["spot_size"])
+    count = int(fc.domains.islands(state)["n_islands"][-1, -1])
+    assert rows(tree, "islands")[-1]["islands"] == str(count)

@@ -68,7 +68,7 @@ def test_results_are_those_of_the_function(scene, tmp_path, text, options):
 
 def test_summary_says_whether_the_diagrams_are_safe(scene, tmp_path):
     tree = fc.scenes.run(scene(BALANCED), progress=False)
-    text = " ".join(fc.scenes.summary(tree).split())
+    text = " ".join(fc.scenes.summary(tree, verbose=True).split())
     assert "at shear 0.6 mm: the linear diagram is" in text
     forces = tree["joints/uplift/uplift_force"].sel(shear=6e-4)
     less = 1 - float(forces.sel(diagram="joint") / forces.sel(diagram="bilinear"))
@@ -76,9 +76,14 @@ def test_summary_says_whether_the_diagrams_are_safe(scene, tmp_path):
     assert f"the bilinear diagram is {way}: the joint has {abs(100 * less):.1f} %" in text
     changed = tree.copy(deep=True)
     changed["joints/uplift/uplift_force"].loc[{"diagram": "joint"}] *= 10
-    text = " ".join(fc.scenes.summary(changed).split())
+    text = " ".join(fc.scenes.summary(changed, verbose=True).split())
     assert text.count("is NOT on the safe side") == 4
     assert "% more uplift" in text
+    factor = changed["joints/uplift/uplift_force"].max("shear")
+    more = 100 * (float((factor.sel(diagram="joint") / factor.drop_sel(diagram="joint")).max()) - 1)
+    assert "NOT on the safe side" in fc.scenes.summary(changed)
+    assert more > 100
+    assert "NOT on the safe side" not in fc.scenes.summary(tree) or less < 0
 
 
 @pytest.mark.parametrize(
@@ -89,7 +94,7 @@ def test_a_balance_that_fails_is_reported(scene, total, message):
     with pytest.warns(ConvergenceWarning):
         tree = fc.scenes.run(path, progress=False)
     assert not tree["joints/uplift/converged"].all()
-    text = " ".join(fc.scenes.summary(tree).split())
+    text = " ".join(fc.scenes.summary(tree, verbose=True).split())
     assert message in text
     assert "no effective stress on the path of the closure balances" in text
     assert "joints/uplift" in text[text.index("achieved") :]

@@ -79,7 +79,7 @@ def test_accuracy_refuses_an_unwritable_folder_first(tmp_path):
 
 def test_command_reports_file_size_and_peak_memory(tmp_path):
     (tmp_path / "study.toml").write_text(SOUND.replace('"closure", ', ""), encoding="utf-8")
-    last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-1]
+    last = command("run", tmp_path / "study.toml", "-o", tmp_path / "out").stdout.splitlines()[-2]
     size = (tmp_path / "out" / "result.nc").stat().st_size
     printed = re.search(r"result\.nc \((\S+) MB\), report\.html; peak memory (\d+) MB", last)
     assert printed, last
@@ -98,7 +98,7 @@ def test_command_reports_file_size_and_peak_memory(tmp_path):
         ("[joint.closure]\nshear = { a = 1 }", "joint.closure.shear"),
         ("[domains.lacunarity]\nbox_sizes = [0]", "domains/lacunarity: box_sizes"),
         ("[domains.box_dimension]\ncover = 'cheap'", "domains/box_dimension: cover"),
-        ("[domains.evolution]\nwant = ['x']", "domains/evolution: want"),
+        ("[domains.evolution]\ninclude = ['x']", "domains/evolution: include"),
         ("[dimensions]\nscales = [3.0, 1.0]", "dimensions: scales"),
         ("[dimensions]\nmethods = ['spectrum']", "dimensions.methods"),
     ],

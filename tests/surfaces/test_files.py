@@ -13,6 +13,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.file_contents import file_contents
 
 HEIGHTS = np.random.default_rng(1).normal(size=(12, 17)) * 1e-6
 
@@ -125,7 +126,7 @@ READERS = {
     "read_points": fc.surfaces.read_points,
     "read_mask": lambda path: fc.domains.read_mask(path, 1.0),
     "open": fc.open,
-    "contents": fc.scenes.contents,
+    "contents": file_contents,
     "load": fc.scenes.load,
 }
 NAMES = {"read": "a.npy", "read_points": "a.xyz", "read_mask": "a.png", "load": "a.toml"}

@@ -3,7 +3,7 @@ Contact domain from first touch to saturation
 =============================================
 
 A periodic rough surface is pressed from first touch to almost full contact. The contact domain begins as
-a few points, merges into islands, and ends as a plane with holes.
+a few spots, merges into islands, and ends as a plane with holes.
 """
 
 import numpy as np
@@ -13,28 +13,48 @@ import fractalcontact as fc
 MODULUS = 1e10  # Pa
 
 surface = fc.surfaces.spectral(
-    (256, 256), 1e-5, hurst=0.8, rms_slope=0.1, long_cutoff=2.56e-3, short_cutoff=4e-5, rng=7
+    (256, 256), 1e-5, hurst=0.8, rms_slope=0.1, rolloff=1.28e-3, short_cutoff=8e-5, rng=7
 )
-pressure = MODULUS * np.geomspace(2e-4, 0.1, 14)
+pressure = MODULUS * np.geomspace(5e-4, 0.1, 14)
 pressed = fc.contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure)
 print(pressed)
 
 maps = fc.plotting.contact_domains(pressed.isel(step=[0, 3, 6, 8, 10, 13]))
 
 # %%
-# The box dimension begins near 1, with a few clusters, and ends at 2. That of the random null (randomly
-# placed cells of equal coverage) begins near 0 and is larger above a coverage of about a quarter. The
-# difference between the two shows the clustering of the contacts; the box dimension alone does not.
+# The whole evolution in one map: without plasticity the sets are nested, so that the domain at a load is all
+# that has its colour or a darker one.
 
-dimensions = fc.domains.box_dimension(pressed["state"])
-print(dimensions)
-box_dimension = fc.plotting.box_dimension(dimensions)
+first = fc.plotting.first_contact(pressed)
 
 # %%
-# The lacunarity decreases from that of rare points towards 1, that of a full plane.
+# Islands are born until those that merge outnumber them. The dotted line is the load of coalescence.
+
+evolution = fc.domains.evolution(pressed["state"])
+print(evolution)
+counts = fc.plotting.lineage(evolution)
+
+# %%
+# The local dimension d(s) of all states over one axis in metres. Below the spot size (circle) a domain is a
+# plane, d = 2; beyond the gap size (square) every box meets it, and d is 2 again. Between the two d says how
+# the spots are placed: it is that of random spots of equal area, perimeter and number (dashed) where they are
+# scattered. Clustered spots leave larger gaps, so that beyond the spot size their curve stays below.
+
+signature = fc.domains.signature(pressed["state"])
+print(signature)
+slopes = fc.plotting.signature(signature)
+
+# %%
+# Up to a coverage of a quarter the spots hardly grow, while the gaps between them close by more than ten.
+
+lengths = fc.plotting.path(signature, ["spot_size", "gap_size", "pair_correlation_length"])
+
+# %%
+# The lacunarity decreases from that of rare spots towards 1, that of a full plane, at every box size.
 
 lacunarity = fc.domains.lacunarity(pressed["state"], [1, 2, 4, 8, 16, 32, 64, 128])
 lacunarity_curves = fc.plotting.lacunarity(lacunarity)
+lacunarity_map = fc.plotting.lacunarity(lacunarity, maps=True)
 
 # %%
 # The real contact area is proportional to the pressure at first and saturates in the end.

@@ -31,7 +31,7 @@ for hurst in (0.8, 0.3):
     state = fc.contact.press(rough_surface(hurst), contact_modulus=MODULUS, nominal_pressure=pressure)[
         "state"
     ]
-    all_sizes, small = (fc.domains.box_dimension(state, scales=2 ** np.arange(k)) for k in (9, 6))
+    all_sizes, small = (fc.domains.box_dimension(state, box_sizes=2 ** np.arange(k)) for k in (9, 6))
     dimensions[hurst] = fc.domains.box_dimension(state)
     columns = [all_sizes.coverage, all_sizes.box_dimension, all_sizes.null_dimension]
     columns += [small.box_dimension, small.null_dimension]
@@ -46,7 +46,7 @@ rough = fc.plotting.box_dimension(dimensions[0.3])
 # A power law holds where the local dimension is constant over a range of sizes. At low load it decreases:
 # the contacts are smooth islands that look like points from afar.
 
-slopes = fc.plotting.local_slopes(dimensions[0.8])
+slopes = fc.plotting.signature(dimensions[0.8])
 
 # %%
 # The area dimension: the same surface with successively shorter waves left out, on coarser grids, under

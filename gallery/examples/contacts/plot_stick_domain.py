@@ -34,7 +34,7 @@ unloaded = fc.contact.press(
 )
 print(sheared["full"])
 
-maps = fc.plotting.slip_domains(sheared["full"])
+maps = fc.plotting.contact_domains(sheared["full"])
 
 # %%
 # The stick set of the superposition and the contact under the smaller force agree node by node. With the
@@ -56,7 +56,7 @@ for name, planes in sets.items():
 
 SCALES = (2, 4, 8, 16, 32)  # of all sets, in nodes
 measured = {
-    name: (fc.domains.box_dimension(planes, scales=SCALES), fc.domains.lacunarity(planes))
+    name: (fc.domains.box_dimension(planes, box_sizes=SCALES), fc.domains.lacunarity(planes))
     for name, planes in sets.items()
 }
 figure = plt.figure(figsize=(7.2, 3.2), layout="constrained")
@@ -64,7 +64,7 @@ left, right = figure.subplots(1, 2)
 styles = {"superposition": "o-", "full": "s--", "contact at P - Q/mu": "k:"}
 for name, (boxes, gliding) in measured.items():
     left.plot(shares, boxes["box_dimension"], styles[name], label=name, ms=4)
-    at_box = gliding["relative_lacunarity"].sel(box_size=4)
+    at_box = (gliding["lacunarity"] / gliding["null_lacunarity"]).sel(box_size=4)
     right.plot(shares, at_box, styles[name], label=name, ms=4)
 boxes = measured["full"][0]
 left.plot(shares, boxes["null_dimension"], c="0.6", label="random null")

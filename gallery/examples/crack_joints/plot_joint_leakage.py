@@ -25,7 +25,7 @@ laws = fc.plotting.closure_laws(closure)
 
 opening = fc.joints.dilatancy(crack, shear=np.arange(0, 4e-3, 1e-4))
 print(opening)
-dilatancy = fc.plotting.rigid_dilatancy(opening)
+dilatancy = fc.plotting.dilatancy(opening)
 
 # %%
 # The hydraulic aperture is the distance of two smooth parallel plates that let the same flow pass.

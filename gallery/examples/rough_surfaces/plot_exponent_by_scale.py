@@ -24,7 +24,7 @@ for options in ({}, {"psf": 1.5e-5}):
     result = fc.dimensions.estimate(scan, **options).sel({"method": "default"})
     low, high = float(result.ci_low), float(result.ci_high)
     print(f"H = {float(result.hurst):.2f}, 95 % interval {low:.2f} to {high:.2f}")
-print(result.hurst.attrs["comment"])
+print(result.note.item())
 
 # %%
 # The exponent by octave of wavelength shows where blur and noise end and self-affinity begins. A surface that
@@ -37,4 +37,4 @@ both = rough + smooth.values
 figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.2), layout="constrained")
 fc.plotting.scaling(fc.dimensions.scaling(scan), ax=left)
 fc.plotting.scaling(fc.dimensions.scaling(both), ax=right)
-print(fc.dimensions.estimate(both).hurst.attrs["comment"])
+print(fc.dimensions.estimate(both).note.values)

@@ -13,8 +13,6 @@ which no published dimension was found. The map, of the United States Geological
 matplotlib: nothing is fetched.
 """
 
-import json
-
 import matplotlib.pyplot as plt
 
 import fractalcontact as fc
@@ -26,12 +24,12 @@ print(land)
 
 # %%
 # No single exponent describes all wavelengths here, nor does one with the blur of an instrument; the default
-# estimate is that of the longest run of octaves that one exponent explains. The comment says so.
+# estimate is that of the longest run of octaves that one exponent explains. The note says so.
 
 result = fc.dimensions.estimate(land).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
 print(f"H = {float(result.hurst):.2f}, 95 % interval {low:.2f} to {high:.2f}")
-print(json.loads(result.hurst.attrs["comment"])["default"])
+print(result.note.item())
 
 # %%
 # The exponent by octave of wavelength shows why: it falls from above 1 at the shortest waves, where the map

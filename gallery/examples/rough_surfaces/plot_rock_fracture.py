@@ -14,7 +14,6 @@ licence and checksum. No published dimension of this fracture itself was found: 
 rocks. Without the file a synthetic surface of H = 0.81 stands in for it.
 """
 
-import json
 import os
 from pathlib import Path
 
@@ -33,13 +32,13 @@ print(fracture)
 
 # %%
 # The default estimate. The points were interpolated linearly on the grid, which changes the shortest waves:
-# the exponent changes with scale, the interval is wide, and the comment says why.
+# the exponent changes with scale, the interval is wide, and the note says why.
 
 result = fc.dimensions.estimate(fracture).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
 print(f"H = {float(result.hurst):.2f}, 95 % interval {low:.2f} to {high:.2f}")
 print(f"dimension {float(result.fractal_dimension):.2f}")
-print(json.loads(result.hurst.attrs.get("comment", "{}")).get("default", "no remark"))
+print(result.note.item() or "no remark")
 
 # %%
 # Left, the exponent by octave of wavelength; blue is the longest run of octaves that one exponent explains.

@@ -43,7 +43,7 @@ relief = fc.plotting.surface(lower)
 # towards E and N.
 
 estimate = fc.dimensions.estimate(lower).isel(method=0)
-low, high = 3 - estimate.ci_high, 3 - estimate.ci_low
+low, high = estimate.fractal_dimension_low, estimate.fractal_dimension_high
 print(f"fractal dimension {estimate.fractal_dimension:.2f}, 95 % interval {low:.2f} to {high:.2f}")
 jrc = fc.joints.roughness_coefficient(lower)
 for one in jrc.roughness_coefficient:

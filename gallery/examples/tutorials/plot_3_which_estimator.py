@@ -6,8 +6,6 @@ The same surfaces, exact and spoilt as scans are, by several estimators. The tru
 surfaces are synthetic.
 """
 
-import json
-
 import numpy as np
 import xarray as xr
 from matplotlib import pyplot as plt
@@ -48,12 +46,13 @@ for ax, name in zip(panels, ["exact", "white noise", "blur of 1.5 spacings"], st
     ax.set_title(name)
 
 # %%
-# What the estimate found is said in the attribute ``comment``, for each method.
+# What the estimate found is said in the variable ``note``, for each method.
 
 for name, one in estimates.items():
     first = one.isel(method=0)
-    print(f"{name}: {first.fractal_dimension:.2f} ({3 - first.ci_high:.2f} to {3 - first.ci_low:.2f})")
-    print("   ", json.loads(first.hurst.attrs["comment"]).get("default", "no remark"))
+    low, high = first.fractal_dimension_low, first.fractal_dimension_high
+    print(f"{name}: {first.fractal_dimension:.2f} ({low:.2f} to {high:.2f})")
+    print("   ", first.note.item() or "no remark")
 
 # %%
 # Take the default, unless a standard or a comparison with other work asks for a curve; then quote its

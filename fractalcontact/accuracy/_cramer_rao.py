@@ -1,0 +1,90 @@
+"""Cramer-Rao bounds: the least standard error of an unbiased estimate of the Hurst exponent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import zeta
+
+from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane
+BOUND_STEP = 1e-4  # of the derivative by H
+
+
+def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, aliases: bool = True) -> float:
+    """Return the bound for n points along each axis of fractional Brownian heights of unknown amplitude.
+
+    Whittle's information gives sqrt(2 / var(d ln f / dH)) / n of a surface for large n: f is the spectral
+    density as sampled, with all its aliases, and the variance is over all wavevectors of the grid. At H near
+    1 a small surface does better by up to a fifth, because no exponent beyond 1 is allowed there. With a
+    Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer
+    function is above one half. Without `aliases` the density is the power law itself.
+    """
+    density = aliased_density if axes == 2 else profile_density
+    low, high = max(hurst - BOUND_STEP, 1e-6), hurst + BOUND_STEP
+    slope = (np.log(density(high)) - np.log(density(low))) / (high - low)
+    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
+    squares = w[:, None] ** 2 + w**2 if axes == 2 else w**2
+    if not aliases:
+        slope = -np.log(squares)
+    inside = blur**2 * squares < np.log(2.0)
+    return float(np.sqrt(2.0 / (np.var(slope[inside]) * inside.mean() * n**axes)))
+
+
+def rolloff_bound(hurst: float, n: int, corner: float, blur: float = 0.0) -> float:
+    """Return the bound of a surface with a slow roll-off, whose corner and amplitude are unknown."""
+    points = min(n, 2 * BOUND_POINTS)
+    w = (np.arange(points) + 0.5) / points * np.pi
+    turns = 2.0 * np.pi * np.arange(-2, 3)[:, None]
+    squares = (w + turns)[:, None, :, None] ** 2 + (w + turns)[None, :, None, :] ** 2
+
+    def logs(exponent: float, length: float) -> Array:
+        """Far aliases do not feel the corner."""
+        rolled = (squares + (2.0 * np.pi / length) ** 2) ** (-1.0 - exponent) - squares ** (-1.0 - exponent)
+        return np.asarray(np.log(aliased_power_law((w[:, None], w), exponent) + rolled.sum(axis=(0, 1))))
+
+    step = BOUND_STEP
+    low, high = max(hurst - step, 1e-6), hurst + step
+    slope = (logs(high, corner) - logs(low, corner)) / (high - low)
+    bend = logs(hurst, corner * (1.0 + step)) - logs(hurst, corner)
+    inside = blur**2 * (w[:, None] ** 2 + w**2) < np.log(2.0)
+    slope, bend = (part[inside] - part[inside].mean() for part in (slope, bend))
+    unexplained = slope - bend * (slope @ bend) / (bend @ bend)
+    return float(np.sqrt(2.0 / np.sum(unexplained**2)) * points / n)
+
+
+def aliased_density(hurst: float) -> Array:
+    """Return the spectral density of the sampled surface on a quarter of its wavevectors."""
+    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
+    return aliased_power_law((w[:, None], w), hurst)
+
+
+def profile_density(hurst: float) -> Array:
+    """Return the spectral density of the sampled profile: the sum of |w + 2 pi k|^(-1 - 2 hurst)."""
+    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS / 2.0
+    power = 1.0 + 2.0 * hurst
+    return np.asarray(zeta(power, w) + zeta(power, 1.0 - w))
+
+
+def band_bound(shape: tuple[int, int], low: float, high: float) -> float:
+    """Return the bound for the independent modes of a periodic power law.
+
+    Parameters
+    ----------
+    shape : (ny, nx)
+        Of a grid with spacing 1.
+    low, high : float
+        Shortest and longest wavelength of the band, in spacings, both known; 0 and inf for all modes.
+    """
+    wave = radial_wavenumber(shape, (1.0, 1.0))
+    weights = np.broadcast_to(half_weights(shape[1]), wave.shape)
+    length = np.divide(2.0 * np.pi, wave, out=np.zeros_like(wave), where=wave > 0)
+    inside = (length > 0) & (length >= low * (1 - 1e-9)) & (length <= high * (1 + 1e-9))
+    logs, weights = np.log(wave[inside]), weights[inside]
+    spread = float(np.sum(weights * (logs - np.average(logs, weights=weights)) ** 2))
+    # a mode has the power q^(-2 - 2 H): d ln power / dH = -2 ln q, and each is one real Gaussian number
+    return float(1.0 / np.sqrt(2.0 * spread))

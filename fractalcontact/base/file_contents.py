@@ -1,0 +1,197 @@
+"""The contents of a result file as text: groups, variables, achieved errors and run times.
+
+Nothing here needs xarray, so that the command starts fast.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.netcdf_header import Header, read_headers
+from fractalcontact.base.tables import Note, screen_width, table
+
+SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
+REASONS = ("comment", "reason")  # attributes with a reason for each direction, as JSON
+REMARKS = ("note", "reason")  # string variables over `method`
+
+
+def file_contents(path: str | os.PathLike[str]) -> str:
+    """Return the contents of a result file: groups and variables, then the stages with errors and run times.
+
+    Raises
+    ------
+    UnreadableFile
+        There is no such file, or it is not complete.
+    """
+    groups = read_headers(path, _is_achieved)
+    root = groups["/"]
+    keys = ("title", "source", "completeness")
+    lines = [str(root.attrs[key]) for key in keys if key in root.attrs]
+    for place, group in groups.items():
+        if group.variables:
+            lines += ["", place, *_variable_lines(group), *_reason_lines(group), *_achieved_lines(group)]
+    for place, group in groups.items():
+        if place == "/" or not root.attrs.get("provenance"):
+            rows = stage_rows(group)
+            lines += ["", table(rows) if len(rows) > 1 else ", ".join(rows[0])] if rows else []
+    return "\n".join(lines)
+
+
+def stage_rows(result: Any) -> list[tuple[str, ...]]:
+    """Return the stages of a study as rows below a head: run time, achieved accuracy, and an earlier origin.
+
+    `result` has the attributes of the root of a study, or of a single result, whose call is the only row.
+    """
+    entry = _provenance(result)
+    stages = entry.get("stages", {})
+    if not stages or not _are_stages(stages):
+        call = _single_call(entry)
+        return [(call,)] if call else []
+    rows: list[tuple[str, ...]] = [("stage", "run time (s)", "achieved")]
+    for name, facts in stages.items():
+        achieved = {key: value for key, value in facts.items() if key not in ("run_time", "origin")}
+        origin = "" if facts.get("origin") == "computed" else f" ({facts.get('origin')})"
+        rows.append((name, f"{facts['run_time']:.2f}", ", ".join(_phrases(achieved)) + origin))
+    together = sum(facts["run_time"] for facts in stages.values())
+    total = entry.get("run_time", together)
+    if "run_time" in entry:  # workers share the stages, and take time to start
+        rows.append(("all stages", f"{together:.2f}", SHARED if together > total else ""))
+    rows.append(("total", f"{total:.2f}", ""))
+    return rows
+
+
+def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
+    """Return the reasons in an attribute by method; a reason of several methods is listed once."""
+    try:
+        by_method = json.loads(attributes.get(key, "{}"))
+    except (TypeError, ValueError):
+        return {}
+    methods: dict[str, list[str]] = {}
+    for method, reason in by_method.items() if isinstance(by_method, dict) else ():
+        methods.setdefault(str(reason), []).append(method)
+    return {", ".join(names): reason for reason, names in methods.items() if reason}
+
+
+def remarks(methods: Sequence[str], texts: Any) -> dict[str, str]:
+    """Return texts (..., methods) by method; a text of several methods is listed once, without empty ones."""
+    found: dict[str, dict[str, None]] = {}
+    for row in np.reshape(np.asarray(texts, dtype=str), (-1, len(methods))):
+        for method, text in zip(methods, row, strict=True):
+            found.setdefault(text, {})[method] = None
+    return {", ".join(names): text for text, names in found.items() if text}
+
+
+def _are_stages(stages: Any) -> bool:
+    """Return whether an entry has the form of the stages of a study; other packages use the same name."""
+    return isinstance(stages, dict) and all(
+        isinstance(facts, dict) and isinstance(facts.get("run_time"), (int, float))
+        for facts in stages.values()
+    )
+
+
+def _provenance(result: Any) -> dict[str, Any]:
+    """Return the provenance of a result, empty for a file of another origin."""
+    try:
+        entry = json.loads(result.attrs.get("provenance", "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return entry if isinstance(entry, dict) else {}
+
+
+_NOT_ACHIEVED = ("parameters", "version", "fft", "threads", "random", "file_sha256", "merged", "stages")
+
+
+def _single_call(entry: dict[str, Any]) -> str:
+    """Return the call of a single result with its run time and its achieved errors."""
+    facts = {key: value for key, value in entry.items() if key not in _NOT_ACHIEVED and value is not None}
+    earlier = facts.pop("before", None)  # the calls that made the input, the last one first
+    while isinstance(earlier, dict):
+        facts["after"] = f"{facts.get('after', '')} {earlier.get('call', '')}".strip()
+        earlier = earlier.get("before")
+    return ", ".join(f"{key.replace('_', ' ')} {_short(value)}" for key, value in facts.items())
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _phrases(facts: dict[str, Any]) -> Iterable[str]:
+    for key, value in facts.items():
+        word = key.replace("_", " ")
+        if isinstance(value, list):
+            yield f"{word} " + " ".join("-" if v is None or v != v else f"{v:.4f}" for v in value)
+        elif isinstance(value, bool):
+            yield word if value else f"not {word}"
+        elif key == "error":
+            yield str(value)
+        else:
+            yield f"{word} {value:.2g}" if isinstance(value, float) else f"{word} {value}"
+
+
+def _variable_lines(group: Header) -> Iterable[str]:
+    """Yield name, dims, long name and units of every variable, in columns."""
+    rows = []
+    for name, (sizes, attributes) in group.variables.items():
+        dims = ", ".join(f"{dim} {size}" for dim, size in sizes.items())
+        units = attributes.get("units", "")
+        unit = "" if units in ("", "1") else f" [{units}]"
+        rows.append((name, f"({dims})" if dims else "", f"{attributes.get('long_name', '')}{unit}"))
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for name, dims, words in rows:
+        line = f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
+        yield from _wrapped(line, min(6 + widths[0] + widths[1], screen_width() // 2))
+
+
+def _wrapped(line: str, indent: int) -> Iterable[str]:
+    """Yield a line in columns in the width of the screen, the rest of it below its last column."""
+    if len(line) <= screen_width():
+        return [line]
+    cut = line.rfind(" ", 0, screen_width() + 1)
+    rest = textwrap.wrap(line[cut:].strip(), screen_width() - indent)
+    return [line[:cut].rstrip(), *(" " * indent + part for part in rest)]
+
+
+def _is_achieved(name: str) -> bool:
+    ends = ("_error", "_low", "_high", "misfit")
+    return name in ("run_time", "residual", "converged", "method", *REMARKS) or name.endswith(ends)
+
+
+def _achieved_lines(group: Header) -> Iterable[str]:
+    """Yield the achieved errors of a group and its run time, each from the smallest to the largest."""
+    for name, numbers in group.values.items():
+        if np.asarray(numbers).dtype.kind not in "biuf":
+            continue
+        values: np.ndarray[Any, Any] = np.ravel(np.ma.filled(np.ma.asarray(numbers, dtype=float), np.nan))
+        finite = values[np.isfinite(values)]
+        word = name.replace("_", " ")
+        if name == "converged":
+            yield f"    converged: {int(finite.sum())} of {values.size}"
+        elif finite.size == 0:
+            yield f"    {word}: not available"
+        elif name == "run_time":
+            yield f"    {word}: {finite.sum():.3g} s"
+        else:
+            ends = dict.fromkeys(f"{value:.3g}" for value in (finite.min(), finite.max()))
+            yield f"    {word}: {' ... '.join(ends)}"
+
+
+def _reason_lines(group: Header) -> Iterable[str]:
+    """Yield the remarks on single methods, those of several variables once."""
+    variables: dict[str, list[str]] = {}
+    for name, (_, attributes) in group.variables.items():
+        for key in REASONS:
+            for methods, reason in reasons(attributes, key).items():
+                variables.setdefault(f"{methods}: {reason}", []).append(name)
+    for text, names in variables.items():
+        yield str(Note(f"{', '.join(names)}, {text}", indent=4))
+    if "method" in group.values:
+        order = [str(name) for name in group.values["method"]]
+        for key in REMARKS:
+            for concerned, remark in remarks(order, group.values.get(key, [])).items():
+                yield str(Note(f"{concerned}: {remark}", indent=4))

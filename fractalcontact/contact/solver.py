@@ -1,0 +1,317 @@
+"""The contact solver on plain arrays, under `press`, `partial_slip` and the joints.
+
+    options, load = ContactOptions(hardness=2e9), LoadPath("normal_force", (10.0, 20.0))
+    pressed = solve(heights, grid, contact_modulus, options, load, keep=("state",))
+    pressed.columns["closure"], pressed.maps["state"]  # of shape (step,) and (step, y, x)
+
+Two subpackages call it, so the module is public inside the package; users call `press` and `partial_slip`.
+Options and loads validate themselves; `ContactOptions.check_grid`, `check_load` and `check_scale` collect
+what does not fit a surface. Beyond that nothing is validated, nothing is labelled, and no warning is given:
+every step states whether it converged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.grid import Grid, contact_edges
+from fractalcontact.base.progress import track
+from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED
+from fractalcontact.base.validation import Problems
+from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
+from fractalcontact.contact._flat_block import block_stiffness
+from fractalcontact.contact._load_path import Step, scaled_path, solve_path
+from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._superposition import (
+    ACCEPTABLE_ERROR,
+    FORCE_ROUNDING,
+    METHODS,
+    ShearPath,
+    Superposition,
+    reduced_forces,
+    shear_states,
+    solve_reduced,
+    superposition_error,
+)
+
+__all__ = [
+    "ACCEPTABLE_ERROR",
+    "CONTROLS",
+    "METHODS",
+    "ContactOptions",
+    "LoadPath",
+    "Pressed",
+    "ShearPath",
+    "Sheared",
+    "block_stiffness",
+    "check_scale",
+    "check_sliding",
+    "rms_slope",
+    "solve",
+    "solve_shear",
+]
+Array = np.ndarray[Any, np.dtype[Any]]
+
+PRESSURE_CLASSES = 50  # of a distribution of pressures, from 0 to the greatest of the step
+PUNCH_TOLERANCE = 1e-2  # left an error of the stiffness below 1e-5 on rough surfaces of 256 x 256 nodes
+PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
+START_TOLERANCE = 1e-2  # of the superposition from which the full method starts
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A surface pressed along a load path.
+
+    `columns` holds the scalars of the steps, shape (step,), and what has a further axis; `maps` the maps that
+    were asked for, shape (step, y, x). `disc_radius` is in m, None for other influence coefficients.
+    """
+
+    columns: dict[str, Array]
+    maps: dict[str, Array]
+    disc_radius: float | None
+
+
+def solve(
+    heights: Array,
+    grid: Grid,
+    contact_modulus: float,
+    options: ContactOptions,
+    load: LoadPath,
+    *,
+    keep: Sequence[str] = (),
+    include: Sequence[str] = (),
+    progress: bool = False,
+) -> Pressed:
+    """Press a rigid flat down on a surface along a load path.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (ny, nx)
+        Finite heights in m, up positive.
+    grid : Grid
+    contact_modulus : float
+        E* in Pa.
+    options : ContactOptions
+    load : LoadPath
+    keep : sequence of str
+        Names of maps, see `MAPS`.
+    include : sequence out of "stiffness", "pressure_distribution"
+    progress : bool
+    """
+    path = scaled_path(heights, grid, contact_modulus, options, load)
+    rows: list[dict[str, Any]] = []
+    maps: dict[str, list[Array]] = {name: [] for name in keep}
+    before: Step | None = None
+    for step in track(solve_path(path), progress, "press", total=len(path.values)):
+        row = _scalars(step, grid)
+        if "stiffness" in include:
+            stiffness = _stiffness(step, before, grid)
+            row |= {"contact_stiffness": stiffness, "relative_conductance": stiffness / contact_modulus}
+        if "pressure_distribution" in include:
+            row |= _pressure_distribution(step.pressure)
+        rows.append(row)
+        for name, planes in maps.items():
+            planes.append(np.asarray(MAPS[name](step, heights)))
+        before = step
+    body = path.body
+    return Pressed(
+        {name: np.array([row[name] for row in rows]) for name in rows[0]},
+        {name: planes[0][None] if len(planes) == 1 else np.stack(planes) for name, planes in maps.items()},
+        body.radius * path.units.length if body.influence == "disc" else None,
+    )
+
+
+def rms_slope(heights: Array, grid: Grid) -> float:
+    """Return the root mean square gradient, from the differences of neighbours."""
+    square = 0.0
+    for axis, (spacing, wraps) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
+        steps = np.diff(
+            heights, axis=axis, append=heights.take([0], axis) if wraps else heights.take([], axis)
+        )
+        largest = float(np.abs(steps).max()) or 1.0  # heights of any unit: no square leaves the range
+        square += float(np.mean((steps / largest) ** 2)) * (largest / spacing) ** 2
+    return float(np.sqrt(square))
+
+
+def _state(step: Step) -> Array:
+    """Return the flags open, contact, yielded."""
+    state = np.where(step.contact, np.int8(CONTACT), np.int8(OPEN))
+    state[step.contact & step.yielded] = YIELDED
+    return state
+
+
+# each map of a step, from the step and the heights of the surface
+MAPS: dict[str, Callable[[Step, Array], Array]] = {
+    "state": lambda step, _: _state(step),
+    "pressure": lambda step, _: step.pressure,
+    "gap": lambda step, _: step.gap,
+    "displacement": lambda step, _: step.displacement,
+    "residual_height": lambda step, heights: heights - step.indentation,
+}
+
+
+def _scalars(step: Step, grid: Grid) -> dict[str, Any]:
+    """Return the scalars of a step."""
+    contact, periodic = step.contact, step.path.body.periodic
+    cells = int(np.count_nonzero(contact))
+    edges = int(contact_edges(contact, (periodic, periodic)).sum())
+    scalars = {
+        "closure": step.closure,
+        "normal_force": step.force,
+        "nominal_pressure": step.force / grid.nominal_area,
+        "contact_area": cells * grid.cell_area,
+        "contact_fraction": cells / contact.size,
+        "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
+        "mean_gap": step.mean_gap,
+        "elastic_energy": step.elastic_energy,
+        "plastic_work": step.plastic_work,
+        "iterations": step.solution.iterations,
+        "transforms": step.solution.transforms,
+        "residual": step.solution.residual,
+        "converged": step.solution.reason == "converged",
+        "stop_reason": STOP_REASONS[step.solution.reason],
+        "run_time": step.run_time,
+    }
+    if not np.isfinite(step.path.hardness):
+        del scalars["plastic_work"]
+    return scalars
+
+
+def _stiffness(step: Step, before: Step | None, grid: Grid) -> float:
+    """Return the derivative of the nominal pressure by the closure, Pa/m; NaN where it has no bound."""
+    if not step.force > 0:
+        return 0.0 if step.force == 0 else np.nan
+    guess = None
+    if before is not None:  # roughly the derivative of the pressure
+        change = np.abs(step.solution.pressure - before.solution.pressure)
+        guess = np.where(step.contact, change, 0.0)
+    punch = press_punch(step, guess, tolerance=PUNCH_TOLERANCE)
+    stiffness = np.inf if punch is None else stiffness_of(punch) / grid.nominal_area
+    return float(stiffness) if np.isfinite(stiffness) else np.nan
+
+
+def _pressure_distribution(pressure: Array) -> dict[str, Any]:
+    """Return the greatest pressure (Pa), and the shares of area and load in each class of pressures.
+
+    The area is that of the whole extent, the open part of which is in no class.
+    """
+    greatest = float(pressure.max())
+    if not greatest > 0:
+        none = np.full(PRESSURE_CLASSES, 0.0 if greatest == 0 else np.nan)
+        return {"maximum_pressure": greatest, "area_share": none, "load_share": none}
+    relative = pressure[pressure > 0] / greatest
+    number = np.minimum((relative * PRESSURE_CLASSES).astype(np.int64), PRESSURE_CLASSES - 1)
+    area = np.bincount(number, minlength=PRESSURE_CLASSES) / pressure.size
+    load = np.bincount(number, relative, minlength=PRESSURE_CLASSES)
+    return {"maximum_pressure": greatest, "area_share": area, "load_share": load / load.sum()}
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """A pressed surface sheared along a path; `columns`, `maps` and `disc_radius` as in `Pressed`."""
+
+    closure: float
+    normal_force: float
+    contact_area: float
+    method: str
+    superposition_error: float
+    columns: dict[str, Array]
+    maps: dict[str, Array]
+    disc_radius: float | None
+
+
+def solve_shear(
+    heights: Array,
+    grid: Grid,
+    contact_modulus: float,
+    options: ContactOptions,
+    load: LoadPath,
+    shear: ShearPath,
+    *,
+    keep: Sequence[str] = (),
+    progress: bool = False,
+) -> Sheared:
+    """Press a surface under a load of one step, and shear it; arguments as for `solve`.
+
+    Raises
+    ------
+    InvalidInput
+        The force under an imposed closure is not determined, or slides: both are known only here.
+    """
+    path = scaled_path(heights, grid, contact_modulus, options, load)
+    pressed = next(solve_path(path)) if path.control == "closure" else None
+    normal = path.values[0] if pressed is None else pressed.force
+    if pressed is not None:
+        with Problems("fractalcontact.contact.partial_slip") as problems:
+            expected = "a closure whose force is determined: above the mean plane of a periodic body"
+            if problems.require(math.isfinite(normal), "closure", expected, load.values[0]):
+                check_sliding(problems, shear, normal)
+    states = shear_states(shear.forces)
+    reduced, numbers = reduced_forces(states, normal, shear.friction)
+    steps = solve_reduced(path, reduced, pressed, path.tolerance)
+    first = next(steps)
+    error = superposition_error(first, shear)
+    method = shear.method
+    if method is None:
+        is_suitable = abs(error) <= ACCEPTABLE_ERROR or shear.slides(normal)
+        method = "superposition" if is_suitable else "full"
+    if method == "full":
+        steps = solve_reduced(path, reduced, first, START_TOLERANCE)
+        next(steps)  # the first one
+    wanted = ("traction_x",) if method == "full" else keep  # where the full method starts from
+    superposition = Superposition(
+        states, numbers, shear, grid.cell_area, wanted, stiffness=method == "superposition"
+    )
+    for step in track(chain([first], steps), progress, "partial_slip", total=len(reduced)):
+        superposition.add(step)
+    columns = superposition.columns()
+    if method == "full":
+        maps = _solve_fully(superposition, columns, keep)
+    else:
+        maps = {name: superposition.map(name) for name in keep}
+    body = path.body
+    return Sheared(
+        first.closure,
+        first.force,
+        np.count_nonzero(first.contact) * grid.cell_area,
+        method,
+        error,
+        columns,
+        maps,
+        body.radius * path.units.length if body.influence == "disc" else None,
+    )
+
+
+def _solve_fully(
+    superposition: Superposition, columns: dict[str, Array], keep: Sequence[str]
+) -> dict[str, Array]:
+    """Return the maps of the full method and write its columns; every step starts from the superposition."""
+    from fractalcontact.contact._coulomb import coulomb_path, empty_maps
+    from fractalcontact.contact._tangential_operator import TangentialOperator
+
+    shear, normal, contact = superposition.shear, superposition.normal, superposition.contact
+    maps = empty_maps(keep, (len(shear.forces), *contact.shape))
+    if contact.any():
+        operator = TangentialOperator(normal.path.body, contact, shear.poisson)
+        law = (shear.friction, np.array(shear.unit))
+        coulomb_path(normal, operator, np.array(shear.forces), superposition.traction(), *law, columns, maps)
+    return maps
+
+
+def check_sliding(problems: Problems, shear: ShearPath, normal_force: float) -> bool:
+    """Check that no tangential force is beyond that at which the whole contact slides."""
+    limit = shear.friction * normal_force
+    greatest = max(shear.forces, key=abs)
+    expected = f"at most friction times normal force, {limit:.8g} N, where sliding begins"
+    if shear.method == "full":
+        expected += ", and less by 1e-6 with method='full'"
+        below = not shear.slides(normal_force)
+    else:
+        below = abs(greatest) <= limit * (1 + FORCE_ROUNDING)
+    return problems.require(below, "tangential_force", expected, greatest)

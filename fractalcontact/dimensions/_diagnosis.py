@@ -1,0 +1,156 @@
+"""What no exponent describes: spikes, seams, levelled rows, repeated or interpolated points, missing
+extremes.
+
+Each is named with the preparation step that removes it; `estimate` then gives no interval. Nothing is
+repaired here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.dimensions._quantisation import quantisation
+from fractalcontact.dimensions._surface_input import Surface
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_REPEATED = 0.1  # share of rows or columns
+_LINEAR = 0.01  # share of heights exactly on a line with their neighbours; measured heights have none
+_SPIKE = 20.0  # standard deviations: 1e8 Gaussian second differences reach 5.7, a scanned rock face 15
+_SPIKED = 0.1  # share of the squared second differences below which noise and misfit describe them
+_SEAM = 6.0  # deviations of a line of increments; 5.3 was the most of 750 exact surfaces, H .1 to .9
+_BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
+_FEWEST_GAPS = 12
+_NORMAL_QUARTILE = 0.6744897501960817
+_BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
+_PARTS = 4
+
+
+def diagnose(surface: Surface) -> str:
+    """Return why no interval holds for a surface, and what to do; empty where nothing was found."""
+    if surface.finest_scale:
+        return ""
+    if surface.linear_share > _LINEAR:
+        return (
+            "many heights lie exactly on lines between their neighbours: they were interpolated; "
+            "grid the points with "
+            "fractalcontact.surfaces.from_points, or give `scales` from eight distances of the points on"
+        )
+    if surface.repeated_share > _REPEATED:
+        return (
+            "many rows or columns repeat their neighbours: the surface was enlarged; remove the "
+            "repeated ones, or give "
+            "`scales` from eight blocks on"
+        )
+    return _seams(surface.heights) or _spikes(surface.heights) or _missing_extremes(surface.heights)
+
+
+def rounding_step(surface: Surface) -> float:
+    """Return the step to which scaled heights were rounded; 0 where none is seen."""
+    return quantisation(surface.heights)[0]
+
+
+def unevenness(heights: Array) -> float:
+    """Return by how much the roughness scatters between blocks more than within them, at least 1.
+
+    The variances of the exponent grow by this factor. Blocks hold 4 x 4 parts; where roughness is even, the
+    variance of their mean square second difference is a sixteenth of that of the parts.
+    """
+    squares = _squared_bends(heights)
+    edges = [max(1, n // (_BLOCKS * _PARTS)) for n in squares.shape]
+    counts = [n // edge // _PARTS * _PARTS for n, edge in zip(squares.shape, edges, strict=True)]
+    if min(count for count, n in zip(counts, squares.shape, strict=True) if n > 1) < 2 * _PARTS:
+        return 1.0
+    steps = [_PARTS if count else 1 for count in counts]
+    ny, nx = (max(count, 1) for count in counts)
+    parts = squares[: ny * edges[0], : nx * edges[1]].reshape(ny, edges[0], nx, edges[1])
+    with np.errstate(invalid="ignore"):
+        means = np.nanmean(parts, axis=(1, 3)) if np.isfinite(parts).any(axis=(1, 3)).all() else None
+    if means is None or not means.min() >= 0.0 or means.mean() == 0.0:
+        return 1.0
+    blocks = means.reshape(ny // steps[0], steps[0], nx // steps[1], steps[1])
+    within = float(np.mean(blocks.var(axis=(1, 3), ddof=1)))
+    between = float(np.var(blocks.mean(axis=(1, 3)), ddof=1)) * steps[0] * steps[1]
+    return max(1.0, between / within - 1.0) if within > 0.0 else 1.0
+
+
+def _squared_bends(heights: Array) -> Array:
+    """Return the squares of mixed second differences, which offsets of rows and columns do not change.
+
+    Of a profile those of plain second differences.
+    """
+    if heights.shape[0] == 1:
+        return np.square(np.diff(heights, 2, axis=1))
+    return np.square(np.diff(np.diff(heights, axis=0), axis=1))
+
+
+def _spikes(heights: Array) -> str:
+    squares = _squared_bends(heights)
+    known = squares[np.isfinite(squares)]
+    if known.size == 0:
+        return ""
+    # 90 % quantile of chi square over its mean: smooth patches do not move it
+    typical = float(np.quantile(known, 0.9)) / 2.706
+    spiked = known[known > _SPIKE**2 * typical]
+    if typical == 0.0 or spiked.sum() < _SPIKED * known.sum():
+        return ""
+    return (
+        f"{spiked.size} heights stand out of their neighbours by more than {_SPIKE:.0f} standard "
+        f"deviations: spikes or "
+        "steps; see fractalcontact.surfaces.despike"
+    )
+
+
+def _seams(heights: Array) -> str:
+    """Look for lines along an axis across which heights differ more than across all others."""
+    if min(heights.shape) < 16 or np.isnan(heights.min()):
+        return ""
+    for lines, name in ((heights, "rows"), (heights.T, "columns")):
+        squares = np.median(np.diff(lines, axis=0) ** 2, axis=1)  # spikes move no median
+        if not squares.min() > 0.0:
+            continue
+        low, middle, high = np.quantile(np.log(squares), (0.25, 0.5, 0.75))
+        number = int(np.sum(np.log(squares) - middle > _SEAM * (high - low) / (2.0 * _NORMAL_QUARTILE)))
+        if number > 0:
+            return (
+                f"heights jump between {name} at {number} places, as at seams of tiles: analyse the "
+                f"tiles one by one, "
+                "or level them first"
+            )
+    return ""
+
+
+def _missing_extremes(heights: Array) -> str:
+    """Look for gaps whose neighbours lie to one side of their surroundings: valleys or peaks are missing."""
+    from scipy.ndimage import binary_dilation, gaussian_filter, label, mean
+
+    observed = np.isfinite(heights)
+    if observed.all() or heights.shape[0] == 1:
+        return ""
+    gaps = label(~observed, np.ones((3, 3)))[0]
+    border = np.unique(np.concatenate([gaps[0], gaps[-1], gaps[:, 0], gaps[:, -1]]))
+    gaps[np.isin(gaps, border)] = 0
+    values = np.where(observed, heights, 0.0)
+    weight = np.maximum(gaussian_filter(observed.astype(float), 4.0), 1e-6)
+    deviation = np.where(observed, heights - gaussian_filter(values, 4.0) / weight, np.nan)
+    beside = observed & binary_dilation(gaps > 0, np.ones((3, 3)))
+    if not beside.any():
+        return ""
+    from scipy.ndimage import grey_dilation
+
+    owner = grey_dilation(gaps, (3, 3))[beside]
+    numbers = np.unique(owner)
+    if numbers.size < _FEWEST_GAPS:
+        return ""
+    means = np.asarray(mean(deviation[beside], owner, numbers))
+    z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))
+    if not abs(z) > _BESIDE:
+        return ""
+    which = "low" if z < 0 else "high"
+    return (
+        f"{which} heights are missing: those beside gaps lie {abs(z):.1f} standard deviations "
+        f"{'below' if z < 0 else 'above'} their surroundings; scan again with a larger range, or "
+        f"crop to a complete part"
+    )

@@ -1,0 +1,278 @@
+"""Expected power of the cosine modes of a self-affine surface, from a scale mixture of Gaussians.
+
+The covariance of fractional Brownian heights is a sum of Gaussians over octaves of t,
+
+    -r^(2 H) = const + c(H) sum_j t_j^(-H) exp(-t_j r^2),   t_j = 2^j,
+
+the trapezoid rule in ln t of an integral of Mellin; its error is exp(-pi^2 / ln 2) = 7e-7. A Gaussian is a
+product of one-dimensional ones, and it stays one under a Gaussian blur of the spread s,
+
+    exp(-t r^2)  ->  (1 + 4 t s^2)^(-d/2) exp(-t r^2 / (1 + 4 t s^2)),
+
+so that the expected power of each mode is a sum over j of products of two one-dimensional transforms, in
+which sampling (aliases), free edges, unequal spacings and the blur are exact. A profile is the case d = 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base import fft
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+HIGHEST = (
+    12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, and the sum a geometric series
+)
+ALIASED, FILTERED, UNALIASED = range(3)
+
+
+@dataclass(frozen=True)
+class Form:
+    """How the heights were sampled and blurred, with the prior probability without and with a blur."""
+
+    prior: float
+    prior_blurred: float
+
+
+# ALIASED: blurred, then sampled; FILTERED: sampled, then blurred by Gaussian weights of the neighbours;
+# UNALIASED:
+# without waves that are shorter than two points, as a part of a synthetic periodic surface
+FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.25, 0.2)}
+FIRST_SPREAD, SPREADS = 0.3, 26  # the spreads of a table are even in asinh(s / FIRST_SPREAD)
+
+
+def mixture(lowest: int) -> Array:
+    """Return the scales t of the Gaussians, in squared x spacings."""
+    return 2.0 ** np.arange(lowest, HIGHEST)
+
+
+def weights(hurst: float, t: Array) -> Array:
+    """Return the weights of the Gaussians for heights of unit rms increment over one x spacing."""
+    weight = t**-hurst
+    longer = t[0] ** (1.0 - hurst) * 2.0 ** (hurst - 1.0) / (1.0 - 2.0 ** (hurst - 1.0))
+    unit = longer + weight @ -np.expm1(-t) + weight[-1] * 2.0**-hurst / (1.0 - 2.0**-hurst)
+    return np.asarray(0.5 * weight / unit)
+
+
+@lru_cache(maxsize=SPREADS)
+def _kernel(spread: float) -> tuple[Array, Array]:
+    """Return places and Gaussian weights of the neighbours whose standard deviation is `spread`."""
+    u = np.arange(-4 * math.ceil(spread) - 8, 4 * math.ceil(spread) + 9)
+    widths = np.geomspace(0.1, spread + 1.0, 300)
+    kernels = np.exp(-0.5 * np.square(u / widths[:, None]))
+    kernels /= kernels.sum(axis=1, keepdims=True)
+    width = np.interp(spread, np.sqrt(kernels @ np.square(u)), widths)
+    weights = np.exp(-0.5 * np.square(u / width))
+    return u, weights / weights.sum()
+
+
+def kernel_transfer(spread: float, q: Array) -> Array:
+    """Return the transfer function of Gaussian weights with the standard deviation `spread`."""
+    if spread == 0.0:
+        return np.ones(q.shape)
+    u, weights = _kernel(spread)
+    half = u > 0  # the weights are even
+    return np.asarray(weights[u == 0] + 2.0 * weights[half] @ np.cos(np.outer(u[half], q)))
+
+
+def clean_density(t: Array, spread: float, form: int, q: Array) -> Array:
+    """Return the spectral density of each Gaussian without the effect of edges, shape (t, q).
+
+    Parameters
+    ----------
+    t : ndarray
+        Per squared point.
+    spread : float
+        Of the blur, in points.
+    form : int
+        ALIASED or UNALIASED, see `FORMS`.
+    q : ndarray
+        Wavenumbers in radians per point.
+    """
+    wider = 1.0 + 4.0 * t * spread**2
+    narrow = t / wider
+    density = np.ones((t.size, q.size))
+    wide = narrow < 1.0 if form == ALIASED else np.ones(t.size, dtype=bool)
+    inverse = 1.0 / (4.0 * narrow[wide, None])
+    density[wide] = np.exp(-np.square(q) * inverse)
+    if form == ALIASED:
+        for m in (-1.0, 1.0):
+            density[wide] += np.exp(-np.square(q + 2.0 * np.pi * m) * inverse)
+        # for narrow Gaussians the sum over the lattice is shorter than that over the aliases
+        between = ~wide & (narrow < 40.0)
+        for u in range(1, 5):
+            density[between] += 2.0 * np.exp(-narrow[between, None] * u * u) * np.cos(q * u)
+    density[wide] *= np.sqrt(np.pi / narrow[wide, None])
+    return np.asarray(density / np.sqrt(wider)[:, None])
+
+
+def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
+    """Return the expected squared cosine modes 1 ... n - 1 of n points with free ends, shape (t, n - 1).
+
+    `detrended`: of the heights less their straight line.
+    """
+    u = np.arange(n + 1)
+    wider = 1.0 + 4.0 * t * spread**2
+    c = np.exp(-(t / wider)[:, None] * np.square(u)) / np.sqrt(wider)[:, None]
+    cosine = fft.dct(c * (n - u), 1, (1,))[:, 1:n]
+    sine = np.zeros_like(cosine) if n < 3 else _dst1(c[:, 1:n])
+    power = (cosine - sine / np.sin(np.pi * np.arange(1, n) / n)) / n
+    if detrended:  # modes of z less its line v (v z): E - 2 g (F C v) + g^2 v C v
+        v = np.arange(n) - 0.5 * (n - 1)
+        v /= np.sqrt(v @ v)
+        g = fft.dct(v[None], 2, (1,))[0, 1:] / math.sqrt(2.0 * n)
+        both = np.concatenate([c[:, :n], c[:, n - 1 : 0 : -1]], axis=1)
+        cv = fft.irfft(fft.rfft(both) * fft.rfft(np.pad(v, (0, n - 1))), 2 * n - 1)[:, :n]
+        power += -2.0 * g * fft.dct(cv, 2, (1,))[:, 1:] / math.sqrt(2.0 * n) + g * g * (cv @ v)[:, None]
+    return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)))
+
+
+def _dst1(lines: Array) -> Array:
+    return fft.dst(lines, 1, (1,))
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Mean power of bins of modes over a pilot, and its expectation for each form, spread and Gaussian.
+
+    Attributes
+    ----------
+    level, variance : ndarray, shape (bins,)
+        Logarithm of the mean of power / pilot, without the bias of the logarithm, and its variance.
+    tables : ndarray, shape (forms, spreads, bins, t)
+    spreads : ndarray
+        In x spacings, with `nodes`: FIRST_SPREAD and the step of asinh(s / FIRST_SPREAD).
+    t : ndarray
+    white : ndarray, shape (bins,)
+        Mean of 1 / pilot.
+    lnq : ndarray, shape (bins,)
+        Mean logarithm of the wavenumber, radians per x spacing.
+    extent : float
+        Of the longer edge, in x spacings.
+    axes : int
+    """
+
+    level: Array
+    variance: Array
+    tables: Array
+    spreads: Array
+    nodes: Array
+    t: Array
+    white: Array
+    lnq: Array
+    extent: float
+    axes: int
+
+
+def spread_nodes(longest: float) -> tuple[Array, Array]:
+    """Return the spreads of a table up to `longest`, and (FIRST_SPREAD, step of asinh(s / FIRST_SPREAD))."""
+    step = math.asinh(longest / FIRST_SPREAD) / (SPREADS - 3)
+    return FIRST_SPREAD * np.sinh(step * np.arange(SPREADS)), np.array([FIRST_SPREAD, step])
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Modes of a rectangle of heights, or of a profile, shape (1, n).
+
+    Attributes
+    ----------
+    shape : (ny, nx)
+    spacing : (dy/dx, 1)
+    periodic : bool
+        Fourier modes of a periodic surface in place of cosine modes.
+    """
+
+    shape: tuple[int, int]
+    spacing: tuple[float, float]
+    periodic: bool = False
+
+    @property
+    def axes(self) -> int:
+        return 1 if self.shape[0] == 1 else 2
+
+    @property
+    def degrees(self) -> float:
+        """Real Gaussian numbers in a mode."""
+        return 2.0 if self.periodic else 1.0
+
+    @cached_property
+    def orders(self) -> list[Array]:
+        """Half waves along y and x of the modes that are used: those that vary along both axes."""
+        if not self.periodic:
+            return [np.zeros(1) if n == 1 else np.arange(1.0, n) for n in self.shape]
+        rows = np.zeros(1) if self.axes == 1 else 2.0 * np.fft.fftfreq(self.shape[0]) * self.shape[0]
+        return [rows, np.arange(2.0, self.shape[1] + 1.0, 2.0)]
+
+    @cached_property
+    def wavenumbers(self) -> list[Array]:
+        """Along y and x, radians per x spacing."""
+        return [np.pi * o / (n * d) for o, n, d in zip(self.orders, self.shape, self.spacing, strict=True)]
+
+    @cached_property
+    def q(self) -> Array:
+        """Wavenumber of each mode, radians per x spacing."""
+        return np.hypot(self.wavenumbers[0][:, None], self.wavenumbers[1])
+
+    @property
+    def longest(self) -> float:
+        """Length of the longer edge, in x spacings."""
+        return max(n * d for n, d in zip(self.shape, self.spacing, strict=True))
+
+    @property
+    def shortest_edge(self) -> float:
+        """Length of the shorter edge, in x spacings."""
+        return min(n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
+
+    @property
+    def median(self) -> float:
+        """Median of a squared mode over its expectation."""
+        return math.log(2.0) if self.periodic else 0.454936423119572
+
+    @cached_property
+    def t(self) -> Array:
+        """Scales of the Gaussians: from one of eight extents on."""
+        return mixture(-2 * math.ceil(math.log2(8.0 * self.longest)) - 2)
+
+    def transforms(self, spread: float, *, edges: bool) -> list[list[Array]]:
+        """Return for each form the transforms (t, modes) of each Gaussian along y and x.
+
+        With `edges` those of free ends, as in the expected power; without, the density alone.
+        """
+        made: dict[tuple[float, int, int], list[Array]] = {}
+        keys = [(d, n, q.size) for n, d, q in zip(self.shape, self.spacing, self.wavenumbers, strict=True)]
+        for key, q in zip(keys, self.wavenumbers, strict=True):
+            if key not in made:
+                made[key] = self._transform(key[0], key[1], q, spread, edges and not self.periodic)
+        return [[made[key][form] for key in keys] for form in FORMS]
+
+    def _transform(self, d: float, n: int, q: Array, spread: float, edges: bool) -> list[Array]:
+        if n == 1:
+            return [np.ones((self.t.size, 1))] * len(FORMS)
+        t, s = self.t * d * d, spread / d
+        aliased = clean_density(t, s, ALIASED, q * d)
+        sampled = aliased if s == 0.0 else clean_density(t, 0.0, ALIASED, q * d)
+        filtered = np.square(kernel_transfer(s, q * d)) * sampled
+        unaliased = clean_density(t, s, UNALIASED, q * d)
+        if not edges:
+            return [aliased, filtered, unaliased]
+        power = free_power(n, t, s, self.axes == 1)
+        # the edges feel long waves alone, which are alike in all forms
+        leak = power - aliased
+        return [power, *(np.maximum(leak + clean, 1e-14 * power) for clean in (filtered, unaliased))]
+
+    def power(self, heights: Array) -> Array:
+        """Return the squared modes of complete heights."""
+        z = heights - heights.mean()
+        if self.periodic:
+            return np.asarray(np.abs(fft.rfft2(z)[:, 1:]) ** 2 / z.size)
+        if self.axes == 1:
+            x = np.arange(z.size) - 0.5 * (z.size - 1)
+            z = z - (z @ x)[:, None] / (x @ x) * x
+            return np.asarray(np.square(fft.dct(z, 2, (1,))[:, 1:]) / (2.0 * z.size))
+        return np.asarray(np.square(fft.dct(z, 2, (0, 1))[1:, 1:]) / (4.0 * z.size))

@@ -1,0 +1,543 @@
+"""Posterior distribution of the Hurst exponent, given the mean power of bins of modes.
+
+The expected power of a bin b is
+
+    E_b = A { B_b sum_j w_j(H) M_bj(s, form) + nu^2 W_b },                                       (1)
+    B = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p)
+
+with the Gaussians j of `_gaussian_mixture`: H is the exponent, s the spread of a blur, nu white noise over
+the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, p the sharpness of that
+corner. The amplitude A has a flat prior in ln A, the others those of the constants below. Noise is
+absent with the probability .5, a blur with .85, a corner with .8; blur and sampling take one of three forms
+(`_gaussian_mixture.FORMS`). The logarithms of the bins are normal, and
+
+    y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
+
+where delta is what (1) does not hold: nothing; a process of standard deviation tau, correlated over an
+octave; the fourth order in q of a filter that is no Gaussian; or a cut q_c beyond which the bins say
+nothing, sharp (short waves) or with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2
+(long waves). Each has a prior probability (`_discrepancies`).
+
+For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
+unit normal variables u, and Laplace's method gives its evidence and a normal distribution of u. The
+posterior of H is the sum of these normal distributions: no sampling, and continuous in the heights.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.jit import kernel
+from fractalcontact.dimensions._gaussian_mixture import FILTERED, FORMS, UNALIASED, Bins
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
+LOWEST, HIGHEST = 0.005, 0.995  # H
+
+# Priors. Normal in ln nu: 95 % of instruments add 1 to 25 % of the rms increment over one spacing.
+_PRIOR_NOISE = math.log(0.05), 0.8
+_PRIOR_SPREAD = 0.0, 0.8  # normal in ln s, spacings: instruments sample a blur at .2 to 5 spacings
+_BLURRED = 0.15  # probability of a blur: with .5, 3 of 40 exact surfaces of 64 x 64 points were 5 bounds off
+_LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
+_SHARPNESSES = 0.4, 10.0  # a slow change between two exponents, a sudden corner
+_SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
+_BENT = 0.2  # probability of a corner among the waves of a scan
+_TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
+_FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
+_CUT = 0.5  # logarithm of the power that is off at a cut
+_LEFT = 2.5  # octaves between cuts, to tell an exponent from a corner
+_DEEPEST = 3.5  # octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent
+_OCTAVE = math.log(2.0)
+
+_STARTS, _ATTEMPTS, _STEPS = 64, 5, 12
+_FLAT = 1e3  # variance of ln A
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Which nuisances are there.
+
+    Attributes
+    ----------
+    form : int
+        Of the sampling and the blur.
+    theta : tuple of float
+        Fixed values of theta, NaN where it is free.
+    log_prior : float
+    """
+
+    form: int
+    theta: tuple[float, ...]
+    log_prior: float
+
+    @property
+    def is_blurred(self) -> bool:
+        """Whether the spread of a blur is fitted."""
+        return math.isnan(self.theta[SPREAD])
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether white noise is fitted."""
+        return math.isnan(self.theta[NOISE])
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether long waves have another exponent."""
+        return math.isnan(self.theta[CORNER])
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """What the model does not hold: standard deviation of each bin, and the bins that count.
+
+    Attributes
+    ----------
+    scatter : ndarray, shape (bins,)
+    inside : ndarray of bool, shape (bins,)
+    prior : float
+    """
+
+    scatter: Array
+    inside: Array
+    prior: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Sum of normal distributions of u = Phi^-1((H - LOWEST) / (HIGHEST - LOWEST)), hypotheses by
+    discrepancies.
+
+    Attributes
+    ----------
+    share, centre, scale : ndarray, shape (hypotheses, discrepancies)
+    theta : ndarray, shape (hypotheses, discrepancies, 6)
+        At the maximum of each.
+    hypotheses, discrepancies : list
+    """
+
+    share: Array
+    centre: Array
+    scale: Array
+    theta: Array
+    hypotheses: list[Hypothesis]
+    discrepancies: list[Discrepancy]
+
+    def quantile(self, share: float) -> float:
+        """Return a quantile of H."""
+        from scipy.special import ndtr
+
+        low, high = -8.0, 8.0  # of u
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            below = float(np.sum(self.share * ndtr((middle - self.centre) / self.scale)))
+            low, high = (middle, high) if below < share else (low, middle)
+        return LOWEST + (HIGHEST - LOWEST) * float(ndtr(low))
+
+    @property
+    def most_probable(self) -> tuple[Hypothesis, Discrepancy, Array]:
+        """Hypothesis, discrepancy and theta of the largest share."""
+        m, k = np.unravel_index(int(np.argmax(self.share)), self.share.shape)
+        return self.hypotheses[m], self.discrepancies[k], self.theta[m, k]
+
+    def probability(self, name: str) -> float:
+        """Return the probability of a property of the hypotheses, as "is_blurred"."""
+        return float(
+            sum(s.sum() for s, h in zip(self.share, self.hypotheses, strict=True) if getattr(h, name))
+        )
+
+    def mean(self, parameter: int, name: str) -> float:
+        """Return the mean of a parameter over the hypotheses with the property."""
+        chosen = np.array([getattr(h, name) for h in self.hypotheses])
+        return float(
+            np.sum(self.share[chosen] * self.theta[chosen, :, parameter]) / np.sum(self.share[chosen])
+        )
+
+
+def hypotheses(spread: float | None, noise: float | None, background: float) -> list[Hypothesis]:
+    """Return the combinations of nuisances; known values of `spread` (spacings) and `noise` are not fitted.
+
+    `background` is the noise that is known to be there, as of rounding, over the rms increment.
+    """
+    nan = math.nan
+    found = []
+    for form, is_blurred, is_noisy, is_bent in itertools.product(
+        FORMS, (False, True), (False, True), (False, True)
+    ):
+        if (is_blurred and spread is not None) or (is_noisy and noise is not None):
+            continue
+        prior = FORMS[form].prior_blurred if is_blurred or spread else FORMS[form].prior
+        if prior == 0.0:
+            continue
+        if spread is None:
+            prior *= _BLURRED if is_blurred else 1.0 - _BLURRED
+        prior *= 1.0 if noise is not None else 0.5
+        blur = nan if is_blurred else spread or 0.0
+        white = nan if is_noisy else math.hypot(noise or 0.0, background)
+        corner = (nan,) * 3 if is_bent else (0.0, 0.0, 1.0)
+        bend = _BENT if is_bent else 1.0 - _BENT
+        found.append(Hypothesis(form, (nan, blur, white, *corner), math.log(prior * bend)))
+    return found
+
+
+def posterior(
+    bins: Bins,
+    *,
+    spread: float | None = None,
+    noise: float | None = None,
+    background: float = 0.0,
+    pilot_spread: float = 0.0,
+    is_pilot: bool = False,
+    is_window: bool = False,
+) -> Posterior:
+    """Return the posterior of H.
+
+    Parameters
+    ----------
+    bins : Bins
+    spread, noise : float, optional
+        Of a known point spread function (spacings), of known white noise (rms increments).
+    background : float
+        See `hypotheses`.
+    pilot_spread : float
+        A first estimate of the spread, for the scatter of the fourth order.
+    is_pilot : bool
+        For a first estimate of the spectrum: with fewer kinds of discrepancy.
+    is_window : bool
+        The waves were chosen beforehand: without corners and cuts.
+    """
+    chosen = hypotheses(spread, noise, background)
+    kinds = _discrepancies(bins, pilot_spread)
+    if is_window:
+        kinds = [kind for kind in kinds if kind.inside.all()]
+        chosen = [hypothesis for hypothesis in chosen if not hypothesis.is_bent]
+    if is_pilot:
+        kinds = [kind for kind in kinds if kind.inside[0] and kind.scatter[0] in (0.0, _TAUS[2])]
+    corners = math.log(0.5 * np.pi / bins.extent), math.log(2.0 * np.pi / _SHORTEST_CORNER)
+    sharpness = math.log(_SHARPNESSES[0]), math.log(_SHARPNESSES[1])
+    ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, sharpness
+    prior = np.array(ranges).T
+    whitening, constants = zip(*(_whitening(kind, bins) for kind in kinds), strict=True)
+    shape = len(chosen), len(kinds)
+    evidence, centre, scale = (np.zeros(shape) for _ in range(3))
+    theta = np.zeros((*shape, len(ranges)))
+    _maxima(
+        _starting_points(),
+        np.array([hypothesis.form for hypothesis in chosen]),
+        np.array([hypothesis.theta for hypothesis in chosen]),
+        prior,
+        bins.tables,
+        bins.nodes,
+        bins.axes,
+        bins.t,
+        bins.white,
+        bins.lnq,
+        bins.level,
+        np.stack(whitening),
+        evidence,
+        centre,
+        scale,
+        theta,
+    )
+    evidence += np.array([hypothesis.log_prior for hypothesis in chosen])[:, None] + np.array(constants)
+    share = np.exp(evidence - evidence.max())
+    return Posterior(share / share.sum(), centre, scale, theta, chosen, kinds)
+
+
+def _discrepancies(bins: Bins, pilot_spread: float) -> list[Discrepancy]:
+    """Return the kinds of discrepancy with their prior probabilities, which sum to one."""
+    octaves = bins.lnq / _OCTAVE
+    everything = np.ones(octaves.size, dtype=bool)
+    lowest, highest = float(octaves.min()), float(octaves.max())
+    cuts: list[tuple[Array, Array]] = []
+    # between rings of bins; those of one ring differ by less than a tenth of an octave
+    ends = np.sort(octaves)
+    ends = ends[np.flatnonzero(np.diff(ends) > 0.1)]
+    for cut in ends[ends > max(lowest + _LEFT, highest - _DEEPEST)]:
+        inside = octaves <= cut
+        cuts += [(_CUT * 4.0 ** (octaves - cut), inside), (np.zeros(octaves.size), inside)]
+    for cut in ends[ends < min(highest - _LEFT, lowest + _DEEPEST)][::2]:
+        cuts.append((_CUT * 4.0 ** (cut - octaves), octaves > cut))
+    cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
+    fourth = _FOURTH * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
+    uncut = 0.5 if cuts else 1.0
+    none = 0.25 if fourth.max() > 0.01 else 0.5
+    kinds = [Discrepancy(np.zeros(octaves.size), everything, uncut * none)]
+    kinds += [Discrepancy(np.full(octaves.size, tau), everything, uncut * 0.5 / len(_TAUS)) for tau in _TAUS]
+    if none < 0.5:
+        kinds.append(Discrepancy(fourth, everything, uncut * none))
+    return kinds + [Discrepancy(scatter, inside, 0.5 / len(cuts)) for scatter, inside in cuts]
+
+
+def _whitening(kind: Discrepancy, bins: Bins) -> tuple[Array, float]:
+    """Return the matrix that makes the bins of (2) white, zero for those that do not count, and its log
+    density.
+
+    A bin beyond a cut has the expected logarithm of the density of a deviation of a factor of e.
+    """
+    octaves = bins.lnq / _OCTAVE
+    inside = np.ix_(kind.inside, kind.inside)
+    correlation = np.exp(-np.abs(octaves[:, None] - octaves))
+    covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
+    lower = np.linalg.cholesky(covariance[inside] + _FLAT)
+    whitening = np.zeros(covariance.shape)
+    whitening[inside] = np.linalg.inv(lower)
+    outside = bins.variance[~kind.inside] + 1.0
+    density = -np.log(np.diag(lower)).sum() - 0.5 * np.sum(np.log(outside) + 1.0)
+    return whitening, math.log(kind.prior) + float(density)
+
+
+@lru_cache
+def _starting_points() -> Array:
+    """Return points that fill the prior evenly: those of Sobol, up to 2 standard deviations."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    return np.asarray(ndtri(np.clip(qmc.Sobol(6, scramble=False).random(_STARTS), 0.02, 0.98)))
+
+
+# numba caches a kernel by its own file, so those that call each other stand in one
+
+
+@kernel
+def tail(hurst: float, t: float, spread: float, form: int, axes: int) -> float:
+    """Return the sum of all Gaussians from the last t on, over its own term."""
+    if form == UNALIASED:
+        return float(1.0 / (1.0 - 2.0 ** -(hurst + 0.5 * axes)))
+    if form == FILTERED or spread == 0.0:
+        return float(1.0 / (1.0 - 2.0**-hurst))
+    total, wider = 0.0, 1.0 + 4.0 * t * spread**2
+    for i in range(40):
+        total += 2.0 ** (-i * hurst) * (wider / (1.0 + 4.0 * t * 2.0**i * spread**2)) ** (0.5 * axes)
+    return total
+
+
+@kernel
+def bin_power(
+    theta: Array,
+    form: int,
+    axes: int,
+    table: Array,
+    nodes: Array,
+    t: Array,
+    white: Array,
+    lnq: Array,
+    out: Array,
+) -> None:
+    """Fill the logarithm of the expected power of each bin, (1); table (spread, bin, t)."""
+    hurst, bins = theta[0], out.size
+    last = t.size - 1
+    ratio = 2.0**-hurst
+    # weights of unit rms increment over one spacing, and their last one with all shorter Gaussians
+    unit = t[0] ** (1.0 - hurst) * 2.0 ** (hurst - 1.0) / (1.0 - 2.0 ** (hurst - 1.0))
+    weight = t[0] ** -hurst
+    for j in range(t.size):
+        unit += weight * -math.expm1(-t[j])
+        weight *= ratio
+    unit += weight / (1.0 - ratio)
+    weights = np.empty(t.size)
+    weight = 0.5 * t[0] ** -hurst / unit
+    for j in range(t.size):
+        weights[j] = weight
+        weight *= ratio
+    weights[last] *= tail(hurst, t[last], theta[1], form, axes)
+    # between the spreads of the table the logarithm is a cubic; the power is even in s
+    place = min(math.asinh(theta[1] / nodes[0]) / nodes[1], table.shape[0] - 2.0)
+    i = min(int(place), table.shape[0] - 3)
+    f = place - i
+    a0, a1 = -f * (f - 1.0) * (f - 2.0) / 6.0, (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0
+    a2, a3 = -(f + 1.0) * f * (f - 2.0) / 2.0, (f + 1.0) * f * (f - 1.0) / 6.0
+    below, here, above, beyond = table[abs(i - 1)], table[i], table[i + 1], table[i + 2]
+    for b in range(bins):
+        p0, p1, p2, p3 = 0.0, 0.0, 0.0, 0.0
+        for j in range(t.size):
+            p0 += weights[j] * below[b, j]
+            p1 += weights[j] * here[b, j]
+            p2 += weights[j] * above[b, j]
+            p3 += weights[j] * beyond[b, j]
+        # where a blur leaves nothing, a slope that no surface has
+        least = 1e-200 * math.exp(-40.0 * lnq[b])
+        logarithm = a0 * math.log(p0 + least) + a1 * math.log(p1 + least)
+        power = math.exp(logarithm + a2 * math.log(p2 + least) + a3 * math.log(p3 + least))
+        if theta[3] > 0.0:
+            x = 2.0 * theta[5] * (math.log(theta[3]) - lnq[b])
+            bend = x if x > 30.0 else math.log1p(math.exp(x))
+            power *= math.exp((theta[4] - hurst) / theta[5] * bend)
+        out[b] = math.log(power + theta[2] * theta[2] * white[b])
+
+
+@kernel
+def _parameters(u: Array, fixed: Array, prior: Array, theta: Array) -> None:
+    """Fill theta from unit normal numbers, where it is not fixed."""
+    low, high = prior[0], prior[1]
+    for k in range(u.size):
+        if not math.isnan(fixed[k]):
+            theta[k] = fixed[k]
+        elif k == 1 or k == 2:
+            theta[k] = math.exp(low[k] + high[k] * u[k])
+        else:
+            value = low[k] + (high[k] - low[k]) * 0.5 * math.erfc(-u[k] / math.sqrt(2.0))
+            theta[k] = math.exp(value) if k == 3 or k == 5 else value
+    if theta[3] > 0.0 and theta[1] > 0.0:  # an octave of waves between corner and blur shows the exponent H
+        theta[3] = min(theta[3], 0.5 / theta[1])
+
+
+@kernel
+def _whitened(whitening: Array, level: Array, model: Array, out: Array) -> float:
+    """Fill the white residuals of the bins; return the sum of their squares."""
+    total = 0.0
+    for a in range(level.size):
+        value = 0.0
+        for b in range(level.size):
+            value += whitening[a, b] * (level[b] - model[b])
+        out[a] = value
+        total += value * value
+    return total
+
+
+@kernel
+def _factorise(matrix: Array, lower: Array) -> float:
+    """Fill the Cholesky factor; return its log determinant, half of that of the matrix."""
+    logarithm = 0.0
+    for i in range(matrix.shape[0]):
+        for j in range(i + 1):
+            value = matrix[i, j]
+            for k in range(j):
+                value -= lower[i, k] * lower[j, k]
+            lower[i, j] = math.sqrt(max(value, 1e-300)) if i == j else value / lower[j, j]
+        logarithm += math.log(lower[i, i])
+    return logarithm
+
+
+@kernel
+def _solve(lower: Array, right: Array, out: Array) -> None:
+    """Solve with a Cholesky factor."""
+    size = right.size
+    for i in range(size):
+        value = right[i]
+        for k in range(i):
+            value -= lower[i, k] * out[k]
+        out[i] = value / lower[i, i]
+    for i in range(size - 1, -1, -1):
+        value = out[i]
+        for k in range(i + 1, size):
+            value -= lower[k, i] * out[k]
+        out[i] = value / lower[i, i]
+
+
+@kernel
+def _maxima(
+    starts: Array,
+    forms: Array,
+    fixed: Array,
+    prior: Array,
+    tables: Array,
+    nodes: Array,
+    axes: int,
+    t: Array,
+    white: Array,
+    lnq: Array,
+    level: Array,
+    whitening: Array,
+    evidence: Array,
+    centre: Array,
+    scale: Array,
+    theta: Array,
+) -> None:
+    """Fill for each hypothesis and discrepancy the log evidence, mean and deviation of u_0, and theta."""
+    p, bins = fixed.shape[1], level.size
+    values = np.empty(p)
+    models = np.empty((starts.shape[0], bins))
+    model, shifted, residual, trial_residual = np.empty(bins), np.empty(bins), np.empty(bins), np.empty(bins)
+    jacobian = np.empty((p, bins))
+    hessian, lower, damped = np.empty((p, p)), np.zeros((p, p)), np.empty((p, p))
+    gradient, move, u, trial = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
+    before, after, totals = np.zeros(p), np.zeros(p), np.empty(starts.shape[0])
+    for m in range(fixed.shape[0]):
+        table, form, free = tables[forms[m]], forms[m], 0
+        for i in range(p):
+            free += math.isnan(fixed[m, i])
+        number = starts.shape[0] if free > 1 else starts.shape[0] // 4
+        for d in range(number):
+            _parameters(starts[d], fixed[m], prior, values)
+            bin_power(values, form, axes, table, nodes, t, white, lnq, models[d])
+        for k in range(whitening.shape[0]):
+            totals[:] = np.inf
+            for d in range(number):
+                if k == 0 or d % 4 == 0:
+                    totals[d] = _whitened(whitening[k], level, models[d], residual)
+            best = np.inf
+            # the first kind has several maxima; those of the others lie near that of the kind before
+            for _ in range(_ATTEMPTS if k == 0 and free > 2 else 1):
+                d = int(np.argmin(totals))
+                u[:] = starts[d]
+                totals[d] = np.inf
+                for i in range(p):
+                    if not math.isnan(fixed[m, i]):
+                        u[i] = 0.0
+                if k > 0:
+                    _parameters(u, fixed[m], prior, values)
+                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
+                    total = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
+                    _parameters(before, fixed[m], prior, values)
+                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
+                    if _whitened(whitening[k], level, model, residual) + np.sum(before * before) < total:
+                        u[:] = before
+                damping, objective = 0.0, np.inf
+                for _step in range(_STEPS):
+                    _parameters(u, fixed[m], prior, values)
+                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
+                    objective = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
+                    for i in range(p):
+                        jacobian[i] = 0.0
+                        if math.isnan(fixed[m, i]):
+                            trial[:] = u
+                            trial[i] += 1e-4
+                            _parameters(trial, fixed[m], prior, values)
+                            bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
+                            _whitened(whitening[k], shifted, model, jacobian[i])
+                            jacobian[i] *= 1e4
+                    for i in range(p):
+                        gradient[i] = np.sum(jacobian[i] * residual) - u[i]
+                        for j in range(p):
+                            hessian[i, j] = np.sum(jacobian[i] * jacobian[j]) + (1.0 if i == j else 0.0)
+                    gain = 0.0
+                    for _ in range(6):
+                        damped[:] = hessian
+                        for i in range(p):
+                            damped[i, i] *= 1.0 + damping
+                        _factorise(damped, lower)
+                        _solve(lower, gradient, move)
+                        longest = np.max(np.abs(move))
+                        trial[:] = u + move * (0.7 / max(longest, 0.7))
+                        _parameters(trial, fixed[m], prior, values)
+                        bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
+                        total = _whitened(whitening[k], level, shifted, trial_residual) + np.sum(
+                            trial * trial
+                        )
+                        if total < objective:
+                            gain = objective - total
+                            objective = total
+                            u[:] = trial
+                            damping *= 0.2
+                            break
+                        damping = max(0.1, 5.0 * damping)
+                    if gain < 1e-3:
+                        break
+                if objective < best:
+                    best = objective
+                    half_log = _factorise(hessian, lower)
+                    gradient[:] = 0.0
+                    gradient[0] = 1.0
+                    _solve(lower, gradient, move)
+                    evidence[m, k] = -0.5 * objective - half_log
+                    centre[m, k], scale[m, k] = u[0], math.sqrt(move[0])
+                    _parameters(u, fixed[m], prior, theta[m, k])
+                    after[:] = u
+            before[:] = after

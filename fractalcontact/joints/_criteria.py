@@ -1,0 +1,283 @@
+"""Empirical criteria of rock joints as formulas on arrays, each with its source and its range.
+
+They were fitted to laboratory tests and serve to compare a computed joint with; nothing else in the package
+depends on them. Pressures in Pa, lengths in m, angles in degrees. What could be checked against a published
+text, and what could not, is listed on page `theory_joints`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MPA, MM, MICRON = 1e6, 1e-3, 1e-6  # units of the published fits
+
+# Shear strength
+
+SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer
+LARGEST_JRC = 20.0  # end of the scale of standard profiles (Barton and Choubey 1977)
+LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
+FITTED_STRESS = (0.01, 0.3)  # normal stress over wall strength of the tests of Barton and Choubey (1977)
+SHEARED_POWER, DILATION_POWER = 1.5, 4.0  # L and K of Ladanyi and Archambault (1970)
+# A0 of the joints of Xia et al. is near one half. The factor 4 A0 is 2 there and 20 % off at these bounds; on
+# saw teeth of A0 = .77 the criterion gives 77 degrees where Patton has 35.
+FACING_SHARE = (0.4, 0.6)
+# mobilised over peak roughness against displacement over that at the peak (Barton 1982); before the first
+# point friction alone is mobilised, from 0 on
+MOBILISED = np.array(
+    [(0.3, 0.0), (0.6, 0.75), (1.0, 1.0), (2.0, 0.85), (4.0, 0.7), (10.0, 0.5), (100.0, 0.0)]
+)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What a criterion of strength may depend on; NaN where it is not known."""
+
+    roughness_coefficient: float
+    asperity_angle: float
+    wall_strength: float
+    tensile_strength: float
+    basic_angle: float
+    residual_angle: float
+    cohesion: float = math.nan
+    length: float = SAMPLE_LENGTH
+    area_fraction: float = math.nan  # A0, C and theta_max of `directional_roughness`
+    shape: float = math.nan
+    theta_max: float = math.nan
+
+
+def scaled_roughness(roughness: Any, length: Any) -> Any:
+    """Return JRC of a longer joint, JRC0 (L/L0)^(-0.02 JRC0) (Barton and Bandis 1982)."""
+    return roughness * (length / SAMPLE_LENGTH) ** (-0.02 * roughness)
+
+
+def scaled_wall_strength(wall_strength: float, roughness: float, length: float) -> float:
+    """Return JCS of a longer joint, JCS0 (L/L0)^(-0.03 JRC0) (Barton and Bandis 1982)."""
+    return float(wall_strength * (length / SAMPLE_LENGTH) ** (-0.03 * roughness))
+
+
+def peak_displacement(roughness: float, length: float) -> float:
+    """Return the shear displacement at the peak, L/500 (JRC/L)^0.33 (Barton and Bandis 1982)."""
+    return float(length / 500.0 * (scaled_roughness(roughness, length) / length) ** 0.33)
+
+
+def roughness_angle(pressure: Array, roughness: float, wall_strength: float, residual_angle: float) -> Array:
+    """Return JRC log10(JCS/sigma): 0 above JCS, and not above 70 degrees with the residual angle."""
+    decades = np.clip(np.log10(wall_strength) - np.log10(pressure), 0.0, None)
+    return np.asarray(np.minimum(roughness * decades, max(LARGEST_ANGLE - residual_angle, 0.0)))
+
+
+def mobilised_angle(relative_displacement: float, peak_angle: Array, residual_angle: float) -> Array:
+    """Return the mobilised angle of the roughness at a displacement over that of the peak (Barton 1982)."""
+    start = MOBILISED[0, 0]
+    if relative_displacement < start:
+        return np.full(peak_angle.shape, -residual_angle * (1.0 - relative_displacement / start))
+    return peak_angle * float(np.interp(relative_displacement, *MOBILISED.T))
+
+
+def damage_coefficient(pressure: Array, roughness: float, wall_strength: float) -> Array:
+    """Return M = 0.7 + JRC/(12 log10(JCS/sigma)), within 1 and 2 (Barton and Choubey 1977)."""
+    decades = np.log10(wall_strength) - np.log10(pressure)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coefficient = np.where(decades > 0, 0.7 + roughness / (12.0 * decades), 2.0)
+    return np.clip(coefficient, 1.0, 2.0)
+
+
+def patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return the strength of asperities that are overridden or sheared off, whichever needs less."""
+    overridden = pressure * math.tan(math.radians(joint.basic_angle + joint.asperity_angle))
+    sheared = joint.cohesion + pressure * math.tan(math.radians(joint.residual_angle))
+    return np.minimum(overridden, sheared), np.ones(pressure.shape, dtype=bool)
+
+
+def ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return the strength where a share of the asperities is sheared off, and the rest is overridden.
+
+    tau = (sigma (1 - a)(v + tan phi) + a s_r)/(1 - (1 - a) v tan phi), with the strength s_r of the material
+    by the parabola of Fairhurst. Above the wall strength the material fails.
+    """
+    relative = pressure / joint.wall_strength
+    remaining = np.clip(1.0 - relative, 0.0, None)
+    sheared = 1.0 - remaining**SHEARED_POWER  # a
+    dilation = remaining**DILATION_POWER * math.tan(math.radians(joint.asperity_angle))  # v
+    friction = math.tan(math.radians(joint.basic_angle))
+    ratio = joint.wall_strength / joint.tensile_strength  # n
+    material = joint.wall_strength * (math.sqrt(1.0 + ratio) - 1.0) / ratio * np.sqrt(1.0 + ratio * relative)
+    overridden = pressure * (1.0 - sheared) * (dilation + friction)
+    strength = (overridden + sheared * material) / (1.0 - (1.0 - sheared) * dilation * friction)
+    return strength, relative <= 1.0
+
+
+def barton_choubey(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return sigma tan(phi_r + JRC log10(JCS/sigma)), limited to 70 degrees; no roughness above JCS."""
+    return _barton(pressure, joint, float(np.fmax(joint.roughness_coefficient, 0.0)), joint.wall_strength)
+
+
+def barton_bandis(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return the strength of Barton and Choubey with JRC and JCS of the length of the joint."""
+    jrc = float(np.fmax(joint.roughness_coefficient, 0.0))  # 0 where it is negative or not known
+    wall_strength = scaled_wall_strength(joint.wall_strength, jrc, joint.length)
+    return _barton(pressure, joint, scaled_roughness(jrc, joint.length), wall_strength)
+
+
+def _barton(pressure: Array, joint: Joint, roughness: float, wall_strength: float) -> tuple[Array, Array]:
+    angle = joint.residual_angle + roughness_angle(pressure, roughness, wall_strength, joint.residual_angle)
+    relative = pressure / wall_strength
+    inside = (relative >= FITTED_STRESS[0]) & (relative <= FITTED_STRESS[1]) & (angle < LARGEST_ANGLE)
+    inside &= 0.0 <= joint.roughness_coefficient <= LARGEST_JRC
+    return pressure * np.tan(np.radians(angle)), inside
+
+
+def grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return sigma tan(phi_r') [1 + exp(-theta_max sigma/(9 A0 C sigma_t))], with a fitted angle phi_r'."""
+    facets = joint.area_fraction * joint.shape  # NaN where no facet faces the shear
+    decay = joint.theta_max / (9.0 * facets) if facets > 0 else math.inf
+    with np.errstate(under="ignore"):
+        share = np.exp(-decay * pressure / joint.tensile_strength)
+    strength = pressure * math.tan(math.radians(joint.residual_angle)) * (1.0 + share)
+    return strength, _by_facets(pressure, joint)
+
+
+def xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
+    """Return sigma tan(phi_b + 4 A0 t [1 + exp(-t sigma/(9 A0 sigma_t))]), t = theta_max/(C + 1), degree."""
+    if joint.area_fraction == 0:
+        return pressure * math.tan(math.radians(joint.basic_angle)), _by_facets(pressure, joint)
+    metric = joint.theta_max / (joint.shape + 1.0)
+    with np.errstate(under="ignore"):
+        share = np.exp(-metric / (9.0 * joint.area_fraction) * pressure / joint.tensile_strength)
+    angle = joint.basic_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
+    possible = angle < 90.0
+    strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
+    low, high = FACING_SHARE
+    return strength, _by_facets(pressure, joint) & possible & (low <= joint.area_fraction <= high)
+
+
+def _by_facets(pressure: Array, joint: Joint) -> Array:
+    """Return where a criterion of the facets may be used: rough, and sigma up to the tensile strength."""
+    return (pressure <= joint.tensile_strength) & (joint.area_fraction > 0)
+
+
+class Criterion(NamedTuple):
+    """Strength with its range, the arguments of `strength_envelope` that it needs, and what it assumes."""
+
+    strength: Callable[[Array, Joint], tuple[Array, Array]]
+    needs: tuple[str, ...]
+    assumption: str
+
+
+STRENGTH = {
+    "patton": Criterion(
+        patton,
+        ("asperity_angle", "cohesion"),
+        "asperities of one angle, overridden or sheared off as a whole",
+    ),
+    "ladanyi_archambault": Criterion(
+        ladanyi_archambault,
+        ("asperity_angle",),
+        "asperities of one angle; the sheared share grows with the normal stress",
+    ),
+    "barton_choubey": Criterion(
+        barton_choubey,
+        ("roughness_coefficient",),
+        "JRC of 0.1 m profiles; normal stress of 0.01 to 0.3 of the wall strength",
+    ),
+    "barton_bandis": Criterion(
+        barton_bandis,
+        ("roughness_coefficient", "length"),
+        "as barton_choubey, with JRC and wall strength of the length of the joint",
+    ),
+    "grasselli_egger": Criterion(
+        grasselli_egger,
+        ("surface", "residual_friction_angle"),
+        "fresh tensile fractures; dips of facets, which depend on the spacing; a fitted residual angle",
+    ),
+    "xia": Criterion(
+        xia, ("surface",), "fresh mated fractures; dips of facets, which depend on the spacing of the surface"
+    ),
+}
+STRENGTH_REFERENCES = (
+    "Patton (1966), 1st ISRM Congress 1:509; Ladanyi and Archambault (1970), 11th US Symposium on Rock "
+    "Mechanics; Barton and Choubey (1977), Rock Mechanics 10:1; Barton and Bandis (1982), 23rd US Symposium "
+    "on Rock Mechanics; Grasselli and Egger (2003), Int. J. Rock Mech. Min. Sci. 40:25; Xia, Tang, Xiao and "
+    "Song (2014), Rock Mech. Rock Eng. 47:387"
+)
+
+# Closure
+
+# A, B, C, D of Vm = A + B JRC + C (JCS/a)^D, mm and MPa, by cycle of load (Bandis, Lumsden and Barton 1983).
+# The third row, the formulas of the aperture and of the stiffness and their ranges are those of the MATLAB
+# Reservoir Simulation Toolbox (bartonBandis.m); no text was found to compare the first two rows with.
+CLOSURE_FITS = {
+    1: (-0.2960, -0.0056, 2.2410, -0.2450),
+    2: (-0.1005, -0.0073, 1.0082, -0.2301),
+    3: (-0.1032, -0.0074, 1.1350, -0.2510),
+}
+
+
+def bandis_aperture(roughness: float, wall_strength: float, compressive_strength: float) -> float:
+    """Return the aperture under no load, JRC/5 (0.2 UCS/JCS - 0.1) mm (Bandis et al. 1983)."""
+    return roughness / 5 * (0.2 * (compressive_strength / wall_strength) - 0.1) * MM
+
+
+def bandis_stiffness(roughness: float, wall_strength: float, aperture: float) -> float:
+    """Return Kni = -7.15 + 1.75 JRC + 0.02 JCS/a, MPa and mm (Bandis et al. 1983)."""
+    return (-7.15 + 1.75 * roughness + 0.02 * (wall_strength / MPA) / (aperture / MM)) * (MPA / MM)
+
+
+def bandis_greatest_closure(roughness: float, wall_strength: float, aperture: float, cycle: int) -> float:
+    """Return Vm = A + B JRC + C (JCS/a)^D, MPa and mm, by cycle of load (Bandis et al. 1983)."""
+    a, b, c, d = CLOSURE_FITS[cycle]
+    return float(a + b * roughness + c * ((wall_strength / MPA) / (aperture / MM)) ** d) * MM
+
+
+def hyperbolic_closure(pressure: Array, initial_stiffness: float, greatest_closure: float) -> Array:
+    """Return the closure sigma Vm/(Kni Vm + sigma) (Bandis, Lumsden and Barton 1983)."""
+    return np.asarray(pressure * greatest_closure / (initial_stiffness * greatest_closure + pressure))
+
+
+# Hydraulic aperture e of a joint from its mechanical aperture E
+
+
+def barton_aperture(aperture: Any, roughness_coefficient: Any) -> Any:
+    """Return e = E^2/JRC^2.5 in micrometres, at most E (Barton, Bandis and Bakhtar 1985)."""
+    return aperture * np.minimum(aperture / (roughness_coefficient**2.5 * MICRON), 1.0)
+
+
+def lognormal_aperture(aperture: Any, spread: Any) -> Any:
+    """Return e = E/sqrt(1 + s^2/E^2), exact in the mean for lognormal apertures (Renshaw 1995)."""
+    return aperture / np.sqrt(1 + (spread / aperture) ** 2)
+
+
+def zimmerman_bodvarsson_aperture(aperture: Any, spread: Any, contact_fraction: Any) -> Any:
+    """Return e with e^3 = E^3 (1 - 1.5 s^2/E^2)(1 - 2 c) (Zimmerman and Bodvarsson 1996)."""
+    return aperture * np.cbrt((1 - 1.5 * (spread / aperture) ** 2) * (1 - 2 * contact_fraction))
+
+
+def walsh_aperture(aperture: Any, contact_fraction: Any) -> Any:
+    """Return e with e^3 = E^3 (1 - c)/(1 + c): plates with few round spots of contact (Walsh 1981)."""
+    return aperture * np.cbrt((1 - contact_fraction) / (1 + contact_fraction))
+
+
+class ApertureModel(NamedTuple):
+    """Formula of the hydraulic aperture and the arguments it takes beside the mechanical one."""
+
+    formula: Callable[..., Any]
+    needs: tuple[str, ...]
+
+
+HYDRAULIC_APERTURE = {
+    "barton_bandis": ApertureModel(barton_aperture, ("roughness_coefficient",)),
+    "lognormal": ApertureModel(lognormal_aperture, ("spread",)),
+    "zimmerman_bodvarsson": ApertureModel(zimmerman_bodvarsson_aperture, ("spread", "contact_fraction")),
+    "walsh": ApertureModel(walsh_aperture, ("contact_fraction",)),
+}
+# s/E of the open part up to which its series is used: the next term, 1.9 (s/E)^4, is then 12 % of E^3
+GREATEST_VARIATION = 0.5
+# few spots: the next term of the series of (1 - c)/(1 + c), 2 c^2, is then 13 % of E^3
+GREATEST_CONTACT = 0.25

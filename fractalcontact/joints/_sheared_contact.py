@@ -1,0 +1,418 @@
+"""A sheared crack that is pressed: its delta-surface between the two bodies, on plain arrays.
+
+    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, {"hardness": 2e9}, keep="state")
+    columns = press_sheared(pressing, shears, towards, progress=False)
+    columns["interface_closure"], columns["state"]  # of shape (shear, step) and (shear, step, y, x)
+
+Options and load are read once for each call; every shear goes to `contact.solver` as an array. The solver is
+imported where it is called: a study of rigid faces loads neither it nor the compiler.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.compass import Direction, direction_coords
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
+from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.memory import Plane, map_bytes
+from fractalcontact.base.numbers import number_of_entries
+from fractalcontact.base.progress import track
+from fractalcontact.base.provenance import content, plain
+from fractalcontact.base.references import PAPER, joined_references
+from fractalcontact.base.results import provenance_of
+from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
+from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.joints._crack import Crack, block_coords, check_elastic
+from fractalcontact.joints._delta_surface import delta_heights
+
+if TYPE_CHECKING:
+    from fractalcontact.contact.solver import ContactOptions, LoadPath, Sheared, ShearPath
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Columns = dict[str, Array]
+
+# how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
+BULK = {
+    "flat_block": (
+        "rigid",
+        "closure of the flat block under the same force and the same influence coefficients",
+    ),
+    "uniform_pressure": (
+        "uniform",
+        "mean displacement of the flat block under the same force, uniformly spread",
+    ),
+}
+LOADS = ("closure", "normal_force", "nominal_pressure")
+SCALARS = (
+    *LOADS, "contact_area", "contact_fraction", "corrected_contact_fraction", "mean_gap", "elastic_energy",
+    "iterations", "residual", "converged", "stop_reason", "run_time",
+)  # fmt: skip
+BLOCK_BYTES = 40.0  # of a cell: the delta-surface, the flat block and what both are made of
+STEPS_SHOWN = 5  # in a warning
+FORCE_ERROR = 1e-7  # relative error of the force that balances a spring
+MAX_SOLUTIONS = 60  # for one such force: 189 of them took 6 in the median and 13 at most
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """How a crack is pressed at every shear: load, solver options, bulk part, maps to keep, and the caller.
+
+    With a `factor` only every so many heights of the delta-surface are kept along both axes.
+    """
+
+    crack: Crack
+    where: str
+    load: LoadPath
+    options: ContactOptions
+    bulk: str = "flat_block"
+    keep: tuple[str, ...] = ()
+    factor: int = 1
+
+    @classmethod
+    def read(
+        cls,
+        crack: Crack,
+        where: str,
+        loads: Mapping[str, Any],
+        solver: Mapping[str, Any],
+        *,
+        bulk: str = "flat_block",
+        keep: Any = (),
+    ) -> Pressing:
+        """Return it from arguments that passed `check_pressing`."""
+        from fractalcontact.contact.solver import ContactOptions, LoadPath
+
+        options = ContactOptions(boundary=_boundary(crack), **solver)
+        return cls(crack, where, LoadPath.from_keywords(**loads), options, bulk, word_tuple(keep))
+
+    @property
+    def references(self) -> str:
+        """The sources of the closure of a delta-surface and of the solver that presses it."""
+        return joined_references(PAPER, self.options.references(self.grid))
+
+    @cached_property
+    def modulus(self) -> float:
+        """E* of the two bodies, Pa."""
+        return self.crack.contact_modulus
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid of the delta-surface, with the spacing that `press` would read."""
+        flat = xr.DataArray(
+            np.broadcast_to(0.0, self.crack.layout.cells), dims=("y", "x"), coords=block_coords(self.crack)
+        )
+        every = slice(None, None, self.factor)
+        return read_grid(flat.isel(y=every, x=every))
+
+    @cached_property
+    def block_stiffness(self) -> float:
+        """Stiffness of the flat block, N/m; infinite for a periodic one."""
+        from fractalcontact.contact import solver
+
+        return solver.block_stiffness(self.grid, self.modulus, self.options, BULK[self.bulk][0])
+
+
+def check_pressing(
+    problems: Problems,
+    crack: Any,
+    loads: Mapping[str, Any] | None,
+    solver: Mapping[str, Any],
+    *,
+    bulk: Any = "flat_block",
+    keep: Any = (),
+) -> LoadPath | None:
+    """Check what `Pressing.read` takes; return the load unless it has problems. Loads of None had theirs."""
+    from fractalcontact.contact.solver import ContactOptions, LoadPath
+
+    load = None if loads is None else problems.construct(LoadPath.from_keywords, **loads)
+    if keep is not None:
+        problems.choices("keep", keep, CONTACT_MAPS)
+    problems.choice("bulk", bulk, BULK)
+    options = problems.construct(ContactOptions, **solver)
+    if options is None or not isinstance(crack, Crack):
+        return load
+    layout = crack.layout
+    grid = Grid(layout.cells, layout.spacing, layout.periodic)
+    replace(options, boundary=_boundary(crack)).check_grid(grid, problems)
+    if load is not None:
+        check_elastic(problems, crack)
+        options.check_load(load, crack.nominal_area, problems)
+    return load
+
+
+def pressing_memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of pressing the block at one shear after the other, with the maps of all of them."""
+    from fractalcontact.contact import press
+
+    pressed = press.memory(plane, arguments)  # type: ignore[operator]
+    shears = max(1, int(np.size(arguments["shear"]))) if "shear" in arguments else 1
+    steps = max(
+        (int(np.size(arguments[name])) for name in LOADS if arguments.get(name) is not None), default=1
+    )
+    maps = shears * steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep")))
+    return float(pressed) + plane.cells * (BLOCK_BYTES + 2.0 * maps)
+
+
+def _boundary(crack: Crack) -> str:
+    return "periodic" if all(crack.layout.periodic) else "free"
+
+
+class ShearedContact:
+    """The delta-surface of one shear between its two bodies, to be pressed along paths of load."""
+
+    def __init__(self, pressing: Pressing, shear: float, towards: Direction) -> None:
+        from fractalcontact.contact import solver
+
+        self.pressing = pressing
+        self.place = f"at a shear of {shear:g} m towards {towards.name}"
+        heights = delta_heights(pressing.crack, shear, towards, pressing.where)
+        self.heights = heights[:: pressing.factor, :: pressing.factor]
+        self.rms_slope = solver.rms_slope(self.heights, pressing.grid)
+
+    def press(self, load: LoadPath, keep: Sequence[str] = ()) -> Columns:
+        """Press along a path of load.
+
+        Returns
+        -------
+        dict of ndarray
+            The scalars of `contact.press`, bulk_closure and interface_closure (m), shape (step,); maps
+            (step, y, x); rms_slope, a number.
+        """
+        from fractalcontact.contact import solver
+
+        pressing = self.pressing
+        with self._problems_named(load):
+            pressed = solver.solve(
+                self.heights, pressing.grid, pressing.modulus, pressing.options, load, keep=keep
+            )
+        scalars = SCALARS if pressing.options.hardness is None else (*SCALARS, "plastic_work")
+        columns = {name: pressed.columns[name] for name in scalars} | pressed.maps
+        columns["rms_slope"] = np.array(self.rms_slope)
+        # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
+        has_bulk = np.isfinite(pressing.block_stiffness)
+        bulk = columns["normal_force"] / pressing.block_stiffness if has_bulk else 0.0 * columns["closure"]
+        return columns | {"bulk_closure": bulk, "interface_closure": columns["closure"] - bulk}
+
+    def shear(self, path: ShearPath, keep: Sequence[str] = ()) -> Sheared:
+        """Press by the load, and push the block along a path of tangential force."""
+        from fractalcontact.contact import solver
+
+        pressing = self.pressing
+        problem = (pressing.grid, pressing.modulus, pressing.options, pressing.load)
+        with self._problems_named(pressing.load):
+            return solver.solve_shear(self.heights, *problem, path, keep=keep)
+
+    @contextmanager
+    def _problems_named(self, load: LoadPath) -> Iterator[None]:
+        """Check that a load is in proportion to the heights; name the caller and the shear in every error."""
+        from fractalcontact.contact import solver
+
+        pressing, height_range = self.pressing, float(np.ptp(self.heights))
+        try:
+            with Problems(pressing.where) as problems:
+                solver.check_scale(
+                    problems, pressing.grid, height_range, pressing.modulus, pressing.options, load
+                )
+            yield
+        except InvalidInput as error:
+            lines = [f"{line} ({self.place})" for line in error.problems]
+            raise InvalidInput(pressing.where, lines) from error
+
+
+def press_sheared(
+    pressing: Pressing,
+    shears: Array,
+    towards: Direction,
+    progress: bool,
+    *,
+    pressed: xr.Dataset | None = None,
+) -> Columns:
+    """Press the crack together at every shear along the same path of load.
+
+    What a result of `closure` has `pressed` already is taken from it.
+
+    Returns
+    -------
+    dict of ndarray
+        As `ShearedContact.press`, with the shear as first axis.
+    """
+    results = []
+    for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear"):
+        columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
+        if columns is None:
+            columns = ShearedContact(pressing, float(shear), towards).press(pressing.load, pressing.keep)
+        results.append(columns)
+    return {name: np.stack([result[name] for result in results]) for name in results[0]}
+
+
+def press_against_spring(
+    pressing: Pressing,
+    shears: Array,
+    lifted: Array,
+    towards: Direction,
+    stiffness: float,
+    progress: bool,
+) -> Columns:
+    """Press the crack together at every shear against a spring.
+
+    The force on the block is N = N0 + k A (delta(N, v) - delta(N0, 0)), and never below zero. For every
+    initial force N0 it is bracketed and solved (Brent): the closure grows with the force, so that the
+    difference of the two sides changes its sign once.
+
+    Parameters
+    ----------
+    lifted : ndarray, shape (shear,)
+        Rigid dilatancy, m.
+    stiffness : float
+        k A, N/m.
+
+    Returns
+    -------
+    dict of ndarray
+        As `press_sheared`; normal_force and all that depends on it differ from shear to shear.
+    """
+    at_rest = ShearedContact(pressing, 0.0, towards).press(pressing.load)
+    initial_dilatancy = -at_rest["interface_closure"]
+    results = []
+    for shear, lift in zip(
+        track(shears, progress, f"press, towards {towards.name}", unit="shear"), lifted, strict=True
+    ):
+        contact = ShearedContact(pressing, float(shear), towards)
+        steps = [
+            _press_balanced(contact, float(force), float(lift - initial), stiffness)
+            for force, initial in zip(pressing.load.values, initial_dilatancy, strict=True)
+        ]
+        slope = {"rms_slope": steps[0].pop("rms_slope")}
+        results.append(slope | {name: np.concatenate([step[name] for step in steps]) for name in steps[0]})
+    return {name: np.stack([result[name] for result in results]) for name in results[0]}
+
+
+def _press_balanced(contact: ShearedContact, initial: float, opening: float, stiffness: float) -> Columns:
+    """Press under the force that balances the spring; `opening` is that of the rigid faces, m."""
+    from scipy.optimize import brentq
+
+    def press(force: float, keep: Sequence[str] = ()) -> Columns:
+        return contact.press(replace(contact.pressing.load, values=(force,)), keep)
+
+    def excess(force: float) -> float:
+        interface_closure = press(force)["interface_closure"][0] if force > 0 else 0.0
+        return float(force - initial - stiffness * (opening - interface_closure))
+
+    if initial + stiffness * opening <= 0:  # the faces sink away from the spring
+        return press(0.0, contact.pressing.keep)
+    at_initial = excess(initial) if initial > 0 else -stiffness * opening
+    low, high = (initial, initial - at_initial) if at_initial < 0 else (0.0, initial)
+    if abs(at_initial) <= FORCE_ERROR * initial:
+        force = initial
+    elif low > 0:  # the closure is nearly linear in the logarithm of the force
+        ends = np.log(low), np.log(high)
+        log_force = brentq(lambda x: excess(np.exp(x)), *ends, xtol=FORCE_ERROR, maxiter=MAX_SOLUTIONS)
+        force = np.exp(log_force)
+    else:
+        force = brentq(excess, low, high, xtol=FORCE_ERROR * high, maxiter=MAX_SOLUTIONS)
+    return press(float(force), contact.pressing.keep)
+
+
+def check_pressed(
+    problems: Problems, crack: Any, pressed: Any, keep: Any, bulk: Any, solver: Mapping[str, Any]
+) -> None:
+    """Check that a result of `closure` is that of this crack, pressed in this way; None passes."""
+    if pressed is None or not isinstance(crack, Crack):
+        return
+    expected = "a result of `joints.closure` for the same crack, bulk part and solver"
+    entry = provenance_of(pressed) if isinstance(pressed, xr.Dataset) else {}
+    stated, wanted = entry.get("parameters", {}), {"crack": crack, "bulk": bulk, **solver}
+    differing = [name for name in wanted if content(stated.get(name)) != content(plain(wanted[name]))]
+    is_closure = entry.get("call") == "fractalcontact.joints.closure"
+    if problems.require(is_closure, "pressed", expected, pressed):
+        problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
+    problems.require(solver.get("hardness") is None, "pressed", "nothing with a hardness", pressed)
+    problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
+
+
+def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:
+    """Return the columns of `ShearedContact.press` from a result of `closure`; None if it lacks a load."""
+    names, shears = np.atleast_1d(pressed["direction"].values), pressed["shear"].values
+    if towards.name not in names or shear not in shears:
+        return None
+    place: dict[str, Any] = {"direction": int(np.flatnonzero(names == towards.name)[0])}
+    place |= {"shear": int(np.flatnonzero(shears == shear)[0])}
+    at_shear = pressed.isel(place, missing_dims="ignore")
+    held = at_shear[load.control].values
+    steps = [np.flatnonzero(held == value) for value in load.values]
+    if not all(found.size for found in steps):
+        return None
+    at_load = at_shear.isel(step=[int(found[0]) for found in steps])
+    columns = {name: at_load[name].values for name in (*SCALARS, "bulk_closure", "interface_closure")}
+    return columns | {"rms_slope": at_load["rms_slope"].values}
+
+
+def pressed_dataset(
+    pressing: Pressing,
+    shears: Array,
+    directions: Sequence[Direction],
+    pressed: Sequence[Columns],
+    *,
+    has_spring: bool = False,
+) -> xr.Dataset:
+    """Return the columns of all directions over (direction, shear, step), and maps over (..., y, x).
+
+    Warns of what did not converge, and of steep delta-surfaces. Without a spring the prescribed load is the
+    same at every shear, and a coordinate of `step` alone.
+    """
+    crack, load = pressing.crack, pressing.load
+    for towards, columns in zip(directions, pressed, strict=True):
+        _warn_unconverged(columns, shears, towards, pressing.where)
+    stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
+    warn_steep(float(stacked["rms_slope"].max()), pressing.where, stacklevel=5)
+    dims = ("direction", "shear", "step", "y", "x")
+    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
+    coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
+    if not has_spring:
+        imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
+        coords |= {name: ("step", stacked[name][0, 0]) for name in imposed}
+        coords[load.control] = ("step", np.array(load.values))  # as given, without rounding
+    coords |= {"shear": ("shear", shears), "step": np.arange(stacked["closure"].shape[2])}
+    coords |= direction_coords(directions)
+    if any(values.ndim > 3 for values in stacked.values()):
+        every = slice(None, None, pressing.factor)
+        coords |= {dim: values[every] for dim, values in block_coords(crack).items()}
+    result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
+    result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
+    residual = float(np.max(stacked["residual"]))
+    return result.assign_attrs(achieved_residual=residual, references=pressing.references)
+
+
+def _warn_unconverged(columns: Columns, shears: Array, towards: Direction, where: str) -> None:
+    """Warn of the shears and steps at which the solver did not meet its tolerance."""
+    failed = np.argwhere(~columns["converged"])
+    if failed.size == 0:
+        return
+    reasons = list(STOP_REASONS)
+    shown = "; ".join(
+        f"shear {shears[i]:g} m towards {towards.name}, step {j}: {reasons[columns['stop_reason'][i, j]]} "
+        f"(residual {columns['residual'][i, j]:.2g})"
+        for i, j in failed[:STEPS_SHOWN]
+    )
+    more = f"; and {len(failed) - STEPS_SHOWN} more" if len(failed) > STEPS_SHOWN else ""
+    warnings.warn(f"{where}: not converged: {shown}{more}", ConvergenceWarning, stacklevel=6)
+
+
+def warn_steep(slope: float, where: str, *, stacklevel: int) -> None:
+    """Warn of delta-surfaces beyond small strains, by the greatest rms slope of all shears and directions."""
+    if slope > STEEP:
+        warnings.warn(
+            f"{where}: the delta-surface has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are "
+            "not small, and linear elasticity is an approximation",
+            SmallStrainWarning,
+            stacklevel=stacklevel,
+        )

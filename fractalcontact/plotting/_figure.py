@@ -1,0 +1,123 @@
+"""What all public figures share: options checked by their names, and the end of their docstrings."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeAlias, TypeVar
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.numbers import is_real, real_numbers
+from fractalcontact.base.validation import Problems, Words
+from fractalcontact.plotting._units import UNITS_EXPECTED
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Test: TypeAlias = Callable[[Any], bool]
+
+UNITS = """units : mapping of str to str, optional
+    Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix."""
+AX = """ax : Axes, optional
+    Default: those of a new figure."""
+AXES = """axes : array of Axes, Figure or SubFigure, optional
+    The Axes of the panels, or a figure to make them in. Default: a new figure."""
+SHARED = """
+Returns
+-------
+{returned}
+
+Raises
+------
+InvalidInput
+    A variable is missing, the result has a further dimension, or an option is not as described."""
+
+
+def figure(function: Callable[P, R]) -> Callable[P, R]:
+    """Check the options of a figure before anything is drawn, and complete its docstring at `{shared}`."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
+        with Problems(f"fc.plotting.{function.__name__}") as problems:
+            for name, value in signature.bind(*arguments, **options).arguments.items():
+                if value is not None or signature.parameters[name].default is not None:
+                    expected, is_valid = OPTIONS.get(name, LABELLED)
+                    shown = value if name in OPTIONS else Words(type(value).__name__)
+                    problems.require(is_valid(value), name, expected, shown)
+        return function(*arguments, **options)
+
+    if function.__doc__:
+        returned = "Axes" if "ax" in signature.parameters else "array of Axes"
+        paragraphs = [UNITS] if "units" in signature.parameters else []
+        paragraphs += [AX if returned == "Axes" else AXES, SHARED.replace("{returned}", returned)]
+        wrapper.__doc__ = inspect.cleandoc(function.__doc__).replace("{shared}", "\n".join(paragraphs))
+    return wrapper
+
+
+def _is_one_of(*names: str) -> Test:
+    """Return a test for the classes of matplotlib, which are not loaded before something is drawn."""
+
+    def test(value: Any) -> bool:
+        return any(f"{cls.__module__}.{cls.__name__}" in names for cls in type(value).__mro__)
+
+    return test
+
+
+_is_axes, _is_sheet = _is_one_of("matplotlib.axes._axes.Axes"), _is_one_of("matplotlib.figure.FigureBase")
+
+
+def _are_panels(value: Any) -> bool:
+    several = isinstance(value, (list, tuple, np.ndarray))
+    return _is_sheet(value) or (several and all(map(_is_axes, np.ravel(np.asarray(value, dtype=object)))))
+
+
+def _is_number(value: Any) -> bool:
+    # a labelled number would carry its dims into the figure
+    return is_real(value) and bool(np.isfinite(value))
+
+
+def _are_numbers(value: Any) -> bool:
+    values = real_numbers(value) if isinstance(value, (list, tuple, np.ndarray)) else None
+    return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())
+
+
+def _are_words(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
+
+
+LABELLED = (
+    "a labelled result (Dataset, DataArray or node of a DataTree)",
+    lambda value: isinstance(value, (xr.DataArray, Mapping)),
+)
+# what is expected of an option, which has one meaning in all figures; any other argument is labelled data
+OPTIONS: dict[str, tuple[str, Test]] = {
+    **dict.fromkeys(("shear", "normal_force", "reach", "zoom", "truth"), ("one finite number", _is_number)),
+    **dict.fromkeys(
+        ("key", "log", "shaded", "maps"), ("True or False", lambda value: isinstance(value, (bool, np.bool_)))
+    ),
+    **dict.fromkeys(("against", "title", "band_name"), ("words", lambda value: isinstance(value, str))),
+    "ax": ("an Axes, or None", _is_axes),
+    "axes": ("a sequence of Axes, a Figure or SubFigure, or None", _are_panels),
+    "band": ("two numbers", lambda value: _are_numbers(value) and len(value) == 2),
+    "block": ("a DataArray with x and y", lambda value: isinstance(value, xr.DataArray)),
+    "direction": (
+        "a word or degrees anticlockwise from E",
+        lambda value: isinstance(value, str) or _is_number(value),
+    ),
+    "figure": ("a Figure or SubFigure, or None", _is_sheet),
+    "marked": ("a sequence of numbers", _are_numbers),
+    "notes": ("a sequence of words", _are_words),
+    "panels": (
+        "an integer >= 1",
+        lambda value: is_real(value) and isinstance(value, (int, np.integer)) and bool(value >= 1),
+    ),
+    "tree": ("a DataTree", lambda value: isinstance(value, xr.DataTree)),
+    "units": UNITS_EXPECTED,
+    "variable": (
+        "the name of a variable, or several",
+        lambda value: isinstance(value, str) or (_are_words(value) and len(value) > 0),
+    ),
+}

@@ -1,0 +1,176 @@
+"""The panel of curves under all figures with lines: labelled axes, named curves, bands, flags and legends."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._style import Axes
+from fractalcontact.plotting._units import Quantity
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Styles = Sequence[dict[str, Any]]
+LEGEND_WIDTH = 24  # characters
+BAND_OPACITY = 0.14  # of an interval under its curve: several of them stay transparent
+
+
+@dataclass(frozen=True)
+class Family:
+    """The curves of a panel: what distinguishes them, and the label and style of each.
+
+    `name` and `unit` belong to labels that are numbers, as in `shear v = 0.4 mm`.
+    """
+
+    styles: Styles
+    labels: Sequence[str] = ()
+    name: str = ""
+    unit: str = ""
+    heading: str = ""
+
+    @property
+    def title(self) -> str:
+        """The title of the legend."""
+        return self.heading or (f"{self.name} ({self.unit})" if self.unit else self.name)
+
+    def curve(self, what: str, number: int = 0) -> str:
+        """Return the name of a curve: what it shows, and which of the family it is."""
+        if not self.labels:
+            return what
+        label = f"{self.name} = {self.labels[number]}" if self.name else self.labels[number]
+        return ", ".join(filter(None, (what, f"{label} {self.unit}".rstrip())))
+
+    def legend(self) -> list[Any]:
+        """Return the entries of the legend, thinned out where they are many."""
+        shown = _style.spread_indices(len(self.labels), _style.MAX_LEGEND_ENTRIES)
+        return [_style.legend_line(self.labels[i], **self.styles[i]) for i in shown]
+
+
+def ordered(labels: Sequence[str], name: str = "", unit: str = "", count: int | None = None) -> Family:
+    """Return a family with colours in order, dark to light."""
+    colours = _style.sequence_colours(len(labels) if count is None else count)
+    return Family([{"color": colour} for colour in colours], labels, name, unit)
+
+
+def distinct(labels: Sequence[str], heading: str = "") -> Family:
+    """Return a family whose colours have no order."""
+    colours = _style.cycle()
+    styles = [{"color": colours[i % len(colours)]} for i in range(len(labels))]
+    return Family(styles, labels, heading=heading)
+
+
+@dataclass
+class LinePanel:
+    """Axes with the quantities x and y, on which the curves of a family are drawn in their units.
+
+    All values are SI; `points` is the most points of a curve that are marked.
+    """
+
+    ax: Axes
+    x: Quantity
+    y: Quantity
+    family: Family = field(default_factory=lambda: ordered((), count=1))
+    points: int = 1
+    entries: list[Any] = field(default_factory=list)
+    drawn: list[tuple[Array, Array]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Label the axes."""
+        self.x.label(self.ax.xaxis)
+        self.y.label(self.ax.yaxis)
+
+    def curves(self, what: str, x: Any, y: Any, *, key: str = "", **style: Any) -> None:
+        """Draw one curve for each of the family: y has its rows, x has them or is common.
+
+        A `key` is the entry of this kind of curve in the legend.
+        """
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        for number, own in enumerate(self.family.styles):
+            self.line(self.family.curve(what, number), x[number], y[number], **(own | style))
+        if key:
+            self.key(key, **style)
+
+    def line(self, name: str, x: Any, y: Any, *, key: str = "", **style: Any) -> None:
+        """Draw one curve."""
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        marker = "o" if x.size <= self.points else ""
+        self.ax.plot(self.x.scale(x), self.y.scale(y), label=name, **({"marker": marker} | style))
+        self.drawn.append((x, y))
+        if key:
+            self.key(key, **style)
+
+    def flagged(self, name: str, x: Any, y: Any, reliable: Array, **style: Any) -> None:
+        """Draw points: filled ones where they are reliable, hollow ones elsewhere."""
+        hollow = {"mec": style["color"], "mfc": self.ax.get_facecolor()}
+        for shown, fill in ((reliable, {}), (~reliable, hollow)):
+            points = self.x.scale(np.asarray(x)[shown]), self.y.scale(np.asarray(y)[shown])
+            self.ax.plot(*points, label=name, **({"marker": "o", "ls": ""} | style | fill))
+
+    def band(self, name: str, x: Any, low: Any, high: Any, colour: Any, alpha: float = BAND_OPACITY) -> None:
+        """Fill between the ends of intervals."""
+        ends = self.y.scale(low), self.y.scale(high)
+        self.ax.fill_between(self.x.scale(x), *ends, color=colour, alpha=alpha, lw=0, label=name)
+
+    def bars(self, name: str, x: Any, low: Any, high: Any, **style: Any) -> None:
+        """Draw intervals as vertical bars."""
+        self.ax.vlines(self.x.scale(x), self.y.scale(low), self.y.scale(high), label=name, **style)
+
+    def level(self, y: float, *, key: str = "", **style: Any) -> None:
+        """Draw a horizontal line of reference."""
+        self.ax.axhline(float(self.y.scale(y)), **style)
+        if key:
+            self.key(key, **style)
+
+    def place(self, x: float, *, key: str = "", **style: Any) -> None:
+        """Draw a vertical line of reference."""
+        self.ax.axvline(float(self.x.scale(x)), **style)
+        if key:
+            self.key(key, **style)
+
+    def key(self, label: str, **style: Any) -> None:
+        """Add an entry to the legend of the kinds of curves, on lines of a legend's width."""
+        text = (
+            label if "$" in label else textwrap.fill(label, LEGEND_WIDTH)
+        )  # symbols are shorter than written
+        self.entries.append(_style.legend_line(text, **style))
+
+    def area_key(self, label: str, **style: Any) -> None:
+        """Add the entry of a filled area."""
+        from matplotlib.patches import Patch
+
+        self.entries.append(Patch(lw=0, label=label, **style))
+
+    def finish(
+        self, *, log: str = "", zero: str = "", title: str = "", legend: bool = True, empty: str = "no values"
+    ) -> Axes:
+        """Set the scales of the axes and put the legends beside them.
+
+        `log` and `zero` name the axes that are logarithmic, or start at zero, where the values allow it.
+        """
+        x, y = (np.concatenate([pair[i].ravel() for pair in self.drawn] or [np.empty(0)]) for i in (0, 1))
+        _style.log_scale(self.ax, x=x if "x" in log else None, y=y if "y" in log else None)
+        if "x" in zero and _reaches_up_from_zero(x):
+            self.ax.set_xlim(left=0)
+        if "y" in zero and _reaches_up_from_zero(y):
+            self.ax.set_ylim(bottom=0)
+        _style.plain_ticks(self.ax)
+        if not np.isfinite(self.y.values if self.y.values.size else y).any():
+            _style.write_in_empty_axes(self.ax, empty)
+        if legend:
+            self.draw_legends(title)
+        return self.ax
+
+    def draw_legends(self, title: str = "", ax: Axes | None = None) -> None:
+        """Put the legends of the family, and of the kinds of curves below it, beside these or other axes."""
+        own = self.family.legend()
+        _style.side_legend(ax or self.ax, own, title=self.family.title)
+        _style.side_legend(ax or self.ax, self.entries, title=title, low=bool(own))
+
+
+def _reaches_up_from_zero(values: Array) -> bool:
+    shown = values[np.isfinite(values)]
+    return bool(shown.size and shown.min() >= 0 and shown.max() > 0)

@@ -1,0 +1,254 @@
+"""Curves over box size or radius: signature, local dimensions and lacunarity, along load and along shear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.units import Scale
+from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import quantity, require_dims, require_variables, result_of, table
+from fractalcontact.plotting._line_panel import Family, LinePanel
+from fractalcontact.plotting._paths import (
+    PATH,
+    at_force,
+    at_shear,
+    by_load,
+    by_shear,
+    load_of,
+    load_text,
+    loaded_steps,
+    loads_of,
+    shear_text,
+)
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Quantity, Units
+
+SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
+IN_CELLS = ("box_size", "radius")
+CELLS = Scale(1.0, "cells")
+MOST = 6  # curves in a panel; more cross those of their random nulls illegibly
+TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
+STEEP = 1.5  # ratio of values above which the lacunarity is drawn on a logarithmic axis
+SPOTS = "random spots, equal area, number and perimeter"
+CELLS_NULL = "random null, equal coverage"
+# curve of a random null: its name and dim, and a and b of its local dimension a + b d ln(curve) / d ln(size)
+NULLS = {
+    "null_count": (CELLS_NULL, "box_size", 0.0, -1.0),
+    "null_mass": (CELLS_NULL, "box_size", 0.0, 1.0),
+    "null_fraction": (CELLS_NULL, "radius", 2.0, -1.0),
+    "spots_fraction": (SPOTS, "side", 2.0, -1.0),
+}
+MARKS = {"spot_size": ("spot size", "o"), "gap_size": ("gap size", "s")}
+
+
+@figure
+def signature(
+    result: Any,
+    *,
+    shear: float | None = None,
+    normal_force: float | None = None,
+    units: Units | None = None,
+    axes: Panels | None = None,
+) -> AxesArray:
+    """Draw the local dimension d(s) of contact domains over the box size s, along load and along shear.
+
+    A power law holds where a curve is level. Dashed lines show the random null. On the curves of a signature
+    a circle marks the spot size and a square the gap size; they are hollow for a state that has no dimension
+    of its own (`signature_flag`), and the common window of the dimensions is shaded. At most six curves are
+    drawn.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.signature`, `box_dimension`, `box_counts`, `correlation_dimension` or
+        `minkowski_dimension` over (shear, step), or without shear or step.
+    shear : float, optional
+        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
+        middle one.
+    normal_force : float, optional
+        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import numpy as np
+    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
+    >>> (ax,) = fc.plotting.signature(fc.domains.signature(mask))
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    box size (mm) | local dimension
+    """
+    data = result_of(result, "signature", ("local_slope",), PATH, units)
+    nulls = [name for name in NULLS if name in data]
+    over = next((name for name in ("side", *IN_CELLS) if name in data["local_slope"].dims), "box_size")
+    require_dims(data, "signature", dict.fromkeys(("local_slope", *nulls), over))
+    for name in nulls[:1]:
+        _, dim, constant, sign = NULLS[name]
+        require_variables(data, "signature", [dim])
+        slope = constant + sign * local_slope(data[dim].values, data[name].values)
+        data = data.assign(null_local_slope=(data[name].dims, slope))
+    shown = path_panels(axes, data)
+    null = NULLS[nulls[0]][0] if nulls else ""
+    names = ("local_slope", "local dimension")
+    for panel, path, dim in _size_curves(data, shear, normal_force, shown, names, null):
+        _mark_sizes(panel, path, dim)
+        panel.finish(log="x", empty="no contact")
+        panel.ax.set_ylim(-0.05, 2.05)
+        slopes = panel.y.values[np.isfinite(panel.y.values)]
+        beyond = slopes[(slopes < -TOLERANCE) | (slopes > 2 + TOLERANCE)]
+        if beyond.size:  # no dimension in a plane: the slope between counts of a few boxes
+            ends = dict.fromkeys(f"{value:.2g}" for value in (beyond.min(), beyond.max()))
+            note = f"outside the axes, of few boxes: {' to '.join(ends)}"
+            place: dict[str, Any] = {"transform": panel.ax.transAxes, "ha": "right", "size": "small"}
+            panel.ax.text(1.0, 1.01, note, color=_style.grey(), **place)
+    return as_array(shown)
+
+
+def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
+    """Mark spot and gap size on each curve, and shade the window of the dimensions."""
+    measured = np.full(path.sizes[dim], True)
+    if "signature_flag" in path:
+        measured = table(path, "signature_flag", (dim,)) == 0
+    for name, (title, marker) in MARKS.items():
+        if name in path:
+            places, sizes = np.log(panel.x.values), table(path, name, (dim,))
+            for i, own in enumerate(panel.family.styles):
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    height = np.interp(np.log(sizes[i]), places, panel.y.values[i], np.nan, np.nan)
+                point = np.array([sizes[i]]), np.array([height]), measured[[i]]
+                panel.flagged(panel.family.curve(title, i), *point, marker=marker, ms=5, **own)
+            panel.key(title, ls="", marker=marker)
+    if not measured.all():
+        panel.key("no dimension", ls="", marker="o", mfc=_style.tone(0.0))
+    ends = [np.unique(path[name].values) for name in ("window_low", "window_high") if name in path]
+    window = np.concatenate([end for end in ends if end.size == 1] or [np.empty(0)])  # that all states have
+    if window.size == 2 and np.isfinite(window).all():
+        panel.ax.axvspan(*panel.x.scale(window), color=_style.pale(), lw=0, zorder=0)
+        panel.area_key("window", facecolor=_style.pale())
+
+
+@figure
+def lacunarity(
+    result: Any,
+    *,
+    shear: float | None = None,
+    normal_force: float | None = None,
+    maps: bool = False,
+    units: Units | None = None,
+    axes: Panels | None = None,
+) -> AxesArray:
+    r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
+
+    Dashed lines show the random null: randomly placed cells of equal coverage. At most six curves are drawn;
+    with `maps` all states are, as colours over load or shear and box size.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.domains.lacunarity` over (shear, step, box_size), or without shear or step.
+    shear : float, optional
+        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
+        middle one.
+    normal_force : float, optional
+        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
+    maps : bool
+        Draw heat maps instead of curves.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import numpy as np
+    >>> mask = fc.surfaces.from_array(np.random.default_rng(1).random((32, 32)), 1e-3) > 0.7
+    >>> result = fc.domains.lacunarity(mask, box_sizes=[1, 2, 4, 8])
+    >>> (ax,) = fc.plotting.lacunarity(result)
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    box size (mm) | lacunarity $\Lambda$
+    """
+    data = result_of(result, "lacunarity", ("lacunarity",), PATH, units)
+    require_dims(data, "lacunarity", {"lacunarity": "box_size"})
+    shown = path_panels(axes, data)
+    if maps:
+        for ax, dim, path, _, text in _chosen_paths(data, shear, normal_force, shown, None):
+            name = "shear" if dim == "shear" else load_of(path)
+            along = loads_of(path.expand_dims([d for d in PATH if d != dim]), name, "lacunarity", _first(dim))
+            places = Quantity(along.values[0], along.scale, along.name)
+            colours = quantity(path, "lacunarity", (dim, "box_size"))
+            _maps.draw_heat_map(ax, places, sizes_of(path, "box_size"), colours)
+            ax.set_title(text)
+        return as_array(shown)
+    for panel, _, _ in _size_curves(data, shear, normal_force, shown, ("lacunarity", ""), CELLS_NULL):
+        finite = panel.y.values[np.isfinite(panel.y.values)]
+        steep = finite.size > 0 and finite.max() > STEEP * finite.min()
+        panel.finish(log="xy" if steep else "x", empty="no contact")
+    return as_array(shown)
+
+
+def _first(dim: str) -> tuple[str, str]:
+    """Return the dims of a path with its own dim last."""
+    return PATH if dim == PATH[1] else PATH[::-1]
+
+
+def path_panels(axes: Panels | None, data: xr.Dataset) -> dict[str, Axes]:
+    """Return Axes for each path dim that is longer than one (`step` if none is)."""
+    dims = [dim for dim in ("step", "shear") if data.sizes[dim] > 1] or ["step"]
+    size = (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL
+    return dict(zip(dims, _style.panel_row(axes, len(dims), size), strict=True))
+
+
+def as_array(panels: dict[str, Axes]) -> AxesArray:
+    """Return the Axes of the panels as an array."""
+    return np.array(list(panels.values()), dtype=object)
+
+
+def _chosen_paths(
+    data: xr.Dataset, shear: float | None, force: float | None, shown: dict[str, Axes], most: int | None
+) -> Iterator[tuple[Axes, str, xr.Dataset, Family, str]]:
+    """Yield for each panel its dim, the states along it (at most `most`), their family and its title."""
+    for dim, ax in shown.items():
+        path = at_shear(data, shear) if dim == "step" else at_force(data, force)
+        text = shear_text(path, data) if dim == "step" else load_text(path, data)
+        count = path.sizes[dim] if most is None else most
+        chosen = loaded_steps(path, count) if dim == "step" else _style.spread_indices(path.sizes[dim], count)
+        path = path.isel({dim: chosen})
+        yield ax, dim, path, by_load(path) if dim == "step" else by_shear(path), text
+
+
+def _size_curves(
+    data: xr.Dataset,
+    shear: float | None,
+    force: float | None,
+    shown: dict[str, Axes],
+    names: tuple[str, str],
+    null: str,
+) -> Iterator[tuple[LinePanel, xr.Dataset, str]]:
+    """Draw a variable over box size, beside its random null, and yield the panels to be finished."""
+    name, title = names
+    for ax, dim, path, family, text in _chosen_paths(data, shear, force, shown, MOST):
+        over = next(str(last) for last in path[name].dims[::-1] if last not in PATH)
+        values = quantity(path, name, (dim, over), title)
+        panel = LinePanel(ax, sizes_of(path, over), values, family)
+        panel.curves("contact domain", panel.x.values, values.values)
+        if f"null_{name}" in path:
+            style = _style.NULL_LINE | {"marker": ""}
+            key = null if ax is list(shown.values())[-1] else ""
+            beside = table(path, f"null_{name}", (dim, over))
+            panel.curves("random null", panel.x.values, beside, key=key, **style)
+        ax.set_title(text)
+        yield panel, path, dim
+
+
+def sizes_of(data: xr.Dataset, over: str) -> Quantity:
+    """Return the box sizes or radii along a dim: lengths, or numbers of cells where there are no lengths."""
+    size = next((s for s in SIZES if s in data.variables and data[s].dims == (over,)), over)
+    name = "radius" if over == "radius" else "box size"
+    if size not in data.variables:
+        return Quantity(np.arange(1.0, data.sizes[over] + 1), CELLS, name)
+    sizes = quantity(data, size, (over,), name)
+    return Quantity(sizes.values, CELLS, name) if size in IN_CELLS else sizes

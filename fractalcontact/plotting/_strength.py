@@ -1,0 +1,260 @@
+"""Strength of a sheared joint: criteria and tests, shear curves, friction angles, and the effect of size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.units import quantity_text
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._directions import by_direction, direction_name, limit_shear, select_direction
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
+from fractalcontact.plotting._line_panel import LinePanel, distinct, ordered
+from fractalcontact.plotting._paths import by_load, by_shear
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Quantity, Units, number_texts, scale_of
+
+OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is out of its range
+TESTS = {"peak_shear_strength": "o", "residual_shear_strength": "x"}
+
+
+@figure
+def strength_envelope(
+    result: Any, *, tests: Any | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
+    r"""Draw the peak shear strength against the normal stress, one curve per criterion.
+
+    A curve is dotted where its criterion is used out of its range.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.strength_envelope`.
+    tests : Dataset or node of a DataTree, optional
+        From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> result = fc.joints.strength_envelope(
+    ...     surface, nominal_pressure=[1e6, 2e6, 4e6], wall_strength=60e6, basic_friction_angle=30
+    ... )
+    >>> print(fc.plotting.strength_envelope(result).get_ylabel())
+    shear strength $\tau$ (MPa)
+    """
+    names, dims = ("shear_strength", "in_range", "criterion"), ("criterion", "nominal_pressure")
+    data = result_of(result, "strength_envelope", names, dims[:1], units)
+    for dim in dims:
+        require_dims(data, "strength_envelope", {"shear_strength": dim, "in_range": dim})
+    data = data.sortby("nominal_pressure")
+    pressure = quantity(data, "nominal_pressure", dims[1:])
+    every = np.append(pressure.values, data["shear_strength"].values)
+    strength = quantity(data, "shear_strength", dims, shown=every)
+    # one unit on both axes, so that a slope can be read as a friction coefficient
+    pressure = Quantity(pressure.values, strength.scale, pressure.name)
+    in_range = table(data, "in_range", dims) > 0
+    authors = [
+        " and ".join(part.capitalize() for part in name.split("_")) for name in words(data["criterion"])
+    ]
+    panel = LinePanel(_style.axes_or_new(ax), pressure, strength, distinct(authors), points=0)
+    panel.curves("", pressure.values, strength.values, **OUTSIDE_LINE)
+    panel.curves("in range", pressure.values, np.where(in_range, strength.values, np.nan))
+    if not in_range.all():
+        panel.key("out of range", **OUTSIDE_LINE)
+    if tests is not None:
+        found = result_of(tests, "strength_envelope", (*TESTS, dims[1]), dims[1:], argument="tests")
+        for name, marker in TESTS.items():
+            style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
+            label = f"direct shear, {name.partition('_')[0]}"
+            points = table(found, dims[1], dims[1:]), table(found, name, dims[1:])
+            panel.line(label, *points, key=label, clip_on=False, **style)
+    return panel.finish(zero="xy")
+
+
+SHOWN = ("shear_stress", "dilatancy")
+DIMS = ("nominal_pressure", "shear_displacement")
+BESIDE: dict[str, Any] = {"lw": 1.0, "ls": "--"}  # curves to compare with
+
+
+@figure
+def shear_curve(
+    result: Any, *, beside: Any | None = None, units: Units | None = None, axes: Panels | None = None
+) -> AxesArray:
+    r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.direct_shear` or `fractalcontact.joints.shear_curve`.
+    beside : Dataset or node of a DataTree, optional
+        Such a result to draw dashed, in the colours of the same normal stresses.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> result = fc.joints.shear_curve(
+    ...     surface, [0, 1e-3, 5e-3], nominal_pressure=1e6, wall_strength=6e7, residual_friction_angle=30
+    ... )
+    >>> print(fc.plotting.shear_curve(result)[0].get_ylabel())
+    shear stress $\tau$ (MPa)
+    """
+    data = [_read(each, units) for each in (result, beside) if each is not None]
+    shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
+    every = {
+        name: np.concatenate([np.ravel(each[name].values) for each in data])
+        for name in ("nominal_pressure", "shear_displacement", *SHOWN)
+    }
+    pressures, places = np.unique(every["nominal_pressure"], return_inverse=True)  # NaN has a place too
+    of_each = np.split(places, [data[0].sizes["nominal_pressure"]])
+    stress = scale_of(data[0]["nominal_pressure"], pressures)
+    family = ordered(number_texts(stress, pressures, 3), "normal stress", stress.unit)
+    for ax, name in zip(shown, SHOWN, strict=True):
+        x, y = (quantity(data[0], each, data[0][each].dims, shown=every[each])
+                for each in ("shear_displacement", name))  # fmt: skip
+        panel = LinePanel(ax, x, y, family, points=0)
+        for each, own, style in zip(data, of_each, ({}, BESIDE), strict=False):
+            title = str(each.attrs.get("title", name))
+            for i, place in enumerate(own):
+                along = each["shear_displacement"].broadcast_like(each[name]).values[i]
+                curve = family.curve(title, place)
+                panel.line(curve, along, each[name].values[i], **(family.styles[place] | style))
+            if beside is not None:
+                panel.key(str(each.attrs.get("title", "")), **style)
+        panel.finish(legend=name == SHOWN[-1])
+    return shown
+
+
+def _read(result: Any, units: Units | None) -> xr.Dataset:
+    names = (*SHOWN, *DIMS)
+    data = result_of(result, "shear_curve", names, ("nominal_pressure",), units)
+    along = (data["shear_displacement"], data["nominal_pressure"])
+    data = data.assign({name: xr.broadcast(data[name], *along)[0] for name in SHOWN})
+    return data.transpose("nominal_pressure", ..., missing_dims="ignore")
+
+
+LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
+BASIC_LINE: dict[str, Any] = {"lw": 0.8, "ls": ":"}
+
+
+@figure
+def friction(
+    result: Any,
+    *,
+    direction: str | float | None = None,
+    reach: float | None = None,
+    units: Units | None = None,
+    axes: Panels | None = None,
+) -> AxesArray:
+    """Draw friction angle and shear strength against shear displacement, one curve per normal force.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.friction`: friction_angle (degree) over (direction, shear, step), with
+        shear_strength (Pa) if forces are given; basic_friction_angle (degree) is drawn as a line.
+    direction : str, optional
+        Direction to draw; required if there are several directions and forces. Without forces each
+        direction gets a curve.
+    reach : float, optional
+        Largest shear displacement (m) to show.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3, basic_friction_angle=35.0)
+    >>> opening = fc.joints.dilatancy(crack, shear=[0.0, 1e-4, 2e-4, 3e-4])
+    >>> (ax,) = fc.plotting.friction(fc.joints.friction(opening))
+    >>> print(ax.get_ylabel())
+    friction angle (°)
+    """
+    selected = limit_shear(select_direction(result, None, "friction", units), reach)
+    names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
+    by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
+    over = "step" if by_force else "direction"
+    if by_force or direction is not None:
+        selected = select_direction(selected, direction, "friction")
+    data = result_of(selected, "friction", (*names, "shear"), ("shear", over))
+    size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
+    shown = _style.panel_row(axes, len(names), size, sharex=True)
+    shear, family = quantity(data, "shear", ("shear",)), by_load(data) if by_force else by_direction(data)
+    for ax, name in zip(shown, names, strict=True):
+        values = quantity(data, name, (over, "shear"))
+        panel = LinePanel(ax, shear, values, family, points=_style.MAX_MARKED_POINTS)
+        panel.curves(name.replace("_", " "), shear.values, values.values)
+        is_wide = name == "shear_strength" and _style.needs_log_axis(values.values)
+        if name == "friction_angle" and "basic_friction_angle" in data:
+            basic_angle = float(np.ravel(data["basic_friction_angle"].values)[0])
+            panel.level(basic_angle, color=_style.ink(), **BASIC_LINE)
+        if name == names[-1] and "basic_friction_angle" in data:
+            panel.key("basic angle", color=_style.ink(), **BASIC_LINE)
+        panel.finish(log="y" if is_wide else "", legend=name == names[-1])
+    remarks = []
+    if by_force and "direction" in data.coords:
+        remarks.append(f"block slides {direction_name(words(data['direction'])[0])}")
+    if shown[0].get_ylim()[1] > LOCKED:
+        shown[0].set_ylim(top=LOCKED)
+        remarks.append(f"locked above {LOCKED:g}°")
+    shown[0].set_title(", ".join(remarks))
+    if len(names) > 1:
+        shown[1].set_title(_slope_lengths(data))
+    return shown
+
+
+def _slope_lengths(data: xr.Dataset) -> str:
+    """Return over which lengths of shear the slopes of the dilatancy were taken; empty where not stated."""
+    lengths = np.atleast_1d(data["smoothing"].values).astype(float) if "smoothing" in data else np.empty(0)
+    lengths = lengths[np.isfinite(lengths)]
+    ends = [quantity_text(end, "m") for end in (lengths.min(), lengths.max())] if lengths.size else []
+    return "slopes over " + " to ".join(dict.fromkeys(ends)) if ends else ""
+
+
+SHEAR_LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.2)))
+CONSTANT: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": "-."}
+
+
+@figure
+def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the shear strength of a joint under self-weight against the size of the structure.
+
+    One colour for each direction of sliding, one line style for each shear. A grey line is the strength for
+    the basic friction angle alone, which grows as the size. Curves are missing where the faces lock.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.self_weight`.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
+    >>> strength = fc.joints.self_weight(crack, structure_size=[10, 100], unit_weight=24e3, shear=1e-3)
+    >>> ax = fc.plotting.self_weight(strength)
+    >>> print(ax.get_xlabel(), ax.get_xscale(), ax.get_yscale())
+    size of the structure (m) log log
+    """
+    names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
+    dims = ("shear", "direction", "structure_size")
+    data = result_of(result, "self_weight", names, dims, units)
+    size = quantity(data, "structure_size", ("structure_size",), "size of the structure")
+    strength, shears = quantity(data, "shear_strength", dims), by_shear(data)
+    panel = LinePanel(_style.axes_or_new(ax), size, strength, by_direction(data), points=1)
+    for i, values in enumerate(strength.values):
+        line = SHEAR_LINES[i % len(SHEAR_LINES)]
+        key = shears.labels[i] if shears.labels else ""
+        panel.curves(shears.curve("shear strength", i), size.values, values, key=key, ls=line)
+    angle = np.radians(table(data, "basic_friction_angle", ()))
+    basic = table(data, "nominal_pressure", ("structure_size",)) * np.tan(angle)
+    panel.line("basic angle alone", size.values, basic, key="basic angle alone", **CONSTANT)
+    return panel.finish(log="xy", title=shears.title)

@@ -1,0 +1,324 @@
+"""The tables of a summary: which variables of the result of a stage they show, and the text of their cells.
+
+A `Rows` declares the table of one stage; `_stages` names it beside the function of the stage. `table_of`
+makes it from the result. Screen and report render the same tables: the screen some of the columns, with the
+tables of all stages over the same shears, directions or loads joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
+
+Array = np.ndarray[Any, np.dtype[Any]]
+Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
+
+MEMBER = "member"
+WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
+ROUNDING = 1e-12  # a spread below it is none: the same load for every member
+FRACTIONS = ("contact_fraction", "corrected_contact_fraction", "stick_fraction", "coverage", "largest_share")
+PATHS = ("shear", "step", "nominal_pressure")  # a table without rows along one shows its last value
+# head of the first columns of a table, by dim
+KEYS = {
+    "shear": "shear",
+    "direction": "toward",
+    "method": "method",
+    "nominal_pressure": "nominal pressure",
+    "structure_size": "size of the structure",
+    "resolution": "spacing",
+    "criterion": "criterion",
+    "axis": "along",
+    "moment_order": "order",
+    "diagram": "diagram",
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes
+    ----------
+    head : str
+    values : str, pair of str, or function
+        A variable; the ends of an interval; or a function of the state of one row, which returns an array, or
+        text. A column is left out where the result does not have its variable.
+    decimals : int, optional
+        Of a plain number. Default: three digits, with the unit.
+    screen : bool
+        Whether the short summary shows it.
+    """
+
+    head: str
+    values: str | tuple[str, str] | Callable[[xr.Dataset], Any]
+    decimals: int | None = None
+    screen: bool = True
+
+
+def no_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterable[str]:
+    """Return no remark."""
+    del tree, data
+    return ()
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The table of a stage.
+
+    Attributes
+    ----------
+    title : str
+    over : tuple of str
+        The dims along which it has rows, of those that the result has; "step" is the path of the load.
+        Other paths of loads and shears are shown at their end.
+    columns : tuple of Column
+    remarks : function
+        What a reader of the whole table needs to know.
+    first_dim : bool
+        Rows along the first of the dims alone.
+    load : str
+        The variable that names a step; default the nominal pressure.
+    """
+
+    title: str
+    over: tuple[str, ...]
+    columns: tuple[Column, ...]
+    remarks: Remarks = no_remarks
+    first_dim: bool = False
+    load: str = "nominal_pressure"
+
+
+@dataclass(frozen=True)
+class ResultTable:
+    """A table as text: the head and cells of the key of each row, and those of its values."""
+
+    title: str
+    key_heads: tuple[str, ...]
+    keys: tuple[tuple[str, ...], ...]
+    heads: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
+        """The head and the rows."""
+        body = zip(self.keys, self.cells, strict=True)
+        return [(*self.key_heads, *self.heads), *((*key, *cells) for key, cells in body)]
+
+    def beside(self, other: ResultTable) -> ResultTable:
+        """Return this table with the columns of another one; a row that one of them lacks has empty cells."""
+        keys = self.keys if len(self.keys) >= len(other.keys) else other.keys
+        ours, theirs = (dict(zip(each.keys, each.cells, strict=True)) for each in (self, other))
+        empty = [("",) * len(each.heads) for each in (self, other)]
+        cells = tuple((*ours.get(key, empty[0]), *theirs.get(key, empty[1])) for key in keys)
+        return replace(self, keys=keys, heads=(*self.heads, *other.heads), cells=cells)
+
+    def shortened(self, most: int) -> ResultTable:
+        """Return at most so many rows, evenly spread from the first to the last."""
+        if len(self.keys) <= most:
+            return self
+        places = np.unique(np.linspace(0, len(self.keys) - 1, most).round().astype(int))
+        rest = f"{len(places)} of {len(self.keys)}"
+        heads = (f"{self.key_heads[0]} ({rest})", *self.key_heads[1:])
+        keys, cells = (tuple(rows[i] for i in places) for rows in (self.keys, self.cells))
+        return replace(self, key_heads=heads, keys=keys, cells=cells)
+
+
+def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = False) -> ResultTable | None:
+    """Return the table of a result, or its columns for the screen; None where the result has none of them."""
+    dims = [dim for dim in rows.over if dim in data.dims]
+    dims = dims[:1] if rows.first_dim else dims
+    keys = dims or [dim for dim in rows.over if dim in data.coords][:1]
+    others = {dim: -1 for dim in PATHS if dim in data.dims and dim not in dims}
+    data = data.isel(others)
+    states = [
+        data.isel(dict(zip(dims, place, strict=True)))
+        for place in np.ndindex(*(data.sizes[dim] for dim in dims))
+    ]
+    shown = [column for column in rows.columns if column.screen or not screen]
+    columns = {column.head: cells for column in shown if (cells := _cells(column, data, states)) is not None}
+    if not columns or not states:
+        return None
+    key_heads, key_cells = [], []
+    for dim in keys:
+        values = [_key(dim, state, data, rows) for state in states]
+        key_heads.append(_load_head(rows) if dim == "step" else KEYS[dim])
+        key_cells.append(values)
+    if {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads:
+        pressures = finite(data["nominal_pressure"])
+        if pressures.size and np.ptp(pressures) <= ROUNDING * pressures.max():
+            key_heads[0] += f", at {amount(data['nominal_pressure'])}"
+    table_keys = tuple(zip(*key_cells, strict=True)) if key_cells else ((),) * len(states)
+    remarks = () if screen else tuple(rows.remarks(tree, data))
+    rows_of_cells = tuple(zip(*columns.values(), strict=True))
+    return ResultTable(rows.title, tuple(key_heads), table_keys, tuple(columns), rows_of_cells, remarks)
+
+
+def _load_head(rows: Rows) -> str:
+    return rows.load.replace("_", " ")
+
+
+def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
+    """Return the value of a dim that names a row: a length in the unit of its column, a load, or a word."""
+    if dim == "step":
+        if rows.load not in state.variables:
+            return str(int(state["step"])) if "step" in state.coords else ""
+        return amount(state[rows.load], scale=column_scale(data[rows.load]))
+    if dim not in state.coords:
+        return ""
+    value = state[dim]
+    if value.dtype.kind not in "fiu":
+        return str(value.values)
+    return amount(value, scale=scale_for(_units_of(value), data[dim].values))
+
+
+def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> list[str] | None:
+    """Return the cells of a column; None where the result does not have it."""
+    values = column.values
+    if callable(values):
+        found = [values(state) for state in states]
+        if all(item is None for item in found):
+            return None
+        return [_text(item, column.decimals) if item is not None else "-" for item in found]
+    if isinstance(values, tuple):
+        if not set(values) <= set(data.variables):
+            return None
+        low, high = values
+        return [interval(state[low], state[high], column.decimals) for state in states]
+    if values not in data.variables:
+        return None
+    scale = column_scale(data[values]) if column.decimals is None and data[values].dtype.kind == "f" else None
+    return [_text(state[values], column.decimals, scale) for state in states]
+
+
+def _text(value: Any, decimals: int | None, scale: Scale | None = None) -> str:
+    if isinstance(value, str):
+        return value
+    if value.dtype.kind == "b":
+        return _yes_or_no(value)
+    if value.dtype.kind not in "fiu":
+        return str(value.values)
+    return amount(value, scale=scale) if decimals is None else plain(value, decimals)
+
+
+def _yes_or_no(value: xr.DataArray) -> str:
+    count, size = int(value.sum()), value.size
+    return f"{count} of {size}" if 0 < count < size else "yes" if count else "no"
+
+
+def interval(low: xr.DataArray, high: xr.DataArray, decimals: int | None) -> str:
+    """Return the ends of an interval, of an ensemble the means of its ends; "none" where there is none."""
+    ends = [end.mean(keep_attrs=True) for end in (low, high)]
+    if not all(np.isfinite(end.values) for end in ends):
+        return "none"
+    return " to ".join(amount(end) if decimals is None else plain(end, decimals) for end in ends)
+
+
+def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
+    """Return a value with its unit and SI prefix; of an ensemble mean and standard deviation.
+
+    `scale` is that of a column, see `column_scale`.
+    """
+    name = str(data.name)
+    if name in FRACTIONS:
+        scale = Scale(0.01, "%")
+    elif scale is None:
+        scale = scale_for(_units_of(data), float(finite(data).mean()) if finite(data).size else np.nan)
+    unit = f" {scale.unit}".rstrip()
+    return _over_members(scale(data.values), lambda value: number(value, digits), _decimals_of, unit)
+
+
+def _units_of(data: Any) -> str:
+    quantity = QUANTITIES.get(str(data.name))
+    return str(data.attrs.get("units") or (quantity.units if quantity else "") or "")
+
+
+def column_scale(data: Any) -> Scale | None:
+    """Return one unit for a column of a table; None, each value its own, where they span three decades."""
+    sizes = np.abs(finite(data))
+    sizes = sizes[sizes > 0]
+    if sizes.size == 0 or sizes.max() >= WIDE_COLUMN * sizes.min():
+        return None
+    return scale_for(_units_of(data), float(np.median(sizes)))
+
+
+def plain(data: Any, decimals: int, *, sign: bool = False) -> str:
+    """Return a number with so many decimals; of an ensemble mean and standard deviation."""
+    return _over_members(data.values, lambda value: fixed(value, decimals, sign=sign), lambda _: decimals)
+
+
+def _over_members(
+    values: Any, text: Callable[[float], str], decimals: Callable[[float], int], unit: str = ""
+) -> str:
+    """Return the value of all, or mean ± standard deviation with the number of members that have one.
+
+    `text` writes a single value; `decimals` gives those of the mean and of the deviation from the deviation.
+    """
+    values = np.asarray(values, dtype=float)
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return "-"
+    share = f" ({known.size} of {values.size})" if known.size < values.size else ""
+    if values.ndim == 0 or float(np.ptp(known)) <= ROUNDING * float(np.abs(known).max()):
+        return text(float(known[0])) + unit + share
+    spread = float(np.std(known, ddof=1))
+    digits, sign = decimals(spread), text(float(known.mean())).startswith("+")
+    return f"{fixed(float(known.mean()), digits, sign=sign)} ± {fixed(spread, digits)}{unit}{share}"
+
+
+def _decimals_of(spread: float) -> int:
+    """Return the decimals that show a standard deviation with two digits."""
+    return max(0, 1 - int(np.floor(np.log10(spread))))
+
+
+def finite(data: Any) -> Array:
+    """Return the finite values."""
+    values = np.asarray(data.values, dtype=float)
+    return np.asarray(values[np.isfinite(values)])
+
+
+def length(value: Any) -> str:
+    """Return a length in metres with the prefix that suits it."""
+    return quantity_text(value, "m")
+
+
+def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
+    """Return the Dataset of a group, None where the study has none."""
+    node = tree
+    for name in path.split("/"):
+        if name not in node.children:
+            return None
+        node = node.children[name]
+    return node.to_dataset() if node.has_data else None
+
+
+def member_count(tree: xr.DataTree) -> int:
+    """Return the number of members of an ensemble; 0 for a single study."""
+    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
+
+
+def of_member(tree: xr.DataTree, number_of_member: int) -> xr.DataTree:
+    """Return the results of one member of an ensemble."""
+    place = {MEMBER: number_of_member}
+    one: xr.DataTree = tree.map_over_datasets(lambda data: data.isel(place, missing_dims="ignore"))
+    one.attrs = dict(tree.attrs)
+    return one
+
+
+def in_turn(data: xr.Dataset, dim: str) -> Iterator[tuple[str, xr.Dataset]]:
+    """Yield the name of every value of a dim, nothing where there is no such dim, with its results."""
+    if dim not in data.coords:
+        yield "", data
+        return
+    values = np.atleast_1d(data[dim].values)
+    scale = scale_for("m", values) if values.dtype.kind == "f" else None
+    for place, value in enumerate(values):
+        state = data.isel({dim: place}) if dim in data.dims else data
+        yield scale.text(value) if scale is not None else str(value), state

@@ -1,0 +1,77 @@
+"""The posterior of the exponent: Laplace's method beside quadrature, and limits that it must keep."""
+
+import numpy as np
+import pytest
+
+import fractalcontact as fc
+from fractalcontact.dimensions import _spectral_posterior as sp
+from fractalcontact.dimensions._likelihood import fitted_modes
+from fractalcontact.dimensions._surface_input import read_surfaces
+
+
+def bins_of(hurst, n=96, seed=1):
+    surface = fc.surfaces.fbm((n, n), 1e-4, hurst=hurst, rms_increment=1e-6, rng=seed)
+    return fitted_modes(read_surfaces(surface)[0]).bins()
+
+
+def log_density(bins, theta, form=0):
+    """Return the log likelihood without discrepancy, amplitude integrated out, up to a constant."""
+    model = np.empty(bins.level.size)
+    sp.bin_power(theta, form, bins.axes, bins.tables[form], bins.nodes, bins.t, bins.white, bins.lnq, model)
+    residual, weight = bins.level - model, 1.0 / bins.variance
+    residual = residual - weight @ residual / weight.sum()
+    return -0.5 * weight @ np.square(residual)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_one_exponent_by_quadrature(hurst):
+    bins = bins_of(hurst)
+    found = sp.posterior(bins, spread=0.0, noise=0.0)
+    plain = next(m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0)
+    grid = np.linspace(0.01, 0.99, 2000)
+    logs = np.array([log_density(bins, np.array([h, 0.0, 0.0, 0.0, 0.0, 1.0])) for h in grid])
+    weights = np.exp(logs - logs.max())
+    mean = weights @ grid / weights.sum()
+    deviation = np.sqrt(weights @ np.square(grid - mean) / weights.sum())
+    u, du = found.centre[plain, 0], found.scale[plain, 0]
+    from scipy.stats import norm
+
+    laplace = sp.LOWEST + (sp.HIGHEST - sp.LOWEST) * norm.cdf(u)
+    slope = (sp.HIGHEST - sp.LOWEST) * norm.pdf(u)
+    assert abs(laplace - mean) < 0.1 * deviation
+    assert du * slope == pytest.approx(deviation, rel=0.05)
+
+
+def test_evidence_of_noise_by_quadrature():
+    bins = bins_of(0.6)
+    found = sp.posterior(bins, spread=0.0)
+    chosen = {h.is_noisy: m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0}
+    ratio = found.share[chosen[True], 0] / found.share[chosen[False], 0]
+    heights = np.linspace(0.01, 0.99, 200)
+    # u of ln nu is normal; at equal steps of its probability the prior is a mean
+    from scipy.stats import norm
+
+    noises = np.exp(sp._PRIOR_NOISE[0] + sp._PRIOR_NOISE[1] * norm.ppf((np.arange(60) + 0.5) / 60))
+    plain = np.array([log_density(bins, np.array([h, 0.0, 0.0, 0.0, 0.0, 1.0])) for h in heights])
+    noisy = np.array(
+        [[log_density(bins, np.array([h, 0.0, nu, 0.0, 0.0, 1.0])) for nu in noises] for h in heights]
+    )
+    top = plain.max()
+    expected = np.mean(np.exp(noisy - top)) / np.mean(np.exp(plain - top))
+    assert np.log(ratio) == pytest.approx(np.log(expected), abs=0.5)
+
+
+def test_shares_sum_to_one_and_quantiles_ascend():
+    found = sp.posterior(bins_of(0.5))
+    assert found.share.sum() == pytest.approx(1.0)
+    assert sum(kind.prior for kind in found.discrepancies) == pytest.approx(1.0)
+    assert sum(np.exp(hypothesis.log_prior) for hypothesis in found.hypotheses) == pytest.approx(1.0)
+    quantiles = [found.quantile(share) for share in (0.025, 0.25, 0.5, 0.75, 0.975)]
+    assert np.all(np.diff(quantiles) > 0.0)
+
+
+def test_level_changes_nothing():
+    bins = bins_of(0.5)
+    found = sp.posterior(bins).quantile(0.5)
+    bins.level[:] += 7.0
+    assert sp.posterior(bins).quantile(0.5) == pytest.approx(found, abs=1e-4)
