@@ -117,7 +117,7 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
         metavar="NAME",
         help="surfaces, dimensions, contact, domains, joints: error against run time of their methods "
         "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
-        "of roughness; with --extreme, names of cases",
+        "of roughness",
     )
     accuracy.add_argument(
         "-o",
@@ -126,14 +126,6 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
         "continues",
     )
     accuracy.add_argument("--budget", type=float, default=60.0, help="time budget in seconds (default 60)")
-    accuracy.add_argument(
-        "--extreme",
-        action="store_true",
-        help="run the catalogue of extreme cases instead, or the cases named",
-    )
-    accuracy.add_argument(
-        "--large", action="store_true", help="with --extreme: also cases that take minutes and gigabytes"
-    )
     bench = accuracy.add_argument_group("estimators")
     bench.add_argument("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
     bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
@@ -347,14 +339,10 @@ def _memory() -> str:
 
 
 def _accuracy(options: argparse.Namespace) -> int:
-    if options.large and not options.extreme:
-        raise InvalidInput("fractalcontact accuracy", ["--large: expected only with --extreme"])
     if options.out is not None:
         from fractalcontact.base.output_folder import output_folder
 
         output_folder(options.out)  # before the measuring, not after it
-    if options.extreme:
-        return _extremes(options)
     if options.names == ["estimators"]:
         return _estimators(options)
     return _error_against_time(options)
@@ -398,18 +386,6 @@ def _accuracy_exit_code(stop: Stop) -> int:
     if stop:
         raise Stopped(stop.number, "the results so far are printed above")
     return 0
-
-
-def _extremes(options: argparse.Namespace) -> int:
-    from fractalcontact import accuracy
-
-    with noted() as stop:
-        result = accuracy.extremes(options.names or None, large=options.large, progress=True, stop=stop)
-    print(accuracy.summary(result))
-    if result.sizes["result"] and options.out is not None:
-        name = _save_accuracy(result, Path(options.out) / "extremes.nc", stop)
-        print(f"\nwritten to {options.out}: {name}")
-    return _accuracy_exit_code(stop) or int(not result["passed"].all())
 
 
 def _estimators(options: argparse.Namespace) -> int:

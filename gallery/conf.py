@@ -80,7 +80,6 @@ PAGES = (
     "conventions",
     "glossary",
     "architecture",
-    "extremes",
     "theory",
     "theory_*",
 )

@@ -10,7 +10,6 @@ from docutils.parsers.rst import Directive
 def setup(app):
     """Register the directives and hooks of this file."""
     app.add_directive("names", Names)
-    app.add_directive("extremes", Extremes)
     app.add_directive("commands", Commands)
     app.add_directive("extras", Extras)
     app.add_directive("scene-tables", SceneTables)
@@ -157,45 +156,6 @@ def _values(schema):
     bounds = " and ".join(f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema)
     names = {"boolean": "true or false", "string": "text", "number": "number", "integer": "integer"}
     return f"{names.get(schema.get('type'), 'see the function')} {bounds}".strip()
-
-
-def worst_results(results):
-    """Return the worst result of each case: one that failed, else the largest error; and its longest call."""
-    import xarray as xr
-
-    badness = results["error"].fillna(-1.0).where(results["passed"], float("inf"))
-    worst = []
-    for name in dict.fromkeys(results["case"].values.tolist()):
-        of_case = results.isel(result=results["case"].values == name)
-        row = of_case.isel(result=[int(badness.values[results["case"].values == name].argmax())])
-        worst.append(row.assign(run_time=("result", [float(of_case["run_time"].max())])))
-    return xr.concat(worst, "result")
-
-
-class Extremes(Directive):
-    """The catalogue of extreme cases, run by this build, with the largest error of each case."""
-
-    def run(self):
-        from fractalcontact import accuracy
-
-        worst = worst_results(accuracy.extremes())
-        names = ("case", "quantity", "expectation", "outcome", "error", "run_time", "passed")
-        rows = [
-            (
-                case,
-                accuracy.cases[case].description,
-                nodes.literal(text=quantity),
-                expectation or "finite or explained",
-                ("" if passed else "FAILED: ") + outcome[:60],
-                "" if error != error else f"{error:.1e}",
-                f"{seconds:.2g}",
-            )
-            for case, quantity, expectation, outcome, error, seconds, passed in zip(
-                *(worst[name].values for name in names), strict=True
-            )
-        ]
-        head = ("case", "description", "worst quantity", "expected", "result", "error", "slowest call, s")
-        return [table((16, 28, 26, 12, 12, 8, 8), head, rows)]
 
 
 def table(widths, head, rows):

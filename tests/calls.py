@@ -148,12 +148,6 @@ def measured():
 
 
 @functools.cache
-def extremes():
-    """Return what `accuracy.extremes` tells of one case, without the process that it starts."""
-    return fc.accuracy.extremes("one cell")
-
-
-@functools.cache
 def estimators():
     return fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1)
 
@@ -338,9 +332,9 @@ REFUSED = ("accuracy.estimators",)
 # not called: `scenes.run` takes damaged scenes (`fuzz_scenes`), the next take as long as they are told to,
 # others have no arguments, and the rest are no functions
 LEFT_OUT = {
-    "scenes.run", "accuracy.examine", "accuracy.extremes", "accuracy.measure",
+    "scenes.run", "accuracy.measure",
     "dimensions.methods", "scenes.json_schema",
-    "accuracy.Benchmark", "accuracy.Case", "accuracy.Method", "accuracy.Result", "accuracy.cases",
+    "accuracy.Benchmark", "accuracy.Method",
     "scenes.Scene",
 }  # fmt: skip
 

@@ -34,10 +34,7 @@ LIMIT = 240.0  # seconds after which a process counts as hanging
 # classes and constants
 LEFT_OUT = {
     "accuracy.Benchmark",
-    "accuracy.Case",
     "accuracy.Method",
-    "accuracy.Result",
-    "accuracy.cases",
     "scenes.Scene",
     "surfaces.SelfAffine",
 }
@@ -68,11 +65,6 @@ def run(folder):
     return tree
 
 
-def extremes():
-    """Return the results of one case, which is examined in a process of its own."""
-    return fc.accuracy.extremes("one cell")
-
-
 CALLS = {
     "save": lambda folder: xr.open_dataset(fc.save(rough(), folder / "saved.nc")).load(),
     "open": opened,
@@ -95,9 +87,7 @@ CALLS = {
     "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
     "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
     "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
-    "accuracy.examine": lambda _: str([r.name for r in fc.accuracy.examine(fc.accuracy.cases["one cell"])]),
     "accuracy.measure": lambda _: str(sorted(measured().children)),
-    "accuracy.extremes": lambda _: extremes(),
     "plotting.draw": lambda folder: str(
         sorted(path.name for path in fc.plotting.draw(study()[0], folder / "figures"))
     ),

@@ -1,11 +1,8 @@
-"""Accuracy: error against run time of every method, and the behaviour in extreme cases.
+"""Accuracy: error against run time of every method.
 
 measure     true error against run time and memory of the methods of each subpackage
 estimators  bias, error over the Cramer-Rao bound and coverage of the estimators of the Hurst exponent
-cases       the catalogue of extreme surfaces, masks and calls, with what is expected of each
-examine     all functions run on one case and compared with what is expected
-extremes    the same for all cases, each in a child process with a time limit
-summary     any of these results as a text table
+summary     either of these results as a text table
 """
 
 import lazy_loader

@@ -15,7 +15,7 @@ from fractalcontact.base.validation import NONE, Problems
 Row = tuple[str, ...]
 WHERE = "fractalcontact.accuracy.summary"
 _SETTING, _METHOD, _CASE = ("method", "setting"), ("method",), ("method", "family", "hurst", "size")
-# dims of the variables that are read, of `measure`, `estimators` and `extremes`
+# dims of the variables that are read, of `measure` and `estimators`
 MEASURED = {
     **dict.fromkeys(("parameter", "error", "run_time", "first_run_time", "memory"), _SETTING),
     **dict.fromkeys(("benchmark", "parameter_name", "error_meaning", "truth", "method"), _METHOD),
@@ -27,17 +27,11 @@ ESTIMATED = {
     "member_count": ("size",),
     **{name: (name,) for name in _CASE},
 }
-EXAMINED = dict.fromkeys(
-    ("case", "quantity", "expectation", "outcome", "error", "run_time", "passed"), ("result",)
-)
-WORDS = (
-    *("benchmark", "parameter_name", "error_meaning", "truth", "method", "family"),
-    *("case", "quantity", "expectation", "outcome"),
-)
+WORDS = ("benchmark", "parameter_name", "error_meaning", "truth", "method", "family")
 
 
 def summary(results: Any) -> str:
-    """Return a result of `measure`, `estimators` or `extremes` as a text table.
+    """Return a result of `measure` or `estimators` as a text table.
 
     Parameters
     ----------
@@ -67,10 +61,7 @@ def summary(results: Any) -> str:
     if isinstance(results, xr.Dataset) and "error_ratio" in results:
         _check("results", results, ESTIMATED)
         return _estimators_summary(results)
-    if isinstance(results, xr.Dataset) and "expectation" in results:
-        _check("results", results, EXAMINED)
-        return _extremes_summary(results)
-    expected = "a result of measure, estimators or extremes"
+    expected = "a result of measure or estimators"
     raise InvalidInput(WHERE, [f"results: expected {expected}, got {type(results).__name__}"])
 
 
@@ -138,16 +129,3 @@ def _estimators_summary(bench: xr.Dataset) -> str:
 def _estimator_cell(bias: float, ratio: float, coverage: float) -> str:
     ratio_text = f"{ratio:.2f}" if ratio < 9.995 else f"{ratio:.0f}"
     return f"{bias:+.3f} {ratio_text} {f'{coverage:.3f}' if np.isfinite(coverage) else 'none'}"
-
-
-def _extremes_summary(results: xr.Dataset) -> str:
-    rows: list[Row] = [("case", "function and quantity", "expected", "got", "error", "seconds", "")]
-    for case, quantity, expected, outcome, error, seconds, passed in zip(
-        *(results[name].values for name in EXAMINED), strict=True
-    ):
-        error_text = "" if np.isnan(error) else f"{error:.1e}"
-        mark = "" if passed else "FAILED"
-        rows.append((case, quantity, expected, outcome[:60], error_text, f"{seconds:.3f}", mark))
-    failed = int((~results["passed"].values.astype(bool)).sum())
-    count = len(np.unique(results["case"].values))
-    return f"{table(rows)}\n\n{results.sizes['result']} results of {count} cases, {failed} failed"

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from extreme_cases import NOT_DEFINED, REFUSED, Case, Expectation
 from scipy import ndimage
 
 from fractalcontact import contact, dimensions, domains, joints, surfaces
-from fractalcontact.accuracy._cases import NOT_DEFINED, REFUSED, Case, Expectation
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -31,27 +31,10 @@ LONGEST = 120.0  # seconds: a longer call fails
 class Result:
     """What one function gave for one case.
 
-    Attributes
-    ----------
-    name : str
-        `subpackage.function.variable`, or `subpackage.function` for a refusal and for the call itself.
-    expected : float, pair, str or None
-        None where only a finite number is expected.
-    got : float or str
-        The first value, or the text of the refusal.
-    passed : bool
-    run_time : float
-        Seconds of the call.
-    error : float
-        Distance from what is expected, over its size (or that of the case, for zero); NaN where only a finite
-        number is expected.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> results = fc.accuracy.examine(fc.accuracy.cases["one cell"])
-    >>> print([f"{r.name}: {r.got:g}" for r in results if r.expected == 1024.0])
-    ['domains.lacunarity.lacunarity: 1024']
+    `name` is `subpackage.function.variable`, or `subpackage.function` for a refusal and for the call itself;
+    `got` is the first value, or the text of the refusal; `expected` is None where only a finite number is
+    expected; `run_time` in seconds; `error` is the distance from what is expected over its size (or that of
+    the case, for zero), NaN where only a finite number is expected.
     """
 
     name: str
@@ -65,24 +48,9 @@ class Result:
 def examine(case: Case) -> list[Result]:
     """Run every function that takes the input of a case, and compare the results with what is expected.
 
-    Parameters
-    ----------
-    case : Case
-        From `cases`, or one of your own.
-
-    Returns
-    -------
-    list of Result
-        One for each expected quantity, and one for each function. A function passes if it returns finite
-        numbers, or NaN with a reason, or refuses the input with an `InvalidInput`. Any other exception, and
-        an infinite or unexplained value, fails.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> results = fc.accuracy.examine(fc.accuracy.cases["empty mask"])
-    >>> print(all(result.passed for result in results))
-    True
+    There is one result for each expected quantity, and one for each function. A function passes if it
+    returns finite numbers, or NaN with a reason, or refuses the input with an `InvalidInput`.
+    Any other exception, and an infinite or unexplained value, fails.
     """
     if case.input_type == "call":
         functions = dict.fromkeys(_function_of(quantity) for quantity in case.expected)

@@ -14,10 +14,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Literal
 
+import extreme_inputs as inputs
 import numpy as np
-
-from fractalcontact.accuracy import _extreme_inputs as inputs
-from fractalcontact.accuracy._extreme_inputs import brownian, uniform_mask, white_noise
+from extreme_inputs import brownian, uniform_mask, white_noise
 
 NOT_DEFINED: Literal["not defined"] = "not defined"
 REFUSED: Literal["refused"] = "refused"
@@ -28,28 +27,9 @@ Expectation = float | tuple[float, float] | str
 class Case:
     """One extreme input, and what is expected of the results.
 
-    Attributes
-    ----------
-    name, description : str
-        Of the input, and what is extreme about it.
-    input_type : {"surface", "mask", "call"}
-    make : callable
-        Returns the input: `height` in metres or a boolean mask, dims (y, x); of a call, the result.
-    expected : mapping
-        `subpackage.function.variable` to a number, a pair (lowest, highest), "not defined" or "refused".
-    modulus : float
-        Contact modulus with which a surface is pressed, Pa.
-    large : bool
-        Takes minutes and gigabytes: left out unless asked for.
-    time_limit : float
-        Seconds after which `extremes` ends the process that examines the case.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> case = fc.accuracy.cases["one cell"]
-    >>> print(case.input_type, int(case.make().sum()), case.expected["domains.lacunarity.lacunarity"])
-    mask 1 1024.0
+    `input_type` is "surface", "mask" or "call"; `make` returns heights in metres or a boolean mask over
+    (y, x), or the result of the call; `modulus` (Pa) is that with which a surface is pressed. A
+    `large` case takes minutes and gigabytes.
     """
 
     name: str
@@ -59,7 +39,6 @@ class Case:
     expected: Mapping[str, Expectation] = field(default_factory=dict)
     modulus: float = 1e9
     large: bool = False
-    time_limit: float = 240.0
 
 
 def _surface(
@@ -325,7 +304,6 @@ _CALLS = (
         inputs.huge,
         {FRACTION: (0.1, 0.35), "contact.press.converged": 1.0, "surfaces.spectral.rms_slope": (0.09, 0.11)},
         large=True,
-        time_limit=1800.0,
     ),
 )
 

@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 import xarray as xr
+from extreme_cases import Case, cases
+from extreme_examination import examine
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fractalcontact as fc
-from fractalcontact.accuracy import Case
 
-CASES = {name: case for name, case in fc.accuracy.cases.items() if not case.large}
+CASES = {name: case for name, case in cases.items() if not case.large}
 SURFACES = [case for case in CASES.values() if case.input_type == "surface"]
 MASKS = [case for case in CASES.values() if case.input_type == "mask"]
 
 
 def failed(case):
-    return [result for result in fc.accuracy.examine(case) if not result.passed]
+    return [result for result in examine(case) if not result.passed]
 
 
 @pytest.mark.parametrize("name", list(CASES))
@@ -39,9 +40,9 @@ def test_wrong_expectations_fail():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, case in fc.accuracy.cases.items() if case.large])
+@pytest.mark.parametrize("name", [name for name, case in cases.items() if case.large])
 def test_large_case_gives_the_expected_values(name):
-    wrong = failed(fc.accuracy.cases[name])
+    wrong = failed(cases[name])
     assert not wrong, "\n".join(map(str, wrong))
 
 
@@ -50,7 +51,7 @@ def test_error_is_the_distance_from_the_expected_value():
         return xr.Dataset({"area": 3.0, "wide": 5.0, "gone": np.nan}, attrs={"reason": "given"})
 
     expected = {"part.call.area": 2.0, "part.call.wide": (1.0, 4.0), "part.call.gone": "not defined"}
-    results = {r.name: r for r in fc.accuracy.examine(Case("by hand", "", "call", make, expected))}
+    results = {r.name: r for r in examine(Case("by hand", "", "call", make, expected))}
     assert results["part.call.area"].error == 0.5
     assert results["part.call.wide"].error == 1.0
     assert [result.passed for result in results.values()] == [False, False, True, True]
