@@ -87,7 +87,7 @@ KERNELS = {
     "mean cover": ("domains", 1),
     "distances": ("domains", 2),
     "boundary": ("domains", 2),
-    "gliding boxes": ("domains", 1),
+    "gliding boxes": ("domains", 3),
     "islands": ("domains", 3),
     "quarters": ("domains", 2),
 }
