@@ -69,8 +69,8 @@ class StageType:
     takes_surface : bool
         It describes the lower face, not the crack.
     whole_path : bool
-        It follows the contact set along the load path, and reads the maps of all steps at once. A scene can
-        ask that of other stages too, see `Stage.whole_path`.
+        It follows the contact set along the load path, or measures all states over one window of lengths, and
+        reads the maps of all steps at once. A scene can ask that of other stages too, see `Stage.whole_path`.
     """
 
     name: str
@@ -191,8 +191,9 @@ _ROWS = (
     _joint("decorrelation_length", _rows.decorrelation_length),
     _joint("transmissivity", _rows.transmissivity, ("joints/closure",), reads="gap"),
     _joint("uplift", _rows.uplift, ("joints/closure",), reads="gap"),
-    _domain("signature", _rows.signature, whole_path=True),  # one window for all states
-    _domain("box_dimension", _rows.box_dimension),
+    # one window of lengths for all states
+    _domain("signature", _rows.signature, whole_path=True),
+    _domain("box_dimension", _rows.box_dimension, whole_path=True),
     _domain("box_counts"),
     _domain("minkowski_dimension", _rows.minkowski_dimension),
     _domain("correlation_dimension", _rows.correlation_dimension),
@@ -202,7 +203,7 @@ _ROWS = (
     _domain("islands", _rows.islands, keeps=(ISLAND_MAP,), whole_path=True),
     _domain("percolation", _rows.percolation),
     _domain("hausdorff_content"),
-    _domain("describe", _rows.describe),
+    _domain("describe", _rows.describe, whole_path=True),
     _domain("evolution", _rows.evolution, whole_path=True),
     _domain("lineage", whole_path=True),
 )

@@ -50,10 +50,12 @@ def test_each_member_equals_a_study_of_its_surface(ensemble):
         member = tree["joints/closure"].isel(member=number)
         for name in ("closure", "contact_fraction", "normal_force"):
             np.testing.assert_array_equal(member[name], closed[name])
-        dimension = tree["domains/box_dimension/box_dimension"][number]
-        for place in range(2):  # each shear is a part of the study, with a window of its own
-            boxes = fc.domains.box_dimension(closed["state"].isel(shear=[place]))
-            np.testing.assert_array_equal(dimension[[place]], boxes["box_dimension"])
+        boxes = tree["domains/box_dimension"].isel(member=number)
+        expected = fc.domains.box_dimension(closed["state"])
+        for name in ("box_dimension", "window_low", "window_high"):
+            np.testing.assert_array_equal(boxes[name], expected[name])
+        measured = boxes["box_dimension"].notnull()  # all shears and loads, parts of the study, in one window
+        assert len(np.unique(boxes["window_high"].values[measured.values])) == 1
         hurst = fc.dimensions.estimate(face)["hurst"]
         np.testing.assert_array_equal(tree["dimensions/hurst"][number], hurst)
 
@@ -86,7 +88,7 @@ contact_modulus = 1e9
 nominal_pressure = { first = 1e3, last = 1e7, count = 60 }
 [want]
 contact = ["press"]
-domains = ["box_dimension"]
+domains = ["box_counts"]
 """
 
 
@@ -118,7 +120,7 @@ def test_long_path_is_solved_in_sections_and_keeps_no_map(tmp_path, monkeypatch)
     np.testing.assert_array_equal(parts["contact/step"], np.arange(60))
     for name in ("closure", "contact_fraction"):
         np.testing.assert_allclose(parts["contact"][name], undivided["contact"][name], rtol=1e-3)
-    assert parts["domains/box_dimension/box_dimension"].dims == ("step",)
+    assert parts["domains/box_counts/box_count"].dims == ("step", "box_size")
     np.testing.assert_array_equal(parts["contact/nominal_pressure"], undivided["contact/nominal_pressure"])
 
 
