@@ -337,4 +337,10 @@ def _periodic_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Dir
         estimates.append((estimate.without_interval(reason) if reason else estimate).limited())
     if modes.weights.sum() < sectors.LEAST or not np.isfinite(every.hurst):
         return _Directional(estimates, None, "too few waves in the band to compare directions")
-    return _Directional.of(estimates, sectors.fit_spectral_anisotropy(modes, every.hurst))
+    anisotropy = sectors.fit_spectral_anisotropy(modes, every.hurst)
+    if np.linalg.matrix_rank(modes.wavevectors) < 2:  # ridges across the only direction of the waves
+        y, x = modes.wavevectors[0]
+        across = float(np.degrees(np.arctan2(x, -y)) % 180.0)
+        ridges = {"isotropy_p_value": 0.0, "anisotropy_p_value": 0.0, "anisotropy_azimuth": across}
+        anisotropy = replace(anisotropy, **ridges, reason=RIDGES)
+    return _Directional.of(estimates, anisotropy)

@@ -283,7 +283,7 @@ def _p_value(score: Array, covariance: Array, fitted: int) -> float:
     from scipy.special import chdtrc
 
     if fitted:
-        projection = covariance[fitted:, :fitted] @ np.linalg.inv(covariance[:fitted, :fitted])
+        projection = covariance[fitted:, :fitted] @ np.linalg.pinv(covariance[:fitted, :fitted])
         score = score[fitted:] - projection @ score[:fitted]
         covariance = covariance[fitted:, fitted:] - projection @ covariance[:fitted, fitted:]
     return float(chdtrc(score.size, score @ np.linalg.pinv(covariance) @ score))
