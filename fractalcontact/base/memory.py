@@ -30,6 +30,8 @@ SMALL_FILE = 1 << 28  # bytes that any file may unpack to
 LIBRARIES = {"-v": 6.1e8, "-d": 2.3e8}
 OPENBLAS_THREAD = 8.4e7
 PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
+# arguments of several values, each of which gives a map
+PATHS = ("closure", "normal_force", "nominal_pressure", "tangential_force", "shear", "direction")
 
 
 class Free(NamedTuple):
@@ -203,10 +205,25 @@ def plane_in(arguments: Mapping[str, Any]) -> Plane | None:
 
 
 def bytes_on(estimate: Estimate, plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of an estimate on a grid; planes are worked on one by one, and 8 bytes a cell kept."""
+    """Return the bytes of an estimate on a grid, and of the maps that the call keeps.
+
+    Planes are worked on one by one, and 8 bytes a cell kept.
+    """
+    maps = 2.0 * kept_bytes(arguments) * plane.cells  # those of the steps, and all of them stacked
     if callable(estimate):
-        return float(estimate(plane, arguments))
-    return estimate * math.prod(plane.shape) + 8.0 * (plane.planes - 1) * math.prod(plane.shape)
+        return float(estimate(plane, arguments)) + maps
+    return estimate * math.prod(plane.shape) + 8.0 * (plane.planes - 1) * math.prod(plane.shape) + maps
+
+
+def kept_bytes(arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of a cell of the maps in `keep`, one for each load, shear and direction."""
+    import numpy as np  # which the command line does without
+
+    names = arguments.get("keep")
+    if names is None:
+        return 0.0
+    maps = math.prod(int(np.size(arguments[name])) for name in PATHS if name in arguments)
+    return maps * sum(map_bytes(str(name)) for name in np.atleast_1d(names))
 
 
 def map_bytes(name: str) -> float:

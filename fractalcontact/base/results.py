@@ -29,7 +29,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, LoadedWarning, TooLittleMemory
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, LoadedWarning, TooLittleMemory
 from fractalcontact.base.memory import (
     NEGLIGIBLE,
     Estimate,
@@ -43,7 +43,7 @@ from fractalcontact.base.missing_numbers import give_reasons
 from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp, with_load_indexes
 from fractalcontact.base.references import NO_REFERENCES
-from fractalcontact.base.schema import label
+from fractalcontact.base.schema import STOP_REASONS, label
 from fractalcontact.base.surface_argument import with_surface
 from fractalcontact.base.validation import Problems, did_you_mean, flags_of
 
@@ -51,6 +51,8 @@ MASKS = ("mask", "masks", "valid")
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
+PLACES_SHOWN = 5  # in a warning
+WORK = {"transforms": "pairs of transforms", "iterations": "iterations"}
 ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 
 
@@ -142,6 +144,7 @@ def public_result(
                 if not in_blocks:
                     announce_loading(name, bound.arguments)
                 result = function(*bound.args, **bound.kwargs)
+            _warn_unconverged(name, result)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {} if completeness is None else {"completeness": completeness}
@@ -170,6 +173,28 @@ def public_result(
         return public
 
     return decorate
+
+
+def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
+    """Warn of the values that `converged` marks: where they are, why, and how far they came."""
+    if "converged" not in result or result["converged"].values.all():
+        return
+    converged = result["converged"]
+    failed, shown = np.argwhere(~converged.values), []
+    for index in failed[:PLACES_SHOWN]:
+        at = result.isel(dict(zip(converged.dims, index.tolist(), strict=True)))
+        places = [f"{dim} {at[dim].values[()] if dim in at.coords else i}"
+                  for dim, i in zip(converged.dims, index, strict=True)]  # fmt: skip
+        reason = converged.attrs.get("reason", "")
+        if "stop_reason" in at:
+            reason = list(STOP_REASONS)[int(at["stop_reason"])]
+        counts = [(unit, at[unit]) for unit in ("transforms", "iterations") if unit in at]
+        work = [f"after {int(count)} {WORK[unit]}" for unit, count in counts[:1]]
+        error = [f"(residual {float(at['residual']):.2g})"] if "residual" in at else []
+        place = f"{', '.join(places)}: " if places else ""
+        shown.append(place + " ".join(filter(None, [reason, *work, *error])))
+    more = f"; and {len(failed) - PLACES_SHOWN} more" if len(failed) > PLACES_SHOWN else ""
+    warnings.warn(f"{name}: not converged: {'; '.join(shown)}{more}", ConvergenceWarning, stacklevel=3)
 
 
 def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:

@@ -39,7 +39,7 @@ def flat_stiffness(
     contact_modulus: float,
     boundary: str = "free",
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     loading: str = "rigid",
 ) -> float:
     """Stiffness of a block with two perfectly mating surfaces: force per closure.

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.grid import UNIFORM, Grid
+from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
-from fractalcontact.contact._scaled_problem import length_unit, make_units, scaled_body
+from fractalcontact.contact._scaled_problem import make_units
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -32,7 +31,6 @@ INFLUENCE_SOURCES = {
     "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
 }
 YASTREBOV = "Yastrebov, Anciaux and Molinari, Tribol. Int. 114:161 (2017) (perimeter correction)"
-SMALLEST_RADIUS = 1e-9  # of the spacing: a smaller plate is a point force, which has no stiffness
 # largest force, closure or hardness over its scale (its inverse is the smallest): products of three such
 # numbers must stay below 1e308
 LARGEST_RATIO = 2.0**300
@@ -54,8 +52,8 @@ class ContactOptions:
         never the reverse.
     influence : {None, "disc", "square", "spectral"}
         Influence coefficients, see `press`. None: "spectral" for periodic bodies, "disc" for free ones.
-    disc_radius : {"second_order", "inscribed", "equal_area"} or float
-        Radius of the circular plate of influence "disc", by name or in m.
+    disc_radius : {"second_order", "inscribed", "equal_area"}
+        Radius of the circular plate of influence "disc".
     hardness : float, optional
         Largest pressure that the surface bears, in Pa. None: elastic.
     tolerance : float
@@ -66,7 +64,7 @@ class ContactOptions:
 
     boundary: str | None = None
     influence: str | None = None
-    disc_radius: str | float = "second_order"
+    disc_radius: str = "second_order"
     hardness: float | None = None
     tolerance: float = 1e-8
     method: str = "fast"
@@ -76,19 +74,15 @@ class ContactOptions:
         with Problems("fractalcontact.contact.ContactOptions") as problems:
             problems.choice("boundary", self.boundary, BOUNDARIES, optional=True)
             problems.choice("influence", self.influence, INFLUENCES, optional=True)
-            if isinstance(self.disc_radius, str):
-                problems.choice("disc_radius", self.disc_radius, _influence.DISC_RADII)
-            else:
-                problems.number("disc_radius", self.disc_radius, above=0)
+            problems.choice("disc_radius", self.disc_radius, _influence.DISC_RADII)
             problems.number("hardness", self.hardness, above=0, optional=True)
             problems.number("tolerance", self.tolerance, above=0, below=1)
             if problems.choice("method", self.method, METHODS) and self.method == "elimination":
                 expected = "None with method='elimination'"
                 problems.require(self.hardness is None, "hardness", expected, self.hardness)
-        for name in ("disc_radius", "hardness", "tolerance"):
+        for name in ("hardness", "tolerance"):
             value = getattr(self, name)
-            if value is not None and not isinstance(value, str):
-                object.__setattr__(self, name, float(value))
+            object.__setattr__(self, name, None if value is None else float(value))
 
     def references(self, grid: Grid) -> str:
         """Return the sources of the methods used on this grid."""
@@ -125,31 +119,14 @@ class ContactOptions:
             expected = "'disc' or 'square' for free bodies"
             problems.require(influence in ("disc", "square"), "influence", expected, influence)
         if influence == "disc":
-            self._check_radius((grid.spacing[0], grid.spacing[1]), problems)
+            ratio = max(grid.spacing) / min(grid.spacing)
+            fits = self.disc_radius == "inscribed" or ratio <= _influence.GREATEST_RATIO * (1 + UNIFORM)
+            expected = "'square', or disc_radius='inscribed', for spacings in a ratio above 2"
+            problems.require(fits, "influence", expected, f"'disc' with a ratio of {ratio:.4g}")
         else:
             expected = "'second_order', the default: other values are only valid with influence='disc'"
             problems.require(self.disc_radius == "second_order", "disc_radius", expected, self.disc_radius)
         return len(problems.messages) == before
-
-    def _check_radius(self, spacing: tuple[float, float], problems: Problems) -> None:
-        """Check that the plates exist on this grid and leave the elastic operator positive."""
-        ratio = max(spacing) / min(spacing)
-        if self.disc_radius == "second_order" and ratio > _influence.GREATEST_RATIO * (1 + UNIFORM):
-            expected = "spacings in a ratio of at most 2 for the second-order disc (use influence='square')"
-            problems.add("influence", expected, f"'disc' with a ratio of {ratio:.4g}")
-            return
-        if not isinstance(self.disc_radius, str) and not self.disc_radius >= SMALLEST_RADIUS * min(spacing):
-            expected = f"a length of at least {SMALLEST_RADIUS:g} spacings"
-            problems.add("disc_radius", expected, f"{self.disc_radius:g} m")
-            return
-        plate = scaled_body((1, 1), spacing, False, "disc", self.disc_radius)
-        least = _least_symbol(plate.radius / float(np.sqrt(plate.cell_area)), ratio)
-        problems.require(
-            least > 0,
-            "disc_radius",
-            "a smaller radius (plates this large make the elastic operator indefinite) or influence='square'",
-            f"{plate.radius * length_unit(spacing):.4g} m",
-        )
 
     def check_load(self, load: LoadPath, nominal_area: float, problems: Problems) -> bool:
         """Check that the hardness bears the load on an area (m2)."""
@@ -208,6 +185,28 @@ def is_periodic(boundary: str | None, wraps: bool) -> bool:
     return wraps if boundary is None else boundary == "periodic"
 
 
+def check_problem(
+    problems: Problems, surface: Any, contact_modulus: Any, *, leading: bool = False, **keywords: Any
+) -> LoadPath | None:
+    """Check surface, modulus, load and options of a contact problem; return the load unless it is wrong."""
+    loads = {name: keywords.pop(name) for name in CONTROLS}
+    surface_is_valid = problems.surface("surface", surface, leading=leading)
+    problems.number("contact_modulus", contact_modulus, above=0)
+    options = problems.construct(ContactOptions, **keywords)
+    load = problems.construct(LoadPath.from_keywords, **loads)
+    if not surface_is_valid or options is None:
+        return load
+    grid = read_grid(surface)
+    options.check_grid(grid, problems)
+    if load is None or problems.messages:
+        return load
+    ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
+    for height_range in {float(ranges.min()), float(ranges.max())}:
+        check_scale(problems, grid, height_range, float(contact_modulus), options, load)
+    options.check_load(load, grid.nominal_area, problems)
+    return load
+
+
 def check_scale(
     problems: Problems,
     grid: Grid,
@@ -247,8 +246,3 @@ def check_scale(
         in_range = value == 0 or unit / LARGEST_RATIO < value < unit * LARGEST_RATIO
         problems.require(in_range, load.control, expected, f"{given:g} {unit_name}")
     return len(problems.messages) == before
-
-
-@lru_cache(maxsize=64)
-def _least_symbol(radius: float, ratio: float) -> float:
-    return _influence.least_symbol(radius, ratio)

@@ -5,35 +5,30 @@ By superposition of normal solutions (`_superposition`), or by Coulomb's law at 
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_direction, read_direction
-from fractalcontact.base.errors import AnisotropyWarning, ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale, is_periodic
+from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
 from fractalcontact.contact.solver import (
-    ACCEPTABLE_ERROR,
     METHODS,
     Sheared,
     ShearPath,
     check_sliding,
     solve_shear,
+    warn_lay,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-# bytes of a node at the peak, of a periodic and of a free body, with both directions
-PERIODIC_BYTES, FREE_BYTES = 176.0, 320.0
 GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
 
 
@@ -48,40 +43,21 @@ def _check(
     direction: Any,
     method: Any,
     keep: Any,
-    closure: Any,
-    normal_force: Any,
-    nominal_pressure: Any,
     **keywords: Any,
 ) -> None:
-    """Collect what is wrong with a call of `partial_slip`."""
-    surface_is_valid = problems.surface("surface", surface)
-    problems.number("contact_modulus", contact_modulus, above=0)
     problems.number("poisson", poisson, above=-1, at_most=0.5)
     problems.number("friction_coefficient", friction_coefficient, above=0, at_most=GREATEST_FRICTION)
     problems.numbers("tangential_force", tangential_force)
     check_direction(problems, direction)
     problems.choice("method", method, METHODS, optional=True)
     problems.choices("keep", keep, SLIP_MAPS)
-    options = problems.construct(ContactOptions, **keywords)
-    load = problems.construct(
-        LoadPath.from_keywords,
-        closure=closure,
-        normal_force=normal_force,
-        nominal_pressure=nominal_pressure,
-    )
-    if load is not None:
-        expected = "one number: the normal load is constant while the tangential force changes"
-        problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
-    if not surface_is_valid or options is None:
+    load = check_problem(problems, surface, contact_modulus, **keywords)
+    if load is None:
         return
-    grid = read_grid(surface)
-    options.check_grid(grid, problems)
-    if load is None or problems.messages:
-        return
-    height_range = float(surface.values.max()) - float(surface.values.min())
-    check_scale(problems, grid, height_range, float(contact_modulus), options, load)
-    if load.control != "closure":
-        normal = float(load.solver_values(grid.nominal_area)[1][0])
+    expected = "one number: the normal load is constant while the tangential force changes"
+    problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
+    if not problems.messages and load.control != "closure":  # under a closure the force is not known yet
+        normal = float(load.solver_values(read_grid(surface).nominal_area)[1][0])
         path = _shear_path(tangential_force, direction, friction_coefficient, poisson, method)
         check_sliding(problems, path, normal)
 
@@ -91,19 +67,11 @@ def _shear_path(forces: Any, direction: Any, friction: Any, poisson: Any, method
     return ShearPath(tuple(float_array(forces).tolist()), (x, y), float(friction), float(poisson), method)
 
 
-def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of the normal and the tangential solution, and of the maps."""
-    periodic = is_periodic(arguments.get("boundary"), plane.periodic)
-    solver = PERIODIC_BYTES if periodic else FREE_BYTES
-    maps = sum(map(map_bytes, word_tuple(arguments.get("keep"))))
-    return plane.cells * (solver + 2.0 * maps * np.size(arguments.get("tangential_force", 0.0)))
-
-
 @public_result(
     title="Partial slip of a rough contact",
     references="Ciavarella (1998), J. Appl. Mech. 65:998; Jaeger (1998), J. Appl. Mech. 65:1019",
     check=_check,
-    memory=_memory,
+    memory=320.0,  # of a free body with both directions; a periodic one takes 176
 )
 def partial_slip(
     surface: xr.DataArray,
@@ -119,7 +87,7 @@ def partial_slip(
     method: str | None = None,
     boundary: str | None = None,
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     tolerance: float = 1e-8,
     keep: Sequence[str] = ("slip_state",),
     progress: bool = False,
@@ -206,16 +174,9 @@ def partial_slip(
     )
     grid = read_grid(surface)
     path = _shear_path(tangential_force, direction, friction_coefficient, poisson, method)
-    sheared = solve_shear(
-        np.asarray(surface.values, dtype=np.float64),
-        grid,
-        float(contact_modulus),
-        options,
-        load,
-        path,
-        keep=word_tuple(keep),
-        progress=progress,
-    )
+    heights = np.asarray(surface.values, dtype=np.float64)
+    problem = (grid, float(contact_modulus), options, load)
+    sheared = solve_shear(heights, *problem, path, keep=word_tuple(keep), progress=progress)
     result = _dataset(surface, grid, sheared).assign(
         contact_modulus=float(contact_modulus),
         poisson=path.poisson,
@@ -228,7 +189,10 @@ def partial_slip(
     )
     stiffness = result["tangential_stiffness"]
     result["tangential_stiffness"] = stiffness.where(np.isfinite(stiffness))
-    _warn(result, sheared.method)
+    if sheared.method == "superposition":
+        warn_lay(
+            "fractalcontact.contact.partial_slip: the contact", sheared.superposition_error, stacklevel=4
+        )
     result.attrs = {
         "method": sheared.method,
         "boundary": "periodic" if options.is_periodic(grid) else "free",
@@ -255,23 +219,3 @@ def _dataset(surface: xr.DataArray, grid: Grid, sheared: Sheared) -> xr.Dataset:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}
         variables |= {name: (("step", "y", "x"), planes) for name, planes in sheared.maps.items()}
     return xr.Dataset(variables, coords)
-
-
-def _warn(result: xr.Dataset, method: str) -> None:
-    """Warn of steps that rest on a normal solution that did not converge, and of a lay."""
-    failed = np.flatnonzero(~result["converged"].values)
-    if failed.size:
-        worst = float(np.fmax.reduce(result["residual"].values))
-        message = (
-            f"fractalcontact.contact.partial_slip: {failed.size} steps not converged, the first of them"
-            f" step {failed[0]} (residual up to {worst:.2g})"
-        )
-        warnings.warn(message, ConvergenceWarning, stacklevel=4)
-    error = float(result["superposition_error"])
-    if method == "superposition" and abs(error) > ACCEPTABLE_ERROR:
-        warnings.warn(
-            "fractalcontact.contact.partial_slip: the contact has a lay, and by superposition displacement "
-            f"and dissipated energy are off by about {error:+.0%}: use method='full'",
-            AnisotropyWarning,
-            stacklevel=4,
-        )

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.errors import ConvergenceWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.memory import Plane, map_bytes
+from fractalcontact.base.memory import Plane
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
 from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale, is_periodic
-from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve
+from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
+from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve, warn_steep
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -28,67 +26,33 @@ UNDETERMINED = (
     "maximum_pressure", "area_share", "load_share",
 )  # fmt: skip
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
-BEYOND_SMALL_STRAINS = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
 SMALL_PLANE = 512 * 512  # nodes up to which surfaces are pressed side by side, each on one thread
 SIDE_BY_SIDE = 8  # surfaces for each thread between two steps of the progress bar
 INCLUDE = ("stiffness", "pressure_distribution")
 NO_STIFFNESS = (
     "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
 )
-# bytes of a node: solver of a periodic and of a free body, steps before, indentation, gap with last solution
-PERIODIC_BYTES, FREE_BYTES, PATH_BYTES, YIELD_BYTES, RESULT_BYTES = 48.0, 156.0, 32.0, 48.0, 32.0
-PUNCH_BYTES = 72.0  # of a node: the solution that gives the stiffness, beside that of the step
+# bytes of a node: solver of a periodic and of a free body with the steps before, indentation, and the
+# solution that gives the stiffness
+PERIODIC_BYTES, FREE_BYTES, YIELD_BYTES, PUNCH_BYTES = 80.0, 188.0, 48.0, 72.0
 
 
 def _check(
-    problems: Problems,
-    *,
-    surface: Any,
-    contact_modulus: Any,
-    keep: Any,
-    include: Any,
-    closure: Any,
-    normal_force: Any,
-    nominal_pressure: Any,
-    **keywords: Any,
+    problems: Problems, *, surface: Any, contact_modulus: Any, keep: Any, include: Any, **keywords: Any
 ) -> None:
-    """Collect what is wrong with a call of `press`."""
-    surface_is_valid = problems.surface("surface", surface, leading=True)
-    problems.number("contact_modulus", contact_modulus, above=0)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
     problems.choices("include", include, INCLUDE)
-    options = problems.construct(ContactOptions, **keywords)
-    load = problems.construct(
-        LoadPath.from_keywords,
-        closure=closure,
-        normal_force=normal_force,
-        nominal_pressure=nominal_pressure,
-    )
-    if not surface_is_valid or options is None:
-        return
-    grid = read_grid(surface)
-    options.check_grid(grid, problems)
-    if load is None or problems.messages:
-        return
-    ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
-    for height_range in {float(ranges.min()), float(ranges.max())}:
-        check_scale(problems, grid, height_range, float(contact_modulus), options, load)
-    options.check_load(load, grid.nominal_area, problems)
+    check_problem(problems, surface, contact_modulus, leading=True, **keywords)
 
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of the solver on the whole plane beside those of the maps."""
-    loads = [arguments[name] for name in CONTROLS if arguments.get(name) is not None]
-    steps = max(1, int(np.size(loads[0]))) if loads else 1
-    solver = PERIODIC_BYTES if is_periodic(arguments.get("boundary"), plane.periodic) else FREE_BYTES
-    solver += (PATH_BYTES if steps > 1 else 0.0) + (YIELD_BYTES if arguments.get("hardness") else 0.0)
-    solver += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("include")) else 0.0
-    maps = steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep", ("state",))))
-    if plane.planes == 1:
-        return plane.cells * max(solver + maps, RESULT_BYTES + 2.0 * maps)
-    at_once = min(plane.planes, thread_count()) * plane.cells / plane.planes
-    return at_once * solver + 2.0 * maps * plane.cells
+    """Return the bytes of the solver on the planes that are pressed at once."""
+    wraps = is_periodic(arguments.get("boundary"), plane.periodic)
+    node = PERIODIC_BYTES if wraps else FREE_BYTES
+    node += YIELD_BYTES if arguments.get("hardness") else 0.0
+    node += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("include")) else 0.0
+    return node * plane.cells / plane.planes * min(plane.planes, thread_count())
 
 
 @public_result(title="Elastic contact of a rough surface", check=_check, memory=_memory)
@@ -101,7 +65,7 @@ def press(
     nominal_pressure: float | Sequence[float] | Array | None = None,
     boundary: str | None = None,
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     hardness: float | None = None,
     tolerance: float = 1e-8,
     method: str = "fast",
@@ -129,8 +93,8 @@ def press(
     influence : {None, "disc", "square", "spectral"}
         Influence coefficients of free bodies: rigid circular plates (the default) or uniform pressure on
         square cells (Love 1929); of periodic bodies: 2/(E* |q|).
-    disc_radius : {"second_order", "inscribed", "equal_area"} or float
-        Radius of the plates, or a length in m. "second_order" makes the error quadratic in the spacing.
+    disc_radius : {"second_order", "inscribed", "equal_area"}
+        Radius of the plates. "second_order" makes the error quadratic in the spacing.
     hardness : float, optional
         Largest pressure (Pa). Where it is reached the surface yields, and the overlap stays as indentation.
     tolerance : float
@@ -194,27 +158,15 @@ def press(
     names, further = word_tuple(keep), word_tuple(include)
 
     def pressed(plane: Array, progress: bool) -> Pressed:
-        return solve(
-            plane,
-            grid,
-            float(contact_modulus),
-            options,
-            load,
-            keep=names,
-            include=further,
-            progress=progress,
-        )
+        problem = (grid, float(contact_modulus), options, load)
+        return solve(plane, *problem, keep=names, include=further, progress=progress)
 
     stack = heights.reshape(-1, *grid.shape)
     planes = _pressed_planes(stack, pressed, progress)
     slopes = [rms_slope(plane, grid) for plane in stack]
     result = _dataset(surface, grid, float(contact_modulus), load, planes, slopes)
     _add_reasons(result)
-    _warn(result)
-    slope = max(slopes)
-    if slope > STEEP:
-        message = f"fractalcontact.contact.press: the surface has an rms slope of {slope:.2g}"
-        warnings.warn(f"{message}; {BEYOND_SMALL_STRAINS}", SmallStrainWarning, stacklevel=3)
+    warn_steep("fractalcontact.contact.press: the surface", max(slopes), stacklevel=4)
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     result.attrs = {
@@ -294,25 +246,3 @@ def _add_reasons(result: xr.Dataset) -> None:
     if "contact_stiffness" in result and bool(result["contact_stiffness"].isnull().any()):
         for name in ("contact_stiffness", "relative_conductance"):
             result[name].attrs["reason"] = NO_STIFFNESS
-
-
-def _warn(result: xr.Dataset) -> None:
-    """Warn of the steps that did not converge."""
-    converged = result.variables["converged"]
-    failed = np.argwhere(~converged.values)
-    if len(failed):
-        words = list(STOP_REASONS)
-        names = ("stop_reason", "residual", "transforms")
-        why, residual, work = (result.variables[name].values for name in names)
-        reasons = ", ".join(
-            f"{_place(converged.dims, at)}: {words[why[tuple(at)]]} after {work[tuple(at)]} pairs of "
-            f"transforms (residual {residual[tuple(at)]:.2g})"
-            for at in failed[:5]
-        )
-        more = f" and {len(failed) - 5} more" if len(failed) > 5 else ""
-        message = f"fractalcontact.contact.press: not converged: {reasons}{more}"
-        warnings.warn(message, ConvergenceWarning, stacklevel=4)
-
-
-def _place(dims: Sequence[Hashable], index: Sequence[int]) -> str:
-    return ", ".join(f"{dim} {i}" for dim, i in zip(dims, index, strict=True))

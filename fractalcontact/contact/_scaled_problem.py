@@ -144,15 +144,14 @@ def scaled_body(
     spacing: tuple[float, float],
     periodic: bool,
     influence: str,
-    disc_radius: str | float,
+    disc_radius: str,
 ) -> Body:
     """Return the scaled body of a grid, from valid options in SI units."""
     unit = length_unit(spacing)
     scaled = (spacing[0] / unit, spacing[1] / unit)
     if influence != "disc":
         return Body(shape, scaled, periodic, influence, 0.0)
-    choice = disc_radius if isinstance(disc_radius, str) else disc_radius / unit
-    return Body(shape, scaled, periodic, influence, _influence.disc_radius(choice, scaled))
+    return Body(shape, scaled, periodic, influence, _influence.disc_radius(disc_radius, scaled))
 
 
 def length_unit(spacing: tuple[float, float]) -> float:

@@ -13,6 +13,7 @@ every step states whether it converged.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -20,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges
 from fractalcontact.base.progress import track
-from fractalcontact.base.schema import CONTACT, OPEN, STOP_REASONS, YIELDED
+from fractalcontact.base.schema import CONTACT, OPEN, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._flat_block import block_stiffness
@@ -41,7 +43,6 @@ from fractalcontact.contact._superposition import (
 )
 
 __all__ = [
-    "ACCEPTABLE_ERROR",
     "CONTROLS",
     "METHODS",
     "ContactOptions",
@@ -55,6 +56,8 @@ __all__ = [
     "rms_slope",
     "solve",
     "solve_shear",
+    "warn_lay",
+    "warn_steep",
 ]
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -137,6 +140,24 @@ def rms_slope(heights: Array, grid: Grid) -> float:
         largest = float(np.abs(steps).max()) or 1.0  # heights of any unit: no square leaves the range
         square += float(np.mean((steps / largest) ** 2)) * (largest / spacing) ** 2
     return float(np.sqrt(square))
+
+
+def warn_steep(what: str, slope: float, *, stacklevel: int) -> None:
+    """Warn of a surface beyond small strains, by its rms slope."""
+    if slope > STEEP:
+        limits = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
+        message = f"{what} has an rms slope of {slope:.2g}; {limits}"
+        warnings.warn(message, SmallStrainWarning, stacklevel=stacklevel)
+
+
+def warn_lay(what: str, error: float, *, stacklevel: int) -> None:
+    """Warn of a contact with a lay that was solved by superposition, by the error of that."""
+    if abs(error) > ACCEPTABLE_ERROR:
+        message = (
+            f"{what} has a lay, and by superposition displacement and dissipated energy are off by about"
+        )
+        message += f" {error:+.0%}: use method='full'"
+        warnings.warn(message, AnisotropyWarning, stacklevel=stacklevel)
 
 
 def _state(step: Step) -> Array:

@@ -341,6 +341,6 @@ def _periodic_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Dir
     if np.linalg.matrix_rank(modes.wavevectors) < 2:  # ridges across the only direction of the waves
         y, x = modes.wavevectors[0]
         across = float(np.degrees(np.arctan2(x, -y)) % 180.0)
-        ridges = {"isotropy_p_value": 0.0, "anisotropy_p_value": 0.0, "anisotropy_azimuth": across}
-        anisotropy = replace(anisotropy, **ridges, reason=RIDGES)
+        anisotropy = replace(anisotropy, isotropy_p_value=0.0, anisotropy_p_value=0.0, reason=RIDGES)
+        anisotropy = replace(anisotropy, anisotropy_azimuth=across)
     return _Directional.of(estimates, anisotropy)

@@ -17,11 +17,11 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._sheared_contact import (
+    PRESSING_BYTES,
     Pressing,
     check_pressing,
     press_sheared,
     pressed_dataset,
-    pressing_memory,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -32,20 +32,11 @@ DEFAULT_FACTORS = 3  # of them, the finest ones
 
 
 def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    shear: Any,
-    direction: Any,
-    factors: Any,
-    normal_force: Any,
-    nominal_pressure: Any,
-    **solver: Any,
+    problems: Problems, *, crack: Any, shear: Any, direction: Any, factors: Any, **pressing: Any
 ) -> None:
     direction = checked_direction(problems, direction)
     check_sliding(problems, crack, shear, direction)
-    loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    check_pressing(problems, crack, loads, solver)
+    check_pressing(problems, crack, **pressing)
     are_numbers = factors is None or problems.numbers("factors", factors, at_least=1)
     if are_numbers and isinstance(crack, Crack):
         _check_factors(problems, crack.layout.cells, factors)
@@ -68,7 +59,7 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
         problems.require(several and bool(valid.all()) and all(divides), "factors", expected, factors)
 
 
-@public_result(title="contact area of a crack by spacing", check=_check, memory=pressing_memory)
+@public_result(title="contact area of a crack by spacing", check=_check, memory=PRESSING_BYTES)
 def area_dimension(
     crack: Crack,
     *,
@@ -129,7 +120,7 @@ def area_dimension(
     """
     towards, shears = read_direction(direction), float_array(shear)
     loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
+    solver = (influence, "second_order", hardness, tolerance)
     pressing = Pressing.read(crack, WHERE, loads, solver, keep=("state",))
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []

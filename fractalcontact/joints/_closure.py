@@ -16,11 +16,11 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import interpolation_errors
 from fractalcontact.joints._sheared_contact import (
+    PRESSING_BYTES,
     Pressing,
     check_pressing,
     press_sheared,
     pressed_dataset,
-    pressing_memory,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -33,25 +33,12 @@ UNDETERMINED = (
 )
 
 
-def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    shear: Any,
-    direction: Any,
-    closure: Any,
-    normal_force: Any,
-    nominal_pressure: Any,
-    bulk: Any,
-    keep: Any,
-    **solver: Any,
-) -> None:
+def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, **pressing: Any) -> None:
     check_sliding(problems, crack, shear, direction)
-    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    check_pressing(problems, crack, loads, solver, bulk=bulk, keep=keep)
+    check_pressing(problems, crack, **pressing)
 
 
-@public_result(title="closure of a sheared crack", check=_check, memory=pressing_memory)
+@public_result(title="closure of a sheared crack", check=_check, memory=PRESSING_BYTES)
 def closure(
     crack: Crack,
     *,
@@ -63,7 +50,7 @@ def closure(
     bulk: str = "flat_block",
     keep: Sequence[str] = ("state",),
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     hardness: float | None = None,
     tolerance: float = 1e-8,
     method: str = "fast",
@@ -122,20 +109,9 @@ def closure(
     [[0.0, 0.0], [2.2, 5.2]]
     """
     directions, shears = read_directions(direction), float_array(shear)
-    pressing = Pressing.read(
-        crack,
-        WHERE,
-        {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure},
-        {
-            "influence": influence,
-            "disc_radius": disc_radius,
-            "hardness": hardness,
-            "tolerance": tolerance,
-            "method": method,
-        },
-        bulk=bulk,
-        keep=keep,
-    )
+    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
+    solver = (influence, disc_radius, hardness, tolerance, method)
+    pressing = Pressing.read(crack, WHERE, loads, solver, bulk=bulk, keep=keep)
     pressed = [press_sheared(pressing, shears, towards, progress) for towards in directions]
     result = pressed_dataset(pressing, shears, directions, pressed)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)

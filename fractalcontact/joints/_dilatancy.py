@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
-from fractalcontact.base.memory import Plane
 from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.references import PAPER
@@ -19,19 +18,18 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
+    PRESSING_BYTES,
     Pressing,
     check_pressed,
     check_pressing,
     press_against_spring,
     press_sheared,
     pressed_dataset,
-    pressing_memory,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.dilatancy"
-RIGID_BYTES = 96.0  # of a cell of the block
 
 
 def _check(
@@ -43,23 +41,20 @@ def _check(
     normal_force: Any,
     normal_stiffness: Any,
     pressed: Any,
-    bulk: Any,
-    keep: Any,
-    **solver: Any,
+    **pressing: Any,
 ) -> None:
     check_sliding(problems, crack, shear, direction)
     if normal_force is None:
-        unused = {"keep": keep, "normal_stiffness": normal_stiffness, "bulk": bulk, **solver}
-        _check_defaults(problems, unused | {"pressed": pressed})
+        _check_defaults(problems, normal_stiffness=normal_stiffness, pressed=pressed, **pressing)
         return
-    check_pressed(problems, crack, pressed, keep, bulk, solver)
+    check_pressed(problems, crack, pressed, **pressing)
     one_of = normal_stiffness is None or pressed is None
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`", pressed)
     problems.number("normal_stiffness", normal_stiffness, above=0, optional=True)
-    check_pressing(problems, crack, {"normal_force": normal_force}, solver, bulk=bulk, keep=keep)
+    check_pressing(problems, crack, normal_force=normal_force, **pressing)
 
 
-def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
+def _check_defaults(problems: Problems, **options: Any) -> None:
     """Check that the options of a press have their defaults, where nothing is pressed."""
     parameters = inspect.signature(dilatancy).parameters
     for name, value in options.items():
@@ -70,13 +65,7 @@ def _check_defaults(problems: Problems, options: dict[str, Any]) -> None:
         problems.require(unused, name, "nothing without normal_force", value)
 
 
-def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of sliding rigid faces, and of pressing them where a force is given."""
-    is_rigid = arguments.get("normal_force") is None
-    return RIGID_BYTES * plane.cells if is_rigid else pressing_memory(plane, arguments)
-
-
-@public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=_memory)
+@public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)
 def dilatancy(
     crack: Crack,
     *,
@@ -88,7 +77,7 @@ def dilatancy(
     bulk: str = "flat_block",
     keep: Sequence[str] = (),
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     hardness: float | None = None,
     tolerance: float = 1e-8,
     method: str = "fast",
@@ -154,13 +143,7 @@ def dilatancy(
     rigid = _rigid_dataset(crack, shears, directions)
     if normal_force is None:
         return rigid
-    solver = {
-        "influence": influence,
-        "disc_radius": disc_radius,
-        "hardness": hardness,
-        "tolerance": tolerance,
-        "method": method,
-    }
+    solver = (influence, disc_radius, hardness, tolerance, method)
     pressing = Pressing.read(crack, WHERE, {"normal_force": normal_force}, solver, bulk=bulk, keep=keep)
     by_direction = []
     for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):

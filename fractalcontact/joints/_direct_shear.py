@@ -20,7 +20,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
-from fractalcontact.joints._sheared_contact import Pressing, check_pressing, warn_steep
+from fractalcontact.joints._sheared_contact import Pressing, check_pressing
 from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, balanced_step, shear_stiffness
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -43,10 +43,8 @@ def _check(
     shear_stiffness: Any,
     distance: Any,
     keep: Any,
-    progress: Any,
     **solver: Any,
 ) -> None:
-    problems.boolean("progress", progress)
     bounds: Any = {"at_least": SMALLEST, "at_most": LARGEST}
     problems.number("normal_stiffness", normal_stiffness, **bounds, optional=True)
     problems.number("shear_stiffness", shear_stiffness, **bounds, optional=True)
@@ -59,9 +57,10 @@ def _check(
         greatest = float(float_array(nominal_pressure).max())
         problems.require(greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest)
     check_crack(problems, crack)
-    known = {"hardness": hardness} if hardness_is_valid else {}
-    loads = {"nominal_pressure": nominal_pressure} if has_load else None
-    check_pressing(problems, crack, loads, known | solver)
+    pressure = nominal_pressure if has_load else 0.0
+    check_pressing(
+        problems, crack, nominal_pressure=pressure, hardness=hardness if hardness_is_valid else None, **solver
+    )
     path_is_valid = problems.numbers("path", path, at_least=-LARGEST, at_most=LARGEST)
     if check_direction(problems, direction) and path_is_valid and isinstance(crack, Crack):
         _check_path(problems, crack, _turning_points(path), read_direction(direction))
@@ -102,7 +101,7 @@ def direct_shear(
     distance: float | None = None,
     keep: Sequence[str] = (),
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     tolerance: float = 1e-5,
     progress: bool = False,
 ) -> xr.Dataset:
@@ -173,12 +172,7 @@ def direct_shear(
     step = _cell_step(crack, towards)
     assert step is not None
     legs = _legs(_turning_points(path), step)
-    solver = {
-        "influence": influence,
-        "disc_radius": disc_radius,
-        "hardness": hardness,
-        "tolerance": tolerance,
-    }
+    solver = (influence, disc_radius, hardness, tolerance)
     pressing = Pressing.read(crack, WHERE, {"nominal_pressure": nominal_pressure}, solver)
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
@@ -203,7 +197,10 @@ def direct_shear(
 
 def _warn(joints: Sequence[WornJoint]) -> None:
     """Warn of presses that did not converge, and of slopes beyond small strains."""
-    warn_steep(max(joint.steepest for joint in joints), WHERE, stacklevel=5)
+    from fractalcontact.contact.solver import warn_steep
+
+    steepest = max(joint.steepest for joint in joints)
+    warn_steep(f"{WHERE}: the delta-surface", steepest, stacklevel=5)
     failed = sum(joint.unconverged for joint in joints)
     if failed:
         message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"

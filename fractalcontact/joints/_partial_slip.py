@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import checked_direction, read_direction
-from fractalcontact.base.errors import AnisotropyWarning, ConvergenceWarning
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -46,11 +44,7 @@ def _check(
     friction_coefficient: Any,
     method: Any,
     keep: Any,
-    progress: Any,
-    closure: Any,
-    normal_force: Any,
-    nominal_pressure: Any,
-    **solver: Any,
+    **pressing: Any,
 ) -> None:
     from fractalcontact.contact import solver as contact_solver
 
@@ -60,9 +54,7 @@ def _check(
     problems.numbers("tangential_force", tangential_force)
     problems.choice("method", method, contact_solver.METHODS, optional=True)
     problems.choices("keep", keep, SLIP_MAPS)
-    problems.boolean("progress", progress)
-    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    load = check_pressing(problems, crack, loads, solver)
+    load = check_pressing(problems, crack, **pressing)
     if load is None:
         return
     expected = "one number: the normal load is constant while the tangential force changes"
@@ -88,7 +80,12 @@ def _shear_path(
     return ShearPath(forces, (x, y), float(friction), crack.contact_poisson, method)
 
 
-@public_result(title="Partial slip of a joint", references=PAPER, check=_check)
+@public_result(
+    title="Partial slip of a joint",
+    references=PAPER,
+    check=_check,
+    memory=360.0,  # of a cell: both directions of a free body (320), delta-surface and flat block
+)
 def partial_slip(
     crack: Crack,
     *,
@@ -101,7 +98,7 @@ def partial_slip(
     friction_coefficient: float | None = None,
     method: str | None = None,
     influence: str | None = None,
-    disc_radius: str | float = "second_order",
+    disc_radius: str = "second_order",
     tolerance: float = 1e-8,
     keep: Sequence[str] = (),
     progress: bool = False,
@@ -160,11 +157,12 @@ def partial_slip(
     >>> round(float(pushed["sliding_force"][0]), 1)
     70.0
     """
+    from fractalcontact.contact import solver as contact_solver
+
     towards, shears, names = read_direction(direction), float_array(shear), word_tuple(keep)
     path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    solver = {"influence": influence, "disc_radius": disc_radius, "tolerance": tolerance}
-    pressing = Pressing.read(crack, WHERE, loads, solver)
+    pressing = Pressing.read(crack, WHERE, loads, (influence, disc_radius, None, tolerance))
     rows = [
         _pushed(ShearedContact(pressing, float(value), towards), path, names)
         for value in track(shears, progress, "partial_slip", unit="shear")
@@ -188,7 +186,11 @@ def partial_slip(
         if not finite.all():
             result[name] = result[name].where(finite)
             result[name].attrs["reason"] = RIGID
-    _warn(result)
+    by_superposition = result["slip_method"] == contact_solver.METHODS.index("superposition")
+    errors = result["superposition_error"].where(by_superposition, 0.0).values
+    worst = int(np.argmax(np.abs(errors)))
+    what = f"{WHERE}: the contact at a shear of {shears[worst]:g} m"
+    contact_solver.warn_lay(what, float(errors[worst]), stacklevel=4)
     return result.assign_attrs(achieved_residual=float(result["residual"].max()))
 
 
@@ -251,28 +253,3 @@ def _without_block(stiffness: Array, block: float) -> Array:
         compliance = 1 / stiffness - 1 / block
         is_block = np.abs(compliance) <= BLOCK_ROUNDING / block
         return np.asarray(np.where(is_block, np.inf, 1 / compliance))
-
-
-def _warn(result: xr.Dataset) -> None:
-    """Warn of steps that did not converge, and of contacts with a lay that were solved by superposition."""
-    from fractalcontact.contact.solver import ACCEPTABLE_ERROR, METHODS
-
-    failed = np.argwhere(~result["converged"].values)
-    if failed.size:
-        row, step = failed[0]
-        warnings.warn(
-            f"{WHERE}: {len(failed)} steps not converged, the first of them step {step} at a shear of "
-            f"{float(result['shear'][row]):g} m (residual up to {float(result['residual'].max()):.2g})",
-            ConvergenceWarning,
-            stacklevel=4,
-        )
-    by_superposition = result["slip_method"].values == METHODS.index("superposition")
-    error = np.where(by_superposition, result["superposition_error"].values, 0.0)
-    worst = int(np.argmax(np.abs(error)))
-    if abs(error[worst]) > ACCEPTABLE_ERROR:
-        warnings.warn(
-            f"{WHERE}: contacts have a lay, and by superposition their displacements are off by up to "
-            f"{error[worst]:+.0%}, at a shear of {float(result['shear'][worst]):g} m: use method='full'",
-            AnisotropyWarning,
-            stacklevel=4,
-        )

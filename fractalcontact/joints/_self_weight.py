@@ -21,7 +21,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
 FROM_RIGID = ("rigid_dilatancy", "basic_friction_angle", "nominal_area")
-SOLVER = {"influence": None, "hardness": None, "tolerance": 1e-8}  # options of elastic faces, as by default
 LARGEST = 1e100  # products of such numbers do not overflow
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
 RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
@@ -48,15 +47,9 @@ def _check(
         problems.require(ascending, "structure_size", "ascending sizes, each once", structure_size)
         if weight and isinstance(crack, Crack):
             force = (float(unit_weight) * sizes * crack.nominal_area).tolist()
-    if _is_rigid(crack):
-        for name, default in SOLVER.items():
-            expected = "nothing for rigid faces, of a crack with neither young nor poisson"
-            problems.require(solver[name] == default, name, expected, solver[name])
-        with problems.collect():
-            dilatancy.validate(crack, shear=shear, direction=direction)
-        return
+    loads = {} if _is_rigid(crack) else {"normal_force": force}
     with problems.collect():
-        dilatancy.validate(crack, shear=shear, direction=direction, normal_force=force, **solver)
+        dilatancy.validate(crack, shear=shear, direction=direction, **loads, **solver)
 
 
 @public_result(title="shear strength of a joint under self-weight", check=_check)

@@ -1,6 +1,7 @@
 """A sheared crack that is pressed: its delta-surface between the two bodies, on plain arrays.
 
-    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, {"hardness": 2e9}, keep="state")
+    solver = (None, "second_order", 2e9)  # influence, disc_radius, hardness
+    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, solver, keep="state")
     columns = press_sheared(pressing, shears, towards, progress=False)
     columns["interface_closure"], columns["state"]  # of shape (shear, step) and (shear, step, y, x)
 
@@ -10,7 +11,6 @@ imported where it is called: a study of rigid faces loads neither it nor the com
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,15 +21,14 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction, direction_coords
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, SmallStrainWarning
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.memory import Plane, map_bytes
 from fractalcontact.base.numbers import number_of_entries
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import content, plain
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.results import provenance_of
-from fractalcontact.base.schema import CONTACT_MAPS, STEEP, STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
@@ -56,8 +55,8 @@ SCALARS = (
     *LOADS, "contact_area", "contact_fraction", "corrected_contact_fraction", "mean_gap", "elastic_energy",
     "iterations", "residual", "converged", "stop_reason", "run_time",
 )  # fmt: skip
-BLOCK_BYTES = 40.0  # of a cell: the delta-surface, the flat block and what both are made of
-STEPS_SHOWN = 5  # in a warning
+# bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
+PRESSING_BYTES = 228.0
 FORCE_ERROR = 1e-7  # relative error of the force that balances a spring
 MAX_SOLUTIONS = 60  # for one such force: 189 of them took 6 in the median and 13 at most
 
@@ -83,15 +82,18 @@ class Pressing:
         crack: Crack,
         where: str,
         loads: Mapping[str, Any],
-        solver: Mapping[str, Any],
+        solver: Sequence[Any],
         *,
         bulk: str = "flat_block",
         keep: Any = (),
     ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`."""
+        """Return it from arguments that passed `check_pressing`.
+
+        `solver` is (influence, disc_radius, hardness, tolerance, method), or the first of these.
+        """
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-        options = ContactOptions(boundary=_boundary(crack), **solver)
+        options = ContactOptions(_boundary(crack), *solver)
         return cls(crack, where, LoadPath.from_keywords(**loads), options, bulk, word_tuple(keep))
 
     @property
@@ -122,22 +124,17 @@ class Pressing:
 
 
 def check_pressing(
-    problems: Problems,
-    crack: Any,
-    loads: Mapping[str, Any] | None,
-    solver: Mapping[str, Any],
-    *,
-    bulk: Any = "flat_block",
-    keep: Any = (),
+    problems: Problems, crack: Any, *, bulk: Any = "flat_block", keep: Any = (), **keywords: Any
 ) -> LoadPath | None:
-    """Check what `Pressing.read` takes; return the load unless it has problems. Loads of None had theirs."""
+    """Check load and options of the solver, as their arguments; return the load unless it is wrong."""
     from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-    load = None if loads is None else problems.construct(LoadPath.from_keywords, **loads)
+    loads = {name: keywords.pop(name) for name in LOADS if name in keywords}
+    load = problems.construct(LoadPath.from_keywords, **loads)
     if keep is not None:
         problems.choices("keep", keep, CONTACT_MAPS)
     problems.choice("bulk", bulk, BULK)
-    options = problems.construct(ContactOptions, **solver)
+    options = problems.construct(ContactOptions, **keywords)
     if options is None or not isinstance(crack, Crack):
         return load
     layout = crack.layout
@@ -147,19 +144,6 @@ def check_pressing(
         check_elastic(problems, crack)
         options.check_load(load, crack.nominal_area, problems)
     return load
-
-
-def pressing_memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of pressing the block at one shear after the other, with the maps of all of them."""
-    from fractalcontact.contact import press
-
-    pressed = press.memory(plane, arguments)  # type: ignore[operator]
-    shears = max(1, int(np.size(arguments["shear"]))) if "shear" in arguments else 1
-    steps = max(
-        (int(np.size(arguments[name])) for name in LOADS if arguments.get(name) is not None), default=1
-    )
-    maps = shears * steps * sum(map_bytes(name) for name in word_tuple(arguments.get("keep")))
-    return float(pressed) + plane.cells * (BLOCK_BYTES + 2.0 * maps)
 
 
 def _boundary(crack: Crack) -> str:
@@ -322,20 +306,18 @@ def _press_balanced(contact: ShearedContact, initial: float, opening: float, sti
     return press(float(force), contact.pressing.keep)
 
 
-def check_pressed(
-    problems: Problems, crack: Any, pressed: Any, keep: Any, bulk: Any, solver: Mapping[str, Any]
-) -> None:
+def check_pressed(problems: Problems, crack: Any, pressed: Any, *, keep: Any, **pressing: Any) -> None:
     """Check that a result of `closure` is that of this crack, pressed in this way; None passes."""
     if pressed is None or not isinstance(crack, Crack):
         return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(pressed) if isinstance(pressed, xr.Dataset) else {}
-    stated, wanted = entry.get("parameters", {}), {"crack": crack, "bulk": bulk, **solver}
+    stated, wanted = entry.get("parameters", {}), {"crack": crack, **pressing}
     differing = [name for name in wanted if content(stated.get(name)) != content(plain(wanted[name]))]
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected, pressed):
         problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
-    problems.require(solver.get("hardness") is None, "pressed", "nothing with a hardness", pressed)
+    problems.require(pressing["hardness"] is None, "pressed", "nothing with a hardness", pressed)
     problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
 
 
@@ -366,14 +348,15 @@ def pressed_dataset(
 ) -> xr.Dataset:
     """Return the columns of all directions over (direction, shear, step), and maps over (..., y, x).
 
-    Warns of what did not converge, and of steep delta-surfaces. Without a spring the prescribed load is the
-    same at every shear, and a coordinate of `step` alone.
+    Warns of steep delta-surfaces. Without a spring the prescribed load is the same at every shear, and a
+    coordinate of `step` alone.
     """
+    from fractalcontact.contact import solver
+
     crack, load = pressing.crack, pressing.load
-    for towards, columns in zip(directions, pressed, strict=True):
-        _warn_unconverged(columns, shears, towards, pressing.where)
     stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
-    warn_steep(float(stacked["rms_slope"].max()), pressing.where, stacklevel=5)
+    what, slope = f"{pressing.where}: the delta-surface", float(stacked["rms_slope"].max())
+    solver.warn_steep(what, slope, stacklevel=5)
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
@@ -390,29 +373,3 @@ def pressed_dataset(
     result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
     residual = float(np.max(stacked["residual"]))
     return result.assign_attrs(achieved_residual=residual, references=pressing.references)
-
-
-def _warn_unconverged(columns: Columns, shears: Array, towards: Direction, where: str) -> None:
-    """Warn of the shears and steps at which the solver did not meet its tolerance."""
-    failed = np.argwhere(~columns["converged"])
-    if failed.size == 0:
-        return
-    reasons = list(STOP_REASONS)
-    shown = "; ".join(
-        f"shear {shears[i]:g} m towards {towards.name}, step {j}: {reasons[columns['stop_reason'][i, j]]} "
-        f"(residual {columns['residual'][i, j]:.2g})"
-        for i, j in failed[:STEPS_SHOWN]
-    )
-    more = f"; and {len(failed) - STEPS_SHOWN} more" if len(failed) > STEPS_SHOWN else ""
-    warnings.warn(f"{where}: not converged: {shown}{more}", ConvergenceWarning, stacklevel=6)
-
-
-def warn_steep(slope: float, where: str, *, stacklevel: int) -> None:
-    """Warn of delta-surfaces beyond small strains, by the greatest rms slope of all shears and directions."""
-    if slope > STEEP:
-        warnings.warn(
-            f"{where}: the delta-surface has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are "
-            "not small, and linear elasticity is an approximation",
-            SmallStrainWarning,
-            stacklevel=stacklevel,
-        )

@@ -84,15 +84,22 @@ def test_epstein_zeta():
     assert influence.epstein_zeta(7, 1.7) == pytest.approx(np.sum(distance[distance > 0] ** -7.0), rel=1e-9)
 
 
-@pytest.mark.parametrize(("radius", "ratio"), [(0.3, 1.0), (0.5, 1.0), (0.4, 1.8), (0.9, 1.0)])
-def test_least_symbol_matches_eigenvalues(radius, ratio):
-    """A large Toeplitz matrix has its least eigenvalue at the least value of its symbol."""
+@pytest.mark.parametrize(
+    ("choice", "ratio", "is_positive"),
+    [
+        *((choice, ratio, True) for choice in influence.DISC_RADII for ratio in (1.0, 1.5, 2.0)),
+        ("inscribed", 5.0, True),
+        ("equal_area", 3.0, False),
+    ],
+)
+def test_plates_leave_the_operator_positive(choice, ratio, is_positive):
+    """Up to the greatest ratio of the spacings; beyond, plates of equal area would not."""
     spacing = (np.sqrt(ratio), 1 / np.sqrt(ratio))
+    radius = influence.disc_radius(choice, spacing)
     table = influence.disc_coefficients((14, 14), spacing, radius)
     index = np.abs(np.subtract.outer(np.arange(14), np.arange(14)))
     matrix = table[index[:, None, :, None], index[None, :, None, :]].reshape(196, 196)
-    least = influence.least_symbol(radius, ratio)
-    assert (np.linalg.eigvalsh(matrix).min() > 0) == (least > 0)
+    assert (np.linalg.eigvalsh(matrix).min() > 0) == is_positive
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (8, 8), (13, 7), (1, 9)])
