@@ -177,14 +177,19 @@ def public_result(
 
 def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
     """Warn of the values that `converged` marks: where they are, why, and how far they came."""
-    if "converged" not in result or result["converged"].values.all():
+    if not isinstance(result, xr.Dataset) or "converged" not in result or result["converged"].values.all():
         return
     converged = result["converged"]
     failed, shown = np.argwhere(~converged.values), []
     for index in failed[:PLACES_SHOWN]:
         at = result.isel(dict(zip(converged.dims, index.tolist(), strict=True)))
-        places = [f"{dim} {at[dim].values[()] if dim in at.coords else i}"
-                  for dim, i in zip(converged.dims, index, strict=True)]  # fmt: skip
+        known = [
+            (dim, at[dim].item() if dim in at.coords else int(i))
+            for dim, i in zip(converged.dims, index, strict=True)
+        ]
+        places = [
+            f"{dim} {value:g}" if isinstance(value, float) else f"{dim} {value}" for dim, value in known
+        ]
         reason = converged.attrs.get("reason", "")
         if "stop_reason" in at:
             reason = list(STOP_REASONS)[int(at["stop_reason"])]

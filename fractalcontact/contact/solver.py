@@ -146,7 +146,7 @@ def warn_steep(what: str, slope: float, *, stacklevel: int) -> None:
     """Warn of a surface beyond small strains, by its rms slope."""
     if slope > STEEP:
         limits = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
-        message = f"{what} has an rms slope of {slope:.2g}; {limits}"
+        message = f"{what} has an rms slope of up to {slope:.2g}; {limits}"
         warnings.warn(message, SmallStrainWarning, stacklevel=stacklevel)
 
 

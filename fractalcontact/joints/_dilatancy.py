@@ -62,7 +62,7 @@ def _check_defaults(problems: Problems, **options: Any) -> None:
         unused = value is default or (isinstance(value, type(default)) and value == default)
         if name == "keep":
             unused = value is None or number_of_entries(value) == 0
-        problems.require(unused, name, "nothing without normal_force", value)
+        problems.require(unused, name, "nothing without a force: rigid faces are not pressed", value)
 
 
 @public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -12,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -51,7 +49,6 @@ RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "re
            "iterations", "converged", "run_time")  # fmt: skip
 HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones
 PLACE_ERROR = 1e-9  # of the search between two steps of the path
-SHOWN = 5  # in a warning
 STRESS_BALANCE = 1e-4  # of the total stress: a single cell that opens takes up more than the solver's error
 NO_UPLIFT = "NaN where no water presses on the joint"
 OFF_THE_PATH = (
@@ -207,14 +204,14 @@ def uplift(
         parallel sides "linear" and with drains "bilinear": uplift_force (N), mean_uplift (Pa, over the
         nominal area), uplift_arm (m, of its line of action from the upstream side), uplift_x and uplift_y (m,
         the point where it acts), uplift_profile (Pa).
-        wet_fraction; isolated_fraction (open, without water); residual (relative). run_time (s). If iterated:
-        iterations, converged; on a path also effective_stress (Pa), balance_error (of the total stress).
+        wet_fraction; isolated_fraction (open, without water); residual (relative); converged; run_time (s).
+        If iterated iterations; on a path also effective_stress (Pa), balance_error (of the total stress).
 
     Raises
     ------
     InvalidInput
         `gap` is not an opening or not a path, a drain or line is outside it, or pressures are out of order.
-        An iteration that does not converge gives a ConvergenceWarning.
+        What does not converge gives a ConvergenceWarning.
 
     Examples
     --------
@@ -247,12 +244,12 @@ def uplift(
         result[name] = result[name] - _from_edge(gap, axis, 0.0)
     result["fluid_pressure"] = ((*leading, "y", "x"), pressure)
     result["wet_fraction"] = leading, np.isfinite(pressure).mean(axis=(-2, -1))
-    iterated = normal_stiffness is not None or total_stress is not None
-    names = ("isolated_fraction", "residual", *(("iterations", "converged") if iterated else ()))
+    names = ["isolated_fraction", "residual", "converged"]
+    names += ["iterations"] if normal_stiffness is not None or total_stress is not None else []
     for name in (*names, *(ON_PATH if total_stress is not None else ())):
         result[name] = leading, np.reshape([getattr(state, name) for state in states], gap.shape[:-2])
     _explain(result)
-    _warn(states)
+    _explain_unconverged(result)
     plane_coords = {dim: gap[dim].variable for dim in ("y", "x")}
     return result.assign_coords(leading_coords(gap, leading, taken=RESULTS) | plane_coords).assign_attrs(
         achieved_residual=max(state.residual for state in states)
@@ -465,19 +462,16 @@ def _balanced(
     return found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
 
 
-def _warn(states: Sequence[State]) -> None:
-    failed = [number for number, state in enumerate(states) if not state.converged]
-    if not failed:
-        return
-    if any(states[number].residual > ERROR for number in failed):
-        what = UNKNOWN
-    elif math.isfinite(states[0].balance_error):
-        errors = ", ".join(f"{states[number].balance_error:+.2g}" for number in failed[:SHOWN])
-        what = f"no effective stress on the path balances the total stress (balance_error {errors})"
+def _explain_unconverged(result: xr.Dataset) -> None:
+    """Say why the iteration of some gaps did not converge."""
+    if not (result["residual"] <= ERROR).all():
+        reason = UNKNOWN
+    elif "balance_error" in result:
+        reason = "no effective stress on the path balances the total stress"
     else:
-        what = f"opening and flow did not come to balance in {MAX_ITERATIONS} iterations"
-    message = f"{WHERE}: not converged, {len(failed)} of {len(states)} gaps: {what}"
-    warnings.warn(message, ConvergenceWarning, stacklevel=4)
+        reason = "opening and flow did not come to balance"
+    if not result["converged"].all():
+        result["converged"].attrs["reason"] = reason
 
 
 Knots = dict[str, tuple[Array, Array]]

@@ -234,12 +234,12 @@ def _uplift(tree: xr.DataTree) -> Iterator[str]:
             f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
             "over time it may come there too, and the uplift grow."
         )
-    failed = ~water["converged"] if "converged" in water else np.zeros(1, bool)
+    failed = ~water["converged"]
     if not bool(failed.any()):
         return
     count = f"{int(failed.sum())} of {failed.size}"
     if "balance_error" not in water:
-        yield f"joints/uplift: opening and flow did not come to balance in {count} cases."
+        yield f"joints/uplift: {water['converged'].attrs['reason']} in {count} cases."
         return
     errors = water["balance_error"].where(failed)
     if float(errors.min()) < 0:

@@ -88,7 +88,7 @@ def test_rigid_faces_need_no_modulus(make_face):
 
 def test_rigid_faces_refuse_options_of_the_solver(make_face):
     crack = fc.joints.Crack(make_face(np.zeros((6, 40))), block=(6, 20))
-    with pytest.raises(ValueError, match="hardness: expected nothing for rigid faces"):
+    with pytest.raises(ValueError, match="hardness: expected nothing without a force: rigid faces"):
         fc.joints.self_weight(
             crack, structure_size=10, unit_weight=GAMMA, shear=2, direction="E", hardness=1e8
         )
