@@ -12,7 +12,7 @@ import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,13 @@ import xarray as xr
 
 from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf import written_whole
+from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
-from fractalcontact.scenes._result_tables import member_count, of_member
+from fractalcontact.scenes import _rows
+from fractalcontact.scenes._result_tables import group_of, member_count, of_member, table_of
 from fractalcontact.scenes._results_folder import REPORT, is_report
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._tables import tables
@@ -52,6 +54,7 @@ FLAG_COLOURS = {
 }
 OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
 LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
+SIZES = (1.0, 2.0, 5.0)  # of a decade, that are written on the axis of d(s)
 PLAIN_LIST = re.compile(r"\[[^\[\]{}\"]*\]")  # in JSON: of numbers, without words, lists or objects
 HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
 
@@ -218,12 +221,16 @@ def _heights(tree: xr.DataTree) -> xr.DataArray | None:
 
 @dataclass(frozen=True)
 class Maps:
-    """A set of maps: its title, its key of colours by meaning, and what the page needs to show them."""
+    """A set of maps: its title, its key of colours by meaning, and what the page needs to show them.
+
+    `signature` is that of the states on the maps, where the study has it.
+    """
 
     title: str
     key: dict[str, str]
     block: int
     data: dict[str, Any]
+    signature: dict[str, Any] | None
 
 
 def _maps(tree: xr.DataTree) -> Iterator[Maps]:
@@ -231,14 +238,15 @@ def _maps(tree: xr.DataTree) -> Iterator[Maps]:
     for node in tree.subtree:
         for name, variable in node.data_vars.items():
             if variable.dims[-2:] == CORE_DIMS and "flag_meanings" in variable.attrs and variable.size:
-                yield _map_set(node.path.strip("/"), node.to_dataset(), str(name))
+                yield _map_set(tree, node.path.strip("/"), node.to_dataset(), str(name))
 
 
-def _map_set(path: str, dataset: xr.Dataset, name: str) -> Maps:
+def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str) -> Maps:
     state = dataset[name]
     dims = [str(dim) for dim in state.dims[:-2]]
     limit = MAPS if len(dims) < 2 else math.isqrt(MAPS)
-    dataset = dataset.isel({dim: _spread(state.sizes[dim], limit) for dim in dims})
+    shown = {dim: _spread(state.sizes[dim], limit) for dim in dims}
+    dataset = dataset.isel(shown)
     state = dataset[name]
     key = _key(state)
     block = math.ceil(max(state.shape[-2:]) / MAP_CELLS)
@@ -254,7 +262,60 @@ def _map_set(path: str, dataset: xr.Dataset, name: str) -> Maps:
     ]
     long_name = str(state.attrs.get("long_name", name))
     data = {"axes": axes, "pictures": pictures, "alternatives": alternatives}
-    return Maps(f"{long_name}: {path.replace('/', ', ').replace('_', ' ')}", key, block, data)
+    signature = group_of(tree, "domains/signature")
+    own = None
+    if name == "state" and signature is not None and set(signature["gap_size"].dims) == set(dims):
+        own = _signature_view(tree, signature.isel(shown).transpose(*dims, ...))
+        data |= {key: own.pop(key) for key in ("curves", "spots", "marks", "rows")}
+    return Maps(f"{long_name}: {path.replace('/', ', ').replace('_', ' ')}", key, block, data, own)
+
+
+def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
+    """Return what the page draws of the signature beside each map: d(s) in a square from 0 to 1, and a table.
+
+    `curves` and `spots` are polylines of the contact domain and of random spots, `marks` the points of spot
+    and gap; `window` is that of the dimensions, and `sizes` the lengths written on the axis.
+    """
+    side = signature["side"].values
+    scale = scale_for("m", side)
+    ends = np.log(side[[0, -1]])
+
+    def across(lengths: Any) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((np.log(lengths) - ends[0]) / max(ends[1] - ends[0], 1e-9))
+
+    def polylines(slopes: Array) -> list[str]:
+        """Return the points of each curve; of a dimension from 0 to 2, upwards."""
+        rows = slopes.reshape(-1, side.size)
+        return [
+            " ".join(f"{x:.3f},{1 - d / 2:.3f}" for x, d in zip(across(side), row, strict=True) if d == d)
+            for row in np.clip(rows, 0.0, 2.0)
+        ]
+
+    local = signature["local_slope"].values
+    lengths = np.stack([signature[name].values.ravel() for name in ("spot_size", "gap_size")], -1)
+    marks = [
+        [
+            [round(float(x), 3), round(1 - float(np.interp(x, across(side), row)) / 2, 3)]
+            if 0 <= x <= 1 and np.isfinite(row).all() else None
+            for x in across(both)
+        ]
+        for both, row in zip(lengths, local.reshape(-1, side.size), strict=True)
+    ]  # fmt: skip
+    window = across(np.array([signature[name].values for name in ("window_low", "window_high")]))
+    decades = 10.0 ** np.arange(-3, 6)[:, None] * SIZES
+    written = [value for value in decades.ravel() if side[0] <= value * scale.factor <= side[-1]]
+    rows = table_of(replace(_rows.signature, first_dim=False), tree, signature)
+    cells = [list(zip(rows.heads, row, strict=True)) for row in rows.cells] if rows else []
+    return {
+        "curves": polylines(local),
+        "spots": polylines(2.0 - local_slope(side, signature["spots_fraction"].values)),
+        "marks": marks,
+        "rows": cells,
+        "window": window.tolist() if np.isfinite(window).all() else None,
+        "sizes": [(float(across(value * scale.factor)), f"{value:g}") for value in written],
+        "unit": scale.unit,
+    }
 
 
 def _spread(size: int, limit: int) -> Array:

@@ -19,7 +19,9 @@ import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-STUDY = SOUND.replace("[want]", "[want]\nsurfaces = ['height']\nkeep = ['state']\nfigures = true")
+STUDY = SOUND.replace(
+    "[want]", "[want]\nsurfaces = ['height']\nkeep = ['state']\ndomains = ['signature']\nfigures = true"
+)
 
 
 class Page(HTMLParser):
@@ -93,6 +95,34 @@ def test_maps_are_those_of_the_result(study, page):
     for picture, expected in zip(maps["pictures"], flags, strict=True):
         shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(picture))))
         np.testing.assert_array_equal(shown[::-1], expected)
+
+
+def points(polyline):
+    return np.array([pair.split(",") for pair in polyline.split()], float).reshape(-1, 2)
+
+
+def test_signature_stands_beside_the_map_of_its_state(study, page):
+    """A unit square: ln s across, the dimension from 0 to 2 upwards; the numbers are those of the summary."""
+    signature, maps = study[0]["domains/signature"].to_dataset(), page.data["map-data"][0]
+    states = [signature.isel(shear=i, step=k) for i in range(2) for k in range(signature.sizes["step"])]
+    across = np.log(signature.side / signature.side[0]) / np.log(signature.side[-1] / signature.side[0])
+    assert len(states) == len(maps["pictures"])
+    for state, curve, marks, rows in zip(states, maps["curves"], maps["marks"], maps["rows"], strict=True):
+        finite = np.isfinite(state.local_slope.values)
+        expected = np.stack([across, 1 - state.local_slope.clip(0, 2) / 2], -1)[finite]
+        np.testing.assert_allclose(points(curve), expected, atol=6e-4)
+        for name, mark in zip(("spot_size", "gap_size"), marks, strict=True):
+            place = np.interp(np.log(state[name]), np.log(signature.side), across, np.nan, np.nan)
+            assert mark is None if np.isnan(place) else mark[0] == pytest.approx(place, abs=6e-4)
+        flag = state.signature_flag.attrs["flag_meanings"].split()[int(state.signature_flag)]
+        assert dict(rows)["D (random spots)"] == flag.replace("_", " ")
+    assert any(mark for marks in maps["marks"] for mark in marks)
+
+
+def test_maps_without_a_signature_have_none(study, tmp_path):
+    groups = {"/joints": xr.Dataset(), "/joints/closure": study[0]["joints/closure"].to_dataset()}
+    (maps,) = page_of(xr.DataTree.from_dict(groups), tmp_path).data["map-data"]
+    assert "curves" not in maps
 
 
 def test_captions_state_load_shear_and_shares(study, page):
@@ -238,7 +268,7 @@ def test_only_open_tables_are_printed(study, browse, tmp_path):
         page.write_text(text.replace("<details>", tag), encoding="utf-8")
         browse(page, f"--print-to-pdf={printed}")
         contents[name] = printed.read_bytes()
-    assert len(re.findall(rb"/Type /Page\b", contents["closed"])) <= 6
+    assert len(re.findall(rb"/Type /Page\b", contents["closed"])) <= 8
     link = b"data:text/csv"  # above each printed table
     assert link in contents["open"]
     assert link not in contents["closed"]
@@ -250,7 +280,9 @@ def test_report_works_in_a_browser(study, browse, tmp_path):
     moves = """<script>
       const noted = {};
       const note = (name) => { noted[name] = [element("map-0").src, element("surface-view").toDataURL(),
-                                              element("map-caption-0").textContent]; };
+                                              element("map-caption-0").textContent,
+                                              element("slopes-0").getAttribute("points"),
+                                              element("signature-0").textContent]; };
       note("before");
       element("axis-0-1").value = 0;
       element("axis-0-1").dispatchEvent(new Event("input"));
