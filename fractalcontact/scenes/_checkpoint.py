@@ -26,9 +26,8 @@ from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.netcdf import clear_partial, written_whole
 from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
-from fractalcontact.scenes._inputs import contact_options, locate, slip_options
+from fractalcontact.scenes._inputs import crack_options, locate
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._stages import PARTIAL_SLIP
 
 if TYPE_CHECKING:
     from fractalcontact.scenes._stages import Stage
@@ -190,28 +189,20 @@ def with_seeds(scene: Scene, store: PartStore) -> Scene:
 
 def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tuple[str, ...]) -> str:
     """Return a digest of all that can change the result of a stage, and of nothing else."""
-    subpackage, _, name = stage.name.partition("/")
+    row = stage.row
     facts: dict[str, Any] = {
         "version": fractalcontact.__version__,
         "keep": [word for word in stage.keep if word not in dropped],
+        "options": row.options(scene, row),
     }
-    if subpackage == "surfaces" or name == "faces":
-        facts["surface"] = table = scene.table("upper" if name == "faces" else "surface")
+    if row.takes == "file":
+        facts["surface"] = table = scene.table("surface" if stage.name == "surfaces" else "upper")
+        facts["register"] = scene.joint.register, scene.joint.turn_upper
         if "read" in table:
             file = locate(table["read"], scene.folder)
             facts["file"] = hashlib.sha256(file.read_bytes()).hexdigest()
-    if subpackage == "joints":
-        facts["material"] = scene.table("material")
-        joint = scene.table("joint")
-        facts["joint"] = {key: joint[key] for key in joint if not isinstance(joint[key], dict) or key == name}
-    if subpackage == "dimensions":
-        facts["dimensions"] = [scene.table("dimensions"), scene.wanted("dimensions")]
-    if subpackage == "contact":
-        facts["contact"] = contact_options(scene)
-    if stage.name == PARTIAL_SLIP:
-        facts["contact"] = slip_options(scene)
-    if subpackage == "domains":
-        facts["domains"] = scene.table("domains").get(name, {})
+    if row.takes == "crack":
+        facts["crack"] = crack_options(scene, row)
     facts["needs"] = [digests[need] for need in stage.needs]
     return _hash([stage.name, facts])
 

@@ -16,17 +16,14 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.units import quantity_text
+from fractalcontact.scenes._functions import parameters_of, public_function
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
-from fractalcontact.scenes._stages import ONE_LOAD, PARTIAL_SLIP, STAGES, public_function
+from fractalcontact.scenes._stage_type import StageType, stage_options
 
 if TYPE_CHECKING:
     import xarray as xr
 
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
-# stages of a joint that solve a contact
-PRESSING = ("closure", "elimination", "area_dimension", "elastic_dilatancy", "self_weight", "direct_shear")
-# what a criterion calls the basic friction angle of the material; there is no residual one in a scene
-FRICTION_ANGLE = {"strength_envelope": "basic_friction_angle", "shear_curve": "residual_friction_angle"}
 
 
 def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None = None) -> xr.DataArray:
@@ -164,8 +161,15 @@ def _bodies(material: MaterialTable) -> tuple[float, float, float, float]:
     return float(young[0]), float(poisson[0]), float(young[1]), float(poisson[1])
 
 
-def contact_options(scene: Scene) -> dict[str, Any]:
+def dimension_options(scene: Scene, row: StageType) -> dict[str, Any]:
+    """Return the arguments of `estimate`: the wanted methods, and those of `[dimensions]`."""
+    del row
+    return {"methods": list(scene.want.dimensions), **scene.table("dimensions")}
+
+
+def contact_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
     """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
+    del row
     table, material = scene.table("contact"), scene.material
     options = {key: value for key, value in table.items() if not isinstance(value, dict)}
     if "contact_modulus" not in options and material.young is not None and material.poisson is not None:
@@ -175,10 +179,10 @@ def contact_options(scene: Scene) -> dict[str, Any]:
     return options
 
 
-def slip_options(scene: Scene) -> dict[str, Any]:
+def slip_options(scene: Scene, row: StageType) -> dict[str, Any]:
     """Return the arguments of `partial_slip`: its own, those of `[contact]`, then those of the material."""
-    options, material = scene.stage_options(STAGES[PARTIAL_SLIP]), scene.material
-    own = scene.table("contact").get(PARTIAL_SLIP, {})
+    options, material = stage_options(scene, row), scene.material
+    own = scene.table("contact").get(row.name, {})
     if any(key in own for key in LOADS):  # a load of its own replaces that of the load path
         options = {key: value for key, value in options.items() if key not in LOADS or key in own}
     pressed = contact_options(scene)
@@ -195,34 +199,35 @@ def slip_options(scene: Scene) -> dict[str, Any]:
     return options
 
 
-def crack_options(scene: Scene, name: str = "") -> dict[str, Any]:
+def crack_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
     """Return the arguments of `Crack` but for the surfaces; a stage may have a block of its own."""
     material = scene.material
+    own = {} if row is None else scene.joint.stages.get(row.word, {})
     options = {
         "young": material.young,
         "poisson": material.poisson,
         "basic_friction_angle": material.basic_friction_angle,
-        "block": scene.joint.stages.get(name, {}).get("block", scene.joint.block),
+        "block": own.get("block", scene.joint.block),
     }
     return {key: value for key, value in options.items() if value is not None}
 
 
-def joint_options(scene: Scene, name: str) -> dict[str, Any]:
+def joint_options(scene: Scene, row: StageType) -> dict[str, Any]:
     """Return the arguments of a stage of the joint but for its crack."""
-    stage = STAGES[f"joints/{name}"]
-    options = scene.stage_options(stage)
-    options.pop("block", None)  # an argument of the crack
-    loads = scene.joint.loads(name, [key for key in LOADS if key in stage.arguments()])
-    if name in ONE_LOAD and loads:
-        load = loads[0]
-        options = {key: value for key, value in options.items() if key not in LOADS or key == load}
-    if name == "elimination":
-        options["method"] = name
-    if name == "friction" and "nominal_pressure" not in scene.joint.stages.get(name, {}):
-        options.pop("nominal_pressure", None)  # in [joint] it is the load of the closure
-    if name in FRICTION_ANGLE and scene.material.basic_friction_angle is not None:
-        options.setdefault(FRICTION_ANGLE[name], scene.material.basic_friction_angle)
-    has_hardness = name in PRESSING and "hardness" in stage.arguments()
-    if has_hardness and scene.material.hardness is not None:
-        options.setdefault("hardness", scene.material.hardness)
-    return options
+    own = scene.joint.stages.get(row.word, {})
+    options = {
+        key: value
+        for key, value in stage_options(scene, row).items()
+        if key != "block" and (key not in row.own or key in own)
+    }
+    loads = scene.joint.loads(row.word, [key for key in LOADS if key in row.arguments()])
+    if row.one_load and loads:
+        options = {key: value for key, value in options.items() if key not in LOADS or key == loads[0]}
+    angle, hardness = scene.material.basic_friction_angle, scene.material.hardness
+    if row.friction_angle and angle is not None:
+        options.setdefault(row.friction_angle, angle)
+    if "hardness" in row.arguments() and hardness is not None:
+        options.setdefault("hardness", hardness)
+    if "direction" in row.splits:
+        options.setdefault("direction", parameters_of(row.function)["direction"].default)
+    return {**options, **row.fixed}

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
+from fractalcontact.scenes._functions import arguments_of, public_function
 from fractalcontact.scenes._scene import PLANES, WANT_KEYS, MaterialTable
 from fractalcontact.scenes._scene_file import (
     COMPASS,
@@ -28,8 +29,6 @@ from fractalcontact.scenes._stages import (
     PARTIAL_SLIP,
     STAGES,
     WANTED,
-    arguments_of,
-    public_function,
 )
 
 Schema = dict[str, Any]

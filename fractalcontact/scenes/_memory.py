@@ -14,23 +14,10 @@ import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memory
-from fractalcontact.scenes._inputs import (
-    block_shape,
-    contact_options,
-    generator_options,
-    joint_options,
-    slip_options,
-    surface_grid,
-)
+from fractalcontact.scenes._functions import arguments_of, public_function
+from fractalcontact.scenes._inputs import block_shape, generator_options, surface_grid
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stages import (
-    FIGURES,
-    PARTIAL_SLIP,
-    Stage,
-    arguments_of,
-    public_function,
-    section_length,
-)
+from fractalcontact.scenes._stages import FIGURES, Stage, section_length
 
 # bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
 STARTED = 1.2e8
@@ -55,22 +42,21 @@ def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
     loaded: set[str] = set()
     peaks = {}
     for stage in stages:
-        loaded.add("contact" if stage.name == PARTIAL_SLIP else stage.name.partition("/")[0])
+        loaded.add(stage.row.subpackage)
         libraries = _libraries(loaded)
         if stage.name == FIGURES:
             peaks[stage.name] = libraries + held + 24.0 * surface.cells
             continue
-        on_surface = stage.row.takes_surface or not stage.name.startswith("joints/")
-        on_surface = on_surface and not (stage.reads_map and not scene.is_pressed)
-        plane = surface if on_surface else block
         if stage.name == "surfaces":
             peaks[stage.name] = libraries + max(held, _surface_memory(scene, surface))
             continue
-        options = _options(scene, stage)
+        takes = stage.row.takes
+        plane = surface if takes == "surface" or (takes == "map" and scene.is_pressed) else block
+        options = stage.row.call_options(scene, stage.keep)
         steps, shears = _count(options, LOADS), _count(options, ("shear",))
         section = section_length(steps, int(plane.cells), has_hardness="hardness" in options)
         planes = section if stage.reads_part else steps * shears if stage.reads_map else 1
-        call = _with_steps(options, section) | {"keep": stage.keep}
+        call = _with_steps(options, section)
         estimate = public_function(stage.row.function).memory  # type: ignore[attr-defined]
         working = bytes_on(estimate, Plane(plane.shape, plane.periodic, planes), call)
         maps = sum(map(map_bytes, stage.keep)) * plane.cells * steps * shears
@@ -95,7 +81,7 @@ def _libraries(loaded: set[str]) -> float:
     """Return the bytes of the libraries and kernels of these subpackages."""
     names = loaded & set(KERNELS) - ({"contact"} if "joints" in loaded else set())  # joints use the same
     compiled = COMPILER + sum(KERNELS[name] for name in names) if names else 0.0
-    return STARTED + compiled + (DRAWING if FIGURES in loaded else 0.0)
+    return STARTED + compiled + (DRAWING if "plotting" in loaded else 0.0)
 
 
 def _surface_memory(scene: Scene, plane: Plane) -> float:
@@ -106,17 +92,6 @@ def _surface_memory(scene: Scene, plane: Plane) -> float:
     function = public_function(f"surfaces.{table.generate}")
     members = int(generator_options(table).get("members") or 1)
     return bytes_on(function.memory, replace(plane, planes=members), {})  # type: ignore[attr-defined]
-
-
-def _options(scene: Scene, stage: Stage) -> dict[str, Any]:
-    """Return the arguments that the scene gives to the call of a stage."""
-    if stage.name == "contact":
-        return contact_options(scene)
-    if stage.name == PARTIAL_SLIP:
-        return slip_options(scene)
-    if stage.name.startswith("joints/") and stage.name != "joints/faces":
-        return joint_options(scene, stage.name.partition("/")[2])
-    return scene.stage_options(stage.row)
 
 
 def _count(options: dict[str, Any], names: Sequence[str]) -> int:

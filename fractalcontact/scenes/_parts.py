@@ -26,20 +26,15 @@ from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.results import provenance_of
 from fractalcontact.base.units import quantity_text
-from fractalcontact.scenes._inputs import (
-    contact_options,
-    crack_options,
-    joint_options,
-    read_surface,
-    slip_options,
-)
+from fractalcontact.scenes._functions import public_function
+from fractalcontact.scenes._inputs import crack_options, read_surface
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._stage_type import StageType
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
-    FROM_RESULTS,
-    PARTIAL_SLIP,
+    STAGES,
     Stage,
-    public_function,
+    only_describes_surface,
     section_length,
 )
 
@@ -162,47 +157,46 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
         return works[stage.needs[0]]
     if stage.reads_map:
         return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
-    subpackage, _, name = stage.name.partition("/")
+    row, options = stage.row, stage.row.call_options(scene, stage.keep)
     if stage.name == "surfaces":
         return StageWork((partial(_read_height, scene.surface, scene.folder),))
-    if subpackage == "surfaces":
-        surface = _measured(scene, results, replace(scene.surface, fill=False))
-        return StageWork((partial(call, stage.row.function, surface),))
-    if subpackage == "dimensions":
-        return _dimension_work(stage, scene, results)
-    if stage.name in ("contact", PARTIAL_SLIP):
-        height = _heights(results, "surfaces")
-        options = contact_options(scene) if stage.name == "contact" else slip_options(scene)
-        function = partial(call, stage.row.function, height, keep=stage.keep)
-        return _split(stage, function, options, height.size)
-    return _joint_work(name, stage, scene, results)
+    if row.takes == "file":
+        return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
+    if row.takes == "result":
+        return StageWork((partial(call, row.function, results[stage.needs[0]], **options),))
+    if row.takes == "surface":
+        surface = _prepared(row.subpackage, scene, results)
+        return _split(stage, partial(call, row.function, surface), options, surface.size)
+    if stage.name == "joints/delta_surface" and row.word not in scene.want.joints:
+        options["shear"] = np.max(options["shear"])  # the figures draw the last one
+    if stage.name == "joints/elastic_dilatancy":
+        options |= _pressed(scene, results, options)
+    crack = _crack(scene, results, row)
+    nodes = crack.layout.cells[0] * crack.layout.cells[1]
+    return _split(stage, partial(call, row.function, crack), options, nodes)
 
 
 def map_reader(stage: Stage, scene: Scene) -> MapReader:
     """Return the function of a map that a stage stands for."""
-    options = scene.stage_options(stage.row)
-    if stage.name == "domains/islands":
-        options["keep"] = stage.keep
-    return MapReader(stage.row.function, stage.row.reads, options)
+    return MapReader(stage.row.function, stage.row.reads, stage.row.call_options(scene, stage.keep))
 
 
 def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
     return as_dataset(read_surface(table, folder).rename("height"))
 
 
-def _dimension_work(stage: Stage, scene: Scene, results: Results) -> StageWork:
-    # spikes are removed for the contact alone: the roughness is that of the surface as it was scanned
-    # unless nothing is pressed
-    table = scene.surface if scene.roughness_only else replace(scene.surface, despike=False)
-    surface = _measured(scene, results, replace(table, fill=table.fill and not table.despike))
-    if stage.name != "dimensions":
-        return StageWork((partial(call, stage.row.function, surface),))
-    options, methods = dict(scene.table("dimensions")), list(scene.want.dimensions)
-    return StageWork((partial(call, stage.row.function, surface, methods, **options),))
+def _prepared(subpackage: str, scene: Scene, results: Results) -> xr.DataArray:
+    """Return the lower face as the functions of a subpackage take it: the roughness without what was filled.
 
-
-def _measured(scene: Scene, results: Results, table: SurfaceTable) -> xr.DataArray:
-    """Return the surface as another table prepares it; that of the contact where the tables are equal."""
+    Spikes are removed for the contact alone: the roughness is that of the surface as it was scanned, unless
+    nothing is pressed.
+    """
+    table = scene.surface
+    if subpackage == "surfaces":
+        table = replace(table, fill=False)
+    if subpackage == "dimensions":
+        despike = table.despike and only_describes_surface(scene)
+        table = replace(table, despike=despike, fill=table.fill and not despike)
     return _heights(results, "surfaces") if table == scene.surface else read_surface(table, scene.folder)
 
 
@@ -227,30 +221,12 @@ def _pieces(dim: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, 
     return [{load: path[start : start + length]} for start in range(0, len(path), length)]
 
 
-def _joint_work(name: str, stage: Stage, scene: Scene, results: Results) -> StageWork:
-    if name == "faces":
-        return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
-    options = joint_options(scene, name)
-    if stage.row.keeps or name == "elimination":  # which stores no maps
-        options["keep"] = stage.keep
-    if name in FROM_RESULTS:
-        return StageWork((partial(call, stage.row.function, results[stage.needs[0]], **options),))
-    if stage.row.takes_surface:
-        return StageWork((partial(call, stage.row.function, _heights(results, "surfaces"), **options),))
-    crack = _crack(scene, results, name)
-    if name == "delta_surface" and name not in scene.want.joints:
-        options["shear"] = np.max(options["shear"])  # the figures draw the last one
-    if name == "elastic_dilatancy":
-        options = {"direction": ("E", "N", "W", "S")} | options | _pressed(scene, results, options)
-    nodes = crack.layout.cells[0] * crack.layout.cells[1]
-    return _split(stage, partial(call, stage.row.function, crack), options, nodes)
-
-
 def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
     """Return the closure as the argument `pressed` of the elastic dilatancy, where both press alike."""
     if "joints/closure" not in results:
         return {}
-    of_closure, free = joint_options(scene, "closure"), (*LOADS, "shear", "direction")
+    row = STAGES["joints/closure"]
+    of_closure, free = row.options(scene, row), (*LOADS, "shear", "direction", "keep")
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
     alike = own == other and "hardness" not in own and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
@@ -282,11 +258,11 @@ def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
     return faces.assign_attrs(preparation=prepared) if prepared else faces
 
 
-def _crack(scene: Scene, results: Results, name: str) -> Crack:
+def _crack(scene: Scene, results: Results, row: StageType) -> Crack:
     from fractalcontact import joints
 
     upper = _heights(results, "joints/faces") if "joints/faces" in results else None
-    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene, name))
+    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene, row))
 
 
 def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:

@@ -7,26 +7,21 @@ from dataclasses import dataclass, field
 
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import NONE, Problems, Words
-from fractalcontact.scenes._inputs import FRICTION_ANGLE, joint_options
 from fractalcontact.scenes._memory import stage_memory
 from fractalcontact.scenes._scene import LOADS, Scene
+from fractalcontact.scenes._stage_type import StageType, stage_options
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
     CURVES,
     FIGURES,
     ISLAND_MAP,
-    ONE_DIRECTION,
-    ONE_LOAD,
     PARTIAL_SLIP,
     READ_THE_GAP,
     STAGES,
     Stage,
-    StageType,
-    arguments_of,
 )
 
 WITH_MEMORY = 80  # characters of a screen that holds the table with its column of memory
-STRENGTH = ("direct_shear", "shear_curve", "strength_envelope")
 
 
 @dataclass(frozen=True)
@@ -59,7 +54,7 @@ class Plan:
         """Return a table: stage, stages it needs, reason, and peak memory where the screen is wide enough."""
         rows: list[tuple[str, ...]] = [("stage", "needs", "reason", "peak memory")]
         for stage in self:
-            needs = "all stored results" if stage.name == FIGURES else ", ".join(stage.needs)
+            needs = "all stored results" if stage.row.takes == "study" else ", ".join(stage.needs)
             name = stage.name + ("" if stage.stored else " (not stored)")
             peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
             rows.append((name, needs, stage.reason, peak))
@@ -108,7 +103,7 @@ def stages_of(scene: Scene) -> tuple[Stage, ...]:
             reasons[name],
             keep=_kept_maps(scene, row),
             stored=name != "surfaces" or reasons[name] != "input",
-            whole_path=row.whole_path or "total_stress" in scene.stage_options(row, ("total_stress",)),
+            whole_path=row.whole_path or "total_stress" in stage_options(scene, row, ("total_stress",)),
         )
         for name, row in STAGES.items()
         if name in reasons
@@ -155,7 +150,7 @@ def _joint_reasons(scene: Scene) -> dict[str, str]:
         reasons.setdefault("closure", "closure_laws needs it")
     if "friction" in reasons and "elastic_dilatancy" not in reasons:
         reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
-    if scene.want.figures and reasons and scene.stage_options(STAGES["joints/delta_surface"], ("shear",)):
+    if scene.want.figures and reasons and stage_options(scene, STAGES["joints/delta_surface"], ("shear",)):
         reasons.setdefault("delta_surface", "figures are wanted")
     if reasons and scene.upper is not None:
         registered = " and registered" if scene.joint.register else ""
@@ -189,36 +184,22 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     return tuple(maps)
 
 
-def _check_strength(scene: Scene, stage: Stage, problems: Problems) -> None:
-    """Note the arguments that a stage of the strength of the joint needs and the scene does not give."""
-    name = stage.name.partition("/")[2]
-    given = set(joint_options(scene, name))
-    needed = arguments_of(stage.row.function)[1] | set(
-        FRICTION_ANGLE.get(name, ()) and [FRICTION_ANGLE[name]]
-    )
-    for key in sorted(needed - given):
-        table = "material" if key == FRICTION_ANGLE.get(name) else f"joint.{name}"
-        word = "basic_friction_angle" if table == "material" else key
-        problems.add(f"{table}.{word}", f"a value for {name}", NONE)
-
-
 def check_loads(scene: Scene, problems: Problems) -> None:
     """Note what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
     for stage in stages_of(scene):
-        name = stage.name.partition("/")[2]
-        if not stage.name.startswith("joints/") or name == "faces":
+        if stage.row.group != "joints" or stage.row.takes == "file":
             continue
-        options = scene.stage_options(stage.row)
-        for key in () if name in STRENGTH else stage.row.required():
-            problems.require(key in options, f"joint.{key}", f"a value for {name} ({stage.reason})", NONE)
-        if name == "elastic_dilatancy" and "normal_force" not in options:
-            problems.add("joint.normal_force", f"a value for {name}", NONE)
-        if name in STRENGTH:
-            _check_strength(scene, stage, problems)
+        row, name = stage.row, stage.row.word
+        options = row.options(scene, row) | stage_options(scene, row)
+        for key in row.needed():
+            place = "joint" if key in (*LOADS, "shear", "block") else row.table
+            problems.require(key in options, f"{place}.{key}", f"a value for {name} ({stage.reason})", NONE)
+        if row.friction_angle and row.friction_angle not in options:
+            problems.add("material.basic_friction_angle", f"a value for {name} ({stage.reason})", NONE)
         direction = options.get("direction", "E")
-        if name in (*ONE_DIRECTION, *STRENGTH) and isinstance(direction, list):
+        if row.one_direction and isinstance(direction, list):
             problems.add("joint.direction", f"one direction for {name}", direction)
-        allowed = [key for key in LOADS if key in stage.row.arguments()]
-        if name in ONE_LOAD and len(loads := scene.joint.loads(name, allowed)) != 1:
+        allowed = [key for key in LOADS if key in row.arguments()]
+        if row.one_load and len(loads := scene.joint.loads(name, allowed)) != 1:
             expected = f"one of a {', '.join(allowed[:-1])} or {allowed[-1]} ({stage.reason})"
             problems.add(f"joint.{name}", expected, Words(", ".join(loads)) or NONE)

@@ -12,6 +12,7 @@ from fractalcontact.base.errors import ScaleWarning
 from fractalcontact.base.grid import distinct
 from fractalcontact.scenes._inputs import contact_modulus, contact_options, spacing_of
 from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stage_type import stage_options
 from fractalcontact.scenes._stages import STAGES
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
         block = edges if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
         for name in stages:
-            loads = scene.stage_options(STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
+            loads = stage_options(scene, STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
             yield from _high_pressures(f"joint.{name}", loads, area, modulus)
 
 

@@ -25,8 +25,8 @@ from fractalcontact.base.provenance import (
 )
 from fractalcontact.base.results import provenance_of
 from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._parts import concatenate
-from fractalcontact.scenes._stages import public_function
 
 WHERE = "fractalcontact.scenes.reproduce"
 PACKAGE = "fractalcontact"

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.tables import html_table
-from fractalcontact.scenes._stages import DATASHEET, PRESS, StageType
 
 Table = Mapping[str, Any]
 SHOWN = 6  # values of a list that are shown in full
 OF_SURFACE = "surface"  # plane of an upper face: plane and cells of the table [surface]
 PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 LOADS = ("closure", "normal_force", "nominal_pressure")
+PRESS = "press"
+# what the datasheet of a joint shows at least
+DATASHEET = (
+    "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "closure_laws",
+    "transmissivity",
+)  # fmt: skip
 
 
 def _number(**bounds: float) -> Any:
@@ -199,33 +204,12 @@ class Scene:
         """Whether the surface is pressed along a load path, which the domains then analyse."""
         return PRESS in self.wanted("contact")
 
-    @property
-    def roughness_only(self) -> bool:
-        """Whether the study presses nothing, and describes the surface alone."""
-        of_surface = ("roughness_coefficient", "directional_roughness", "strength_envelope", "shear_curve")
-        return not (self.want.contact or self.want.domains or set(self.want.joints) - set(of_surface))
-
     def wanted(self, subpackage: str) -> tuple[str, ...]:
         """Return the words that `[want]` gives for a subpackage."""
         words = self.table("want").get(subpackage, ())
         return (
             (words,) if isinstance(words, str) else tuple(words) if isinstance(words, (list, tuple)) else ()
         )
-
-    def stage_options(self, stage: StageType, keys: Iterable[str] | None = None) -> dict[str, Any]:
-        """Return the arguments that the scene gives to a stage.
-
-        Those of its own table (`[joint.closure]`) come before those of the whole table (`[joint]`).
-        """
-        name, _, word = stage.table.partition(".")
-        table = self.table(name)
-        # a stage may have the name of an argument ([joint.closure]), so sub-tables are not values; the block
-        # of a joint is that of its crack, and only one in the table of a stage is an argument
-        options = {k: value for k, value in table.items() if not isinstance(value, dict) and k != "block"}
-        own = table.get(word)
-        options |= own if isinstance(own, dict) else {}
-        allowed = stage.arguments() if keys is None else tuple(keys)
-        return {key: options[key] for key in allowed if key in options}
 
 
 def _short(value: Any) -> str:

@@ -17,7 +17,8 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
-from fractalcontact.scenes._plan import check_loads
+from fractalcontact.scenes._functions import arguments_of
+from fractalcontact.scenes._plan import check_loads, stages_of
 from fractalcontact.scenes._scene import (
     LOADS,
     MATERIAL_KEYS,
@@ -27,13 +28,13 @@ from fractalcontact.scenes._scene import (
     Scene,
     Table,
 )
+from fractalcontact.scenes._stage_type import stage_options
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,
     JOINT_STAGES,
     PARTIAL_SLIP,
     STAGES,
     WANTED,
-    arguments_of,
 )
 
 GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
@@ -88,7 +89,6 @@ SYMBOLS = {
     "h": "hurst",
 }
 PAIRS = ("young", "poisson")  # one value, or that of each body
-RIGID = ("delta_surface", "delta_dimension", "rigid_dilatancy", "decorrelation_length")
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
@@ -363,16 +363,10 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     _check_partial_slip(scene, problems)
     contact, material = scene.table("contact"), scene.table("material")
-    rigid = set(RIGID)
-    if "elastic_dilatancy" not in scene.want.joints:
-        rigid.add("friction")  # that of the rigid dilatancy
-    if not {"young", "poisson"} & set(material):
-        rigid.add("self_weight")
-    deforms = any(
-        name in JOINT_STAGES and name not in rigid and not STAGES[f"joints/{name}"].takes_surface
-        for name in scene.want.joints
-    )
-    if deforms or (scene.wanted("domains") and not scene.is_pressed):
+    # the block falls on rigid faces where the material has no elastic constants
+    rigid = set() if {"young", "poisson"} & set(material) else {"joints/self_weight"}
+    planned = [stage.row for stage in stages_of(scene) if stage.name not in rigid]
+    if any(row.presses and row.takes == "crack" for row in planned):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     if scene.wanted("contact"):
@@ -394,7 +388,7 @@ def _check_partial_slip(scene: Scene, problems: Problems) -> None:
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
     if not wanted[0]:
         return
-    options, own = scene.stage_options(row), scene.table("contact").get(PARTIAL_SLIP, {})
+    options, own = stage_options(scene, row), scene.table("contact").get(PARTIAL_SLIP, {})
     for key, source in (
         ("tangential_force", ""),
         ("poisson", "poisson"),

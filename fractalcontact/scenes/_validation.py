@@ -6,7 +6,6 @@ function that it will call is given the arguments of that call.
 
 from __future__ import annotations
 
-import inspect
 import math
 import os
 from collections.abc import Iterator, Sequence
@@ -23,34 +22,25 @@ from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._functions import arguments_of, parameters_of, public_function
 from fractalcontact.scenes._inputs import (
-    PRESSING,
     block_shape,
-    contact_options,
     crack_options,
     generator_options,
-    joint_options,
     read_surface,
-    slip_options,
     spacing_of,
 )
-from fractalcontact.scenes._parts import map_reader
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
-from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
+from fractalcontact.scenes._stage_type import StageType
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,
-    FIGURES,
-    FROM_RESULTS,
     JOINT_STAGES,
-    PARTIAL_SLIP,
-    PRESS,
     STAGES,
     WANTED,
     Stage,
-    arguments_of,
-    public_function,
 )
 
 if TYPE_CHECKING:
@@ -200,7 +190,7 @@ def _zeros(
 def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> Crack | None:
     """Return the crack of the scene, None without one; its shears must not push the block off its face."""
     joint_presses = bool(scene.want.domains) and not scene.is_pressed
-    slides = any(not STAGES[f"joints/{name}"].takes_surface for name in scene.want.joints)
+    slides = any(STAGES[f"joints/{name}"].takes != "surface" for name in scene.want.joints)
     if not (slides or joint_presses) or not _is_valid(problems, "material", "joint.block"):
         return None
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
@@ -209,27 +199,35 @@ def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Prob
     with problems.collect("joint: "):
         crack = _crack(scene, surfaces)
         for stage in stages_of(scene):
-            name = stage.name.partition("/")[2]
-            if stage.name.startswith("joints/") and name in JOINT_STAGES:
-                options = scene.stage_options(stage.row, ("shear", "direction"))
-                keys = [f"joint{part}.{key}" for part in ("", f".{name}") for key in options]
-                if "shear" in options and _is_valid(problems, *keys):
-                    own = name == "elimination" and _is_valid(problems, "joint.elimination.block")
-                    sliding = _crack(scene, surfaces, name) if own else crack
-                    _validate_travel(sliding, options, stage, problems)
+            tables = ("joint", stage.row.table)
+            keys = [f"{table}.{key}" for table in tables for key in ("shear", "direction")]
+            if stage.row.takes == "crack" and _is_valid(problems, *keys):
+                sliding = _own_crack(scene, surfaces, crack, stage.row, problems)
+                _validate_travel(sliding, stage, scene, problems)
     return crack
 
 
-def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], name: str = "") -> Crack:
+def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], row: StageType | None = None) -> Crack:
     """Return the crack of the scene, or that of a stage with a block of its own."""
     faces = surfaces["surface"], surfaces.get("upper")
-    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, name))
+    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, row))
     return crack
 
 
-def _validate_travel(crack: Crack, options: dict[str, Any], stage: Stage, problems: Problems) -> None:
-    default = ("E", "N", "W", "S") if stage.name.endswith("dilatancy") else "E"
-    directions = options.get("direction", default)
+def _own_crack(
+    scene: Scene, surfaces: dict[str, xr.DataArray], crack: Any, row: StageType, problems: Problems
+) -> Any:
+    """Return the crack of a stage: that of the scene unless the stage has a valid block of its own."""
+    has_own = crack is not None and "block" in scene.joint.stages.get(row.word, {})
+    valid = has_own and _is_valid(problems, f"{row.table}.block")
+    return _crack(scene, surfaces, row) if valid else crack
+
+
+def _validate_travel(crack: Crack, stage: Stage, scene: Scene, problems: Problems) -> None:
+    options = stage.row.options(scene, stage.row)
+    if "shear" not in options:
+        return
+    directions = options.get("direction", parameters_of(stage.row.function)["direction"].default)
     longest = float(np.max(options["shear"]))
     for direction in directions if isinstance(directions, (list, tuple)) else [directions]:
         travel = crack.travel(direction)
@@ -245,50 +243,24 @@ def _validate_calls(
     # which loads are possible depends on the heights
     is_flat = surface is not None and _flat_surface(scene.surface) is not None
     for stage in stages_of(scene):
-        if stage.name == FIGURES:
+        row, subject = stage.row, surface
+        if row.takes in ("file", "result", "study") or (is_flat and row.presses):
             continue
-        name = stage.name.partition("/")[2]
-        tables = (stage.row.table, stage.row.table.partition(".")[0])
-        with _collected(problems, stage.name, *tables):
-            if stage.name == "dimensions":
-                options = scene.stage_options(stage.row) | {"methods": list(scene.want.dimensions)}
-                _validate_call(stage.row.function, surface, **options)
-            elif stage.name == "contact" and not is_flat:
-                options = _contact_options(scene)
-                _validate_call(stage.row.function, surface, keep=stage.keep, **options)
-            elif stage.name == PARTIAL_SLIP and not is_flat:
-                options = {"contact_modulus": None} | slip_options(scene)
-                _validate_call(stage.row.function, surface, keep=stage.keep, **options)
-            elif stage.reads_map:
-                reader, maps = map_reader(stage, scene), None
-                if reader.variable == "gap" and crack is not None:
-                    maps = _empty_gap(scene, crack)
-                elif surface is not None and (scene.is_pressed or crack is not None):
-                    maps = _empty_maps(scene, surface)
-                _validate_call(reader.function, maps, **reader.options)
-            elif stage.name.startswith("joints/") and name in JOINT_STAGES and name not in FROM_RESULTS:
-                if stage.row.takes_surface:
-                    _validate_call(stage.row.function, surface, **joint_options(scene, name))
-                    continue
-                if scene.joint.register is True or (is_flat and name in PRESSING):
-                    continue
-                own = name == "elimination" and crack is not None
-                own = own and _is_valid(problems, "joint.elimination.block")
-                pressed = _crack(scene, surfaces, name) if own else crack
-                options = joint_options(scene, name) | ({"keep": stage.keep} if stage.row.keeps else {})
-                _validate_call(stage.row.function, pressed, **options)
-
-
-def _contact_options(scene: Scene) -> dict[str, Any]:
-    """Return the known arguments of the press; the modulus is open where the material is not valid."""
-    allowed = arguments_of("contact.press")[0]
-    options = {key: value for key, value in contact_options(scene).items() if key in allowed}
-    return {"contact_modulus": None} | options
+        if row.takes == "crack" and scene.joint.register:
+            continue
+        with _collected(problems, stage.name, row.table, row.table.partition(".")[0]):
+            if row.takes == "crack":
+                subject = _own_crack(scene, surfaces, crack, row, problems)
+            elif row.takes == "map":
+                subject = _empty_maps(scene, surface, crack, row)
+            _validate_call(row.function, subject, **row.call_options(scene, stage.keep))
 
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
     """Validate a call that has all arguments it needs; what is missing was noted before."""
-    known = inspect.signature(public_function(name)).parameters  # an unknown key was noted before
+    known = parameters_of(name)  # an unknown key was noted before
+    if "contact_modulus" in known:
+        options.setdefault("contact_modulus", None)  # of a material that is not valid
     options = {key: value for key, value in options.items() if key in known}
     others = list(known.values())[len(arguments) :]
     if all(each.name in options for each in others if each.default is each.empty):
@@ -300,15 +272,22 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
     rows, columns = crack.layout.slices
     block = crack.lower.isel(y=rows, x=columns)
     gap = block.copy(data=np.broadcast_to(0.0, block.shape))
-    options = joint_options(scene, "closure")
+    row = STAGES["joints/closure"]
+    options = row.options(scene, row)
     path = next((real_numbers(options[key]) for key in LOADS if key in options), None)
     if path is None or path.ndim > 1:  # a problem of the closure, which is listed there
         path = np.zeros(1)
     return gap.expand_dims(step=path.size).assign_coords(nominal_pressure=("step", path.astype(float)))
 
 
-def _empty_maps(scene: Scene, surface: xr.DataArray) -> xr.DataArray:
+def _empty_maps(
+    scene: Scene, surface: xr.DataArray | None, crack: Crack | None, row: StageType
+) -> xr.DataArray | None:
     """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
+    if row.reads == "gap" and crack is not None:
+        return _empty_gap(scene, crack)
+    if surface is None or not (scene.is_pressed or crack is not None):
+        return None
     spacing, shape = spacing_of(surface), (surface.sizes["y"], surface.sizes["x"])
     cells = shape if scene.is_pressed else block_shape(scene, shape, spacing)
     is_surface = scene.is_pressed or scene.joint.block is None

@@ -126,7 +126,7 @@ def test_finished_parts_are_kept(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("tangential_force = [0.0, 4.0, -4.0]", "", "joint.tangential_force"),
+        ("tangential_force = [0.0, 4.0, -4.0]", "", "joint.partial_slip.tangential_force"),
         ("tangential_force = [0.0, 4.0, -4.0]", "tangential_force = 9.0", "where sliding begins"),
         ("tangential_force = { start", "tangential_farce = { start", "tangential_force"),
         ("basic_friction_angle = 35", "", "contact.partial_slip.friction_coefficient"),

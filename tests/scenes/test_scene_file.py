@@ -256,7 +256,7 @@ def test_press_takes_its_modulus_from_the_material(write):
         (
             "self_weight",
             "",
-            "joint.structure_size: expected a value(?s:.*)joint.unit_weight: expected a value",
+            "joint.self_weight.structure_size: expected(?s:.*)joint.self_weight.unit_weight: expected",
         ),
         ("self_weight", "[joint.self_weight]\nstructure_size = 0.0\nunit_weight = 1.0", "structure_size"),
         ("area_dimension", "[joint.area_dimension]\nclosure = 1e-6", "joint.area_dimension.closure"),

@@ -104,7 +104,7 @@ def test_a_balance_that_fails_is_reported(scene, total, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("upstream_pressure = 5e5", "", "joint.upstream_pressure: expected a value for uplift"),
+        ("upstream_pressure = 5e5", "", "joint.uplift.upstream_pressure: expected a value for uplift"),
         ("upstream_pressure = 5e5", "upstream_presure = 5e5", "did you mean 'upstream_pressure'"),
         ("[[3e-3, 2e-3]]", "[[3e-1, 2e-3]]", "inside the plane"),
         ("[[3e-3, 2e-3]]", "[[3e-3, 2e-3]]\nupstream = 'WE'", "upstream: expected 'W'"),
