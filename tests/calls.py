@@ -302,6 +302,7 @@ CALLS = {
     "plotting.box_dimension": lambda: {"result": boxes()},
     "plotting.signature": lambda: {"result": boxes()},
     "plotting.first_contact": lambda: {"result": pressed()},
+    "plotting.alluvial": lambda: {"result": result_of("domains.lineage")},
     "plotting.lineage": lambda: {"result": result_of("domains.evolution")},
     "plotting.hydraulic_aperture": lambda: {"result": flow()},
     "plotting.uplift": lambda: {"result": watered()},

@@ -564,6 +564,8 @@ QUANTITIES: dict[str, Quantity] = {
     "island_before": Quantity("1", "number of the island before, 0 if there is none"),
     "island_after": Quantity("1", "number of the island after, 0 if there is none"),
     "common_cells": Quantity("1", "number of cells that both islands share"),
+    "cells_before": Quantity("1", "number of cells of the island before, 0 if there is none"),
+    "cells_after": Quantity("1", "number of cells of the island after, 0 if there is none"),
     "event": Quantity("1", "event in the history of the island", _EVENT),
     # accuracy
     "error": Quantity("1", "true error"),

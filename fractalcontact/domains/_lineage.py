@@ -89,8 +89,8 @@ def lineage(
     -------
     Dataset
         Over `link`, one row for each pair of islands that overlap, each birth and each death:
-        `island_before` and `island_after`, the numbers of `islands` (0: none); `common_cells`; `event` (int8
-        flags): continuation, birth, death, merge (the island after overlaps several before), split (the
+        `island_before` and `island_after`, the numbers of `islands` (0: none); `common_cells`; the sizes of
+        both islands, `cells_before` and `cells_after`; `event` (int8 flags): continuation, birth, death, merge (the island after overlaps several before), split (the
         island before overlaps several after), or merge_and_split. The coordinates `link_<dim>` give, for
         every leading dim, the later of the two states.
 
@@ -192,6 +192,8 @@ class Overlaps:
     cells: Array
     ancestors: Array  # number of islands before that each island after overlaps
     heirs: Array  # number of islands after that each island before overlaps
+    sizes_before: Array  # cells of each island before
+    sizes_after: Array
 
     @property
     def event_counts(self) -> dict[str, int]:
@@ -220,7 +222,7 @@ def island_overlaps(before: Components, after: Components, moved: Array | None =
     island_before, island_after = codes // (after_count + 1), codes % (after_count + 1)
     ancestors = np.bincount(island_after, minlength=after_count + 1)[1:]
     heirs = np.bincount(island_before, minlength=before_count + 1)[1:]
-    return Overlaps(island_before, island_after, cells, ancestors, heirs)
+    return Overlaps(island_before, island_after, cells, ancestors, heirs, before.sizes, after.sizes)
 
 
 def event_table(overlaps: Overlaps) -> dict[str, Array]:
@@ -230,9 +232,13 @@ def event_table(overlaps: Overlaps) -> dict[str, Array]:
     splits = overlaps.heirs[overlaps.before - 1] > 1
     event = np.select([merges & splits, merges, splits], [MERGE_AND_SPLIT, MERGE, SPLIT], CONTINUATION)
     zero_born, zero_dead = np.zeros(born.size, np.int64), np.zeros(dead.size, np.int64)
+    before = np.concatenate([overlaps.before, zero_born, dead])
+    after = np.concatenate([overlaps.after, born, zero_dead])
     return {
-        "island_before": np.concatenate([overlaps.before, zero_born, dead]),
-        "island_after": np.concatenate([overlaps.after, born, zero_dead]),
+        "island_before": before,
+        "island_after": after,
         "common_cells": np.concatenate([overlaps.cells, zero_born, zero_dead]),
+        "cells_before": np.append(0, overlaps.sizes_before)[before],
+        "cells_after": np.append(0, overlaps.sizes_after)[after],
         "event": np.concatenate([event, zero_born + BIRTH, zero_dead + DEATH]).astype(np.int8),
     }

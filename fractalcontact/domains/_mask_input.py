@@ -315,7 +315,7 @@ def build_dataset(
     of_rows = _row_coords(planes, *rows) if rows else {}
     dataset = xr.Dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
     if not planes.grid.has_coordinates:  # lengths and areas are in cells
-        own = [name for name in dataset.variables if name not in leading]
+        own = [name for name in dataset.variables if name not in leading and name not in of_rows]
         for name in own:
             dataset.variables[name].attrs.update(in_cells(str(name)))
     for name, attributes in (notes or {}).items():

@@ -1,5 +1,6 @@
 from ._accuracy import error_against_time as error_against_time
 from ._accuracy import estimator_errors as estimator_errors
+from ._alluvial import alluvial as alluvial
 from ._box_dimension import box_dimension as box_dimension
 from ._closure import closure_laws as closure_laws
 from ._contact_curves import area_dimension as area_dimension
@@ -33,6 +34,7 @@ from ._surface import field as field
 from ._surface import surface as surface
 
 __all__ = [
+    "alluvial",
     "area_dimension",
     "box_dimension",
     "closure_laws",

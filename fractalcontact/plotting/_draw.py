@@ -16,6 +16,7 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems, writing
+from fractalcontact.plotting._alluvial import alluvial
 from fractalcontact.plotting._box_dimension import box_dimension
 from fractalcontact.plotting._closure import closure_laws
 from fractalcontact.plotting._contact_curves import area_dimension, contact_area, slip_loops
@@ -141,6 +142,7 @@ FIGURES = (
     Row("lacunarity_maps", "domains/lacunarity", "lacunarity", functools.partial(lacunarity, maps=True),
         ("step", "box_size")),
     Row("lineage", "domains/evolution", "births", lineage),
+    Row("alluvial", "domains/lineage", "common_cells", alluvial),
     Row("islands", "domains/islands", "label", islands),
     Row("delta_dimension", "joints/delta_dimension", "variogram_dimension", delta_dimension),
     Row("area_dimension", "joints/area_dimension", "resolution", area_dimension),

@@ -37,6 +37,9 @@ def test_lineage_of_a_small_path():
         (3, 1, 2, 2, "split"),
         (3, 2, 0, 0, "death"),
     ]
+    # every character of the rows stands for two cells
+    assert result.cells_before.values.tolist() == [2, 2, 2, 2, 4, 4, 12, 12, 2]
+    assert result.cells_after.values.tolist() == [2, 4, 4, 12, 12, 2, 4, 2, 0]
     births = fc.domains.lineage(as_mask(np.concatenate([0 * cells[:1], cells[:1]])))
     assert births.event.values.tolist() == [1, 1, 1]
     assert births.island_before.values.tolist() == [0, 0, 0]

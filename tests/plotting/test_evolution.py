@@ -80,6 +80,46 @@ def test_lineage_and_the_coalescence_load():
         plotting.lineage(result.drop_vars("births"))
 
 
+def test_alluvial_bars_are_islands_and_ribbons_what_they_share():
+    """Two islands grow together, a third one grows alone, a fourth is born."""
+    rows = ("#...##..##........", "##..###.##........", "#######.###...####")
+    cells = np.array([[[mark == "#" for mark in row]] for row in rows])
+    loads = {"normal_force": ("step", [1.0, 2.0, 4.0]), "step": [0, 1, 2]}
+    mask = label(xr.DataArray(cells.astype(np.int8), loads, ("step", "y", "x"), name="state"))
+    ax = plotting.alluvial(fc.domains.lineage(mask))
+    shapes = [path.vertices[:-1] for bars in ax.collections for path in bars.get_paths()]
+    bars = [shape for shape in shapes if len(shape) == 4]
+    heights = {place: [] for place in range(3)}
+    for bar in bars:
+        heights[round(bar[:, 0].mean())].append(np.ptp(bar[:, 1]))
+    assert [sorted(heights[place]) for place in range(3)] == [[1, 2, 2], [2, 2, 3], [3, 4, 7]]
+    ribbons = [shape for shape in shapes if len(shape) > 4]
+    widths = [(round(shape[0, 0]), shape[-1, 1] - shape[0, 1]) for shape in ribbons]
+    assert sorted(widths) == [(0, 1), (0, 2), (0, 2), (1, 2), (1, 2), (1, 3)]
+    first, middle, last = ax.collections[:3]
+    colours = [[tuple(colour) for colour in bars.get_facecolors()] for bars in (first, middle, last)]
+    assert colours[0][0] == colours[0][1] == colours[1][0] == colours[1][1] == colours[2][0]  # they merge
+    assert len({colours[0][2], *colours[2]}) == 3
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "4"]
+    render(ax)
+
+
+def test_alluvial_of_one_shear_and_of_nothing(measured):
+    rng = np.random.default_rng(1)
+    cells = rng.random((2, 3, 16, 16)) < np.array([0.1, 0.2, 0.3])[:, None, None]
+    coords = {"shear": [1e-4, 2e-4], "step": [0, 1, 2]}
+    mask = label(xr.DataArray(cells, coords, ("shear", "step", "y", "x"), name="state").astype(np.int8))
+    table = fc.domains.lineage(mask)
+    for shear, states in zip((1e-4, 2e-4), cells, strict=True):
+        ax = plotting.alluvial(table, shear=shear)
+        tops = [max(path.vertices[:, 1].max() for path in bars.get_paths()) for bars in ax.collections[:3]]
+        assert tops == states.sum((1, 2)).tolist()
+        assert (ax.get_xlabel(), ax.get_title(loc="left")[:3]) == ("step", "$v$")
+    empty = plotting.alluvial(fc.domains.lineage(mask * 0))
+    assert "no islands" in [text.get_text() for text in empty.texts]
+    render(empty)
+
+
 @pytest.fixture(scope="module")
 def measured():
     """The signature of two paths of random cells, and of discs."""

@@ -35,6 +35,12 @@ print(evolution)
 counts = fc.plotting.lineage(evolution)
 
 # %%
+# Which islands grow together: each of the 20 largest islands of the last load has a colour, and so have all
+# that it grew from.
+
+tree = fc.plotting.alluvial(fc.domains.lineage(pressed.isel(step=slice(0, 9))["state"]))
+
+# %%
 # The local dimension d(s) of all states over one axis in metres. Below the spot size (circle) a domain is a
 # plane, d = 2; beyond the gap size (square) every box meets it, and d is 2 again. Between the two d says how
 # the spots are placed: it is that of random spots of equal area, perimeter and number (dashed) where they are
