@@ -13,7 +13,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
 }  # fmt: skip
-SMALLEST = 0.5  # the largest value is at least this many of the shown units
+SMALLEST = 0.5  # the largest value is at least this many of the shown units (0.05 m2, 0.005 m3)
 PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -51,7 +51,8 @@ def scale_for(units: str, values: Any) -> Scale:
     largest = _largest(values)
     if largest == 0:
         return Scale(1.0, raise_exponents(units))
-    fitting = [e for e in PREFIXES if largest >= SMALLEST * 10.0 ** (e * power)]
+    smallest = SMALLEST * 0.1 ** (power - 1)  # 0.2 mm2, not 200 000 um2
+    fitting = [e for e in PREFIXES if largest >= smallest * 10.0 ** (e * power)]
     exponent = max(fitting) if fitting else min(PREFIXES)
     if units == "s":
         exponent = min(exponent, 0)

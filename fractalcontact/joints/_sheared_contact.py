@@ -178,7 +178,7 @@ class ShearedContact:
             pressed = solver.solve(
                 self.heights, pressing.grid, pressing.modulus, pressing.options, load, keep=keep
             )
-        scalars = SCALARS if pressing.options.hardness is None else (*SCALARS, "plastic_work")
+        scalars = [name for name in (*SCALARS, "plastic_work") if name in pressed.columns]
         columns = {name: pressed.columns[name] for name in scalars} | pressed.maps
         columns["rms_slope"] = np.array(self.rms_slope)
         # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
@@ -317,7 +317,6 @@ def check_pressed(problems: Problems, crack: Any, pressed: Any, *, keep: Any, **
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected, pressed):
         problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
-    problems.require(pressing["hardness"] is None, "pressed", "nothing with a hardness", pressed)
     problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
 
 
@@ -333,8 +332,11 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     steps = [np.flatnonzero(held == value) for value in load.values]
     if not all(found.size for found in steps):
         return None
+    if "plastic_work" in at_shear and not np.array_equal(held[: len(steps)], load.values):
+        return None  # what yielded depends on the path
     at_load = at_shear.isel(step=[int(found[0]) for found in steps])
     columns = {name: at_load[name].values for name in (*SCALARS, "bulk_closure", "interface_closure")}
+    columns |= {"plastic_work": at_load["plastic_work"].values} if "plastic_work" in at_load else {}
     return columns | {"rms_slope": at_load["rms_slope"].values}
 
 

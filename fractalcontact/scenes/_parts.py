@@ -228,7 +228,7 @@ def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict
     row = STAGES["joints/closure"]
     of_closure, free = row.options(scene, row), (*LOADS, "shear", "direction", "keep")
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
-    alike = own == other and "hardness" not in own and "normal_force" in of_closure
+    alike = own == other and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
 
 

@@ -343,7 +343,7 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield f"The peak friction angle {comment}.{strength}"
     elastic = group_of(tree, "joints/elastic_dilatancy")
     form = provenance_of(data).get("parameters", {}).get("form")
-    if elastic is None or "elastic_energy" not in elastic or form != "kinematic":
+    if elastic is None or "elastic_energy" not in elastic or form != "kinematic" or "plastic_work" in elastic:
         return
     angle = _energy_peak(elastic, data)
     more, locked = (angle - data["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
@@ -680,6 +680,6 @@ evolution = _set(
     Column("deaths", "deaths", 0),
     Column("merges", "merges", 0),
     Column("splits", "splits", 0),
-    Column("D (random spots)", _window_dimension),
+    Column("D (random spots)", _window_dimension, screen=False),
     remarks=_signature_window,
 )

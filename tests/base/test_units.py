@@ -32,7 +32,8 @@ def test_number_times_prefix_is_the_value(size, units, sign):
         (float("nan"), "Pa", "-"),
         (54.31, "degree", "54.3 °"),
         (1.6e-3, "m2", "1600 mm²"),
-        (0.05, "m2", "50000 mm²"),
+        (0.04, "m2", "40000 mm²"),
+        (1.75e-7, "m2", "0.175 mm²"),
         (0.0, "Pa", "0 Pa"),
     ],
 )

@@ -192,6 +192,21 @@ def test_what_the_closure_has_pressed_is_not_pressed_again(crack):
     assert not (fc.joints.dilatancy(crack, pressed=marked, **other).interface_closure > 0.5).any()
 
 
+def test_closure_with_a_hardness_is_shared_along_the_same_path_alone(crack):
+    path = {"normal_force": [10.0, 100.0, 1e3], "hardness": 1e9}
+    closing = fc.joints.closure(crack, shear=[8e-5], direction="S", **path)
+    assert closing.plastic_work[0, -1] > 0
+    given = {"shear": [8e-5], "direction": "S"}
+    alone = fc.joints.dilatancy(crack, **given, **path)
+    marked = closing.assign(interface_closure=closing.interface_closure + 1.0)
+    shared = fc.joints.dilatancy(crack, pressed=marked, **given, **path)
+    np.testing.assert_allclose(shared.interface_closure, alone.interface_closure + 1.0, rtol=1e-12)
+    np.testing.assert_allclose(shared.plastic_work, alone.plastic_work, rtol=1e-12)
+    start, other = ({**path, "normal_force": forces} for forces in ([10.0, 100.0], [10.0, 1e3]))
+    assert (fc.joints.dilatancy(crack, pressed=marked, **given, **start).interface_closure > 0.5).all()
+    assert (fc.joints.dilatancy(crack, pressed=marked, **given, **other).interface_closure < 0.5).all()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -199,10 +214,10 @@ def test_what_the_closure_has_pressed_is_not_pressed_again(crack):
         ({"bulk": "uniform_pressure"}, "one with another bulk"),
         ({"keep": ("state",)}, "nothing beside `keep`"),
         ({"normal_stiffness": 1e9}, "nothing beside `normal_stiffness`"),
-        ({"hardness": 1e9}, "nothing with a hardness"),
+        ({"hardness": 1e9}, "one with another hardness"),
         ({"pressed": xr.Dataset()}, "a result of `joints.closure`"),
         ({"pressed": 3.0}, "a result of `joints.closure`"),
-        ({"normal_force": None}, "nothing without normal_force"),
+        ({"normal_force": None}, "nothing without a force"),
     ],
 )
 def test_another_closure_is_refused(crack, change, message):
@@ -307,7 +322,7 @@ def test_falling_plane_loses_its_force(make_face):
 
 
 def test_spring_needs_a_force(spring_crack):
-    with pytest.raises(ValueError, match="normal_stiffness: expected nothing without normal_force"):
+    with pytest.raises(ValueError, match="normal_stiffness: expected nothing without a force"):
         fc.joints.dilatancy(spring_crack, shear=0.0, normal_stiffness=1.0)
     with pytest.raises(ValueError, match="normal_stiffness"):
         fc.joints.dilatancy(spring_crack, shear=0.0, normal_force=1.0, normal_stiffness=-1.0)

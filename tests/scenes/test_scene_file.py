@@ -290,7 +290,7 @@ def test_scene_in_words():
     lines = repr(scene).splitlines()
     assert lines[0] == "Scene 'concrete_crack'"
     assert "young = 3e+10" in next(line for line in lines if line.startswith("  material"))
-    assert "shear = [0, 8e-05 ... 0.01] (126 values)" in repr(scene)
+    assert "shear = [0, 4e-05 ... 0.004] (101 values)" in repr(scene)
     assert "<td>yield" not in scene._repr_html_()
     assert scene._repr_html_().count("<tr>") == len(scene.tables)
 
