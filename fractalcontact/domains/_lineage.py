@@ -90,9 +90,9 @@ def lineage(
     Dataset
         Over `link`, one row for each pair of islands that overlap, each birth and each death:
         `island_before` and `island_after`, the numbers of `islands` (0: none); `common_cells`; the sizes of
-        both islands, `cells_before` and `cells_after`; `event` (int8 flags): continuation, birth, death, merge (the island after overlaps several before), split (the
-        island before overlaps several after), or merge_and_split. The coordinates `link_<dim>` give, for
-        every leading dim, the later of the two states.
+        both, `cells_before` and `cells_after`; `event` (int8 flags): continuation, birth, death, merge
+        (the island after overlaps several before), split (the island before overlaps several after), or
+        merge_and_split. The coordinates `link_<dim>` give, for every leading dim, the later of both states.
 
     Raises
     ------

@@ -81,24 +81,19 @@ def alluvial(
     for place, stack in enumerate(stacks):
         x = place + BAR * np.array([-1, 1, 1, -1])
         y = stack.low[:, None] + stack.cells[:, None] * np.array([0, 0, 1, 1])
-        bars = PolyCollection(np.stack(np.broadcast_arrays(x, y), -1), facecolors=colours[stack.colour])
+        bars = PolyCollection(_shapes(x, y), facecolors=colours[stack.colour])
         bars.set(edgecolor=_style.tone(0.0), linewidths=np.where(stack.colour < LARGEST, 0.4, 0.0))
         ax.add_collection(bars)
     for place, (each, before, after) in enumerate(zip(links, stacks, stacks[1:], strict=False)):
         x = place + BAR + (1 - 2 * BAR) * np.concatenate([BEND, BEND[::-1]])
         edges, colour = _ribbons(each, before, after)
-        shapes = np.stack(np.broadcast_arrays(x, edges), -1)
-        ax.add_collection(PolyCollection(shapes, facecolors=colours[colour], alpha=0.45, lw=0))
-    name = load_of(path)
-    texts = (
-        number_texts(scale_of(path[name]), table(path, name, ("step",)), 3)
-        if name
-        else map(str, range(len(stacks)))
-    )
-    ax.set(
-        xlabel=scale_of(path[name]).label(name_of(path[name])) if name else "step", ylabel="cells in contact"
-    )
-    ax.set_xticks(range(len(stacks)), list(texts))
+        ax.add_collection(PolyCollection(_shapes(x, edges), facecolors=colours[colour], alpha=0.45, lw=0))
+    texts, name = [str(place) for place in range(len(stacks))], load_of(path)
+    if name:
+        scale = scale_of(path[name])
+        texts = number_texts(scale, table(path, name, ("step",)), 3)
+    ax.set(xlabel=scale.label(name_of(path[name])) if name else "step", ylabel="cells in contact")
+    ax.set_xticks(range(len(stacks)), texts)
     ax.set_title(shear_text(path, data))
     ax.autoscale_view()
     ax.set_ylim(bottom=0)
@@ -112,6 +107,11 @@ def _rgb(colour: Any) -> tuple[float, float, float]:
     from matplotlib.colors import to_rgb
 
     return to_rgb(colour)
+
+
+def _shapes(x: Array, y: Array) -> Any:
+    """Return the corners of shapes with common places x (corners,) and own heights y (shapes, corners)."""
+    return np.stack(np.broadcast_arrays(x, y), -1)
 
 
 def _stacks(links: list[xr.Dataset]) -> list[Stack]:
@@ -143,7 +143,7 @@ def _sizes(links: xr.Dataset, side: str) -> Array:
 
 
 def _ribbons(links: xr.Dataset, before: Stack, after: Stack) -> tuple[Array, Array]:
-    """Return the outline of each ribbon, forth on its lower edge and back on the upper one, and its colour."""
+    """Return the outline of each ribbon, along its lower edge and back on the upper, and its colour."""
     shared = links["common_cells"].values
     shared, number = shared[shared > 0], np.flatnonzero(shared > 0)
     old, new = (links[f"island_{side}"].values[number] - 1 for side in ("before", "after"))
