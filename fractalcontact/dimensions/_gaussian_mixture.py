@@ -30,6 +30,10 @@ HIGHEST = (
     12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, and the sum a geometric series
 )
 ALIASED, FILTERED, UNALIASED = range(3)
+_LEAST_ALIASED = 0.05  # of a Gaussian: below, aliases are exp(-49) of its highest density
+_SUM_OF_WAVES = (
+    1.0  # spread from which on its sum over waves is the shorter one; the variance is then exact to 3e-7
+)
 
 
 @dataclass(frozen=True)
@@ -60,56 +64,56 @@ def weights(hurst: float, t: Array) -> Array:
     return np.asarray(0.5 * weight / unit)
 
 
-@lru_cache(maxsize=SPREADS)
-def _kernel(spread: float) -> tuple[Array, Array]:
-    """Return places and Gaussian weights of the neighbours whose standard deviation is `spread`."""
-    u = np.arange(-4 * math.ceil(spread) - 8, 4 * math.ceil(spread) + 9)
-    widths = np.geomspace(0.1, spread + 1.0, 300)
-    kernels = np.exp(-0.5 * np.square(u / widths[:, None]))
-    kernels /= kernels.sum(axis=1, keepdims=True)
-    width = np.interp(spread, np.sqrt(kernels @ np.square(u)), widths)
-    weights = np.exp(-0.5 * np.square(u / width))
-    return u, weights / weights.sum()
+@lru_cache
+def _width(spread: float) -> float:
+    """Return the width w of the Gaussian weights exp(-u^2 / (2 w^2)) of whole u with a standard deviation."""
+    if spread > _SUM_OF_WAVES:
+        return spread
+    u, widths = np.arange(9.0), np.geomspace(0.1, _SUM_OF_WAVES + 0.1, 300)
+    weights = np.exp(-0.5 * np.square(u / widths[:, None]))
+    variances = weights @ np.square(u) / (weights.sum(axis=1) - 0.5)
+    return float(np.interp(spread, np.sqrt(variances), widths))
 
 
 def kernel_transfer(spread: float, q: Array) -> Array:
-    """Return the transfer function of Gaussian weights with the standard deviation `spread`."""
+    """Return the transfer function of Gaussian weights with the standard deviation `spread`.
+
+    The sum over points equals one over waves (Poisson): the shorter of the two is used.
+    """
     if spread == 0.0:
         return np.ones(q.shape)
-    u, weights = _kernel(spread)
-    half = u > 0  # the weights are even
-    return np.asarray(weights[u == 0] + 2.0 * weights[half] @ np.cos(np.outer(u[half], q)))
+    width = _width(spread)
+    if width < _SUM_OF_WAVES:
+        u = np.arange(1.0, 9.0)
+        weights = np.exp(-0.5 * np.square(u / width))
+        return np.asarray((1.0 + 2.0 * weights @ np.cos(np.outer(u, q))) / (1.0 + 2.0 * weights.sum()))
+    turns = 2.0 * np.pi * np.arange(-2.0, 3.0)
+    waves = sum(np.exp(-0.5 * np.square(width * (q + turn))) for turn in turns)
+    return np.asarray(waves / np.sum(np.exp(-0.5 * np.square(width * turns))))
 
 
-def clean_density(t: Array, spread: float, form: int, q: Array) -> Array:
-    """Return the spectral density of each Gaussian without the effect of edges, shape (t, q).
+def densities(t: Array, spread: float, q: Array) -> tuple[Array, Array]:
+    """Return the spectral density of each Gaussian on a lattice, with aliases and without, shape (t, q).
 
-    Parameters
-    ----------
-    t : ndarray
-        Per squared point.
-    spread : float
-        Of the blur, in points.
-    form : int
-        ALIASED or UNALIASED, see `FORMS`.
-    q : ndarray
-        Wavenumbers in radians per point.
+    Neither holds the effect of edges. `t` is per squared point, `spread` in points, q in radians per point.
     """
     wider = 1.0 + 4.0 * t * spread**2
     narrow = t / wider
-    density = np.ones((t.size, q.size))
-    wide = narrow < 1.0 if form == ALIASED else np.ones(t.size, dtype=bool)
-    inverse = 1.0 / (4.0 * narrow[wide, None])
-    density[wide] = np.exp(-np.square(q) * inverse)
-    if form == ALIASED:
-        for m in (-1.0, 1.0):
-            density[wide] += np.exp(-np.square(q + 2.0 * np.pi * m) * inverse)
-        # for narrow Gaussians the sum over the lattice is shorter than that over the aliases
-        between = ~wide & (narrow < 40.0)
-        for u in range(1, 5):
-            density[between] += 2.0 * np.exp(-narrow[between, None] * u * u) * np.cos(q * u)
-    density[wide] *= np.sqrt(np.pi / narrow[wide, None])
-    return np.asarray(density / np.sqrt(wider)[:, None])
+    inverse = 1.0 / (4.0 * narrow[:, None])
+    unaliased = np.exp(-np.square(q) * inverse)
+    aliased = np.ones(unaliased.shape)
+    # for narrow Gaussians the sum over the points is shorter than that over the waves
+    wide = narrow < 1.0
+    aliased[wide] = unaliased[wide]
+    with_aliases = wide & (narrow > _LEAST_ALIASED)
+    for turn in (-2.0 * np.pi, 2.0 * np.pi):
+        aliased[with_aliases] += np.exp(-np.square(q + turn) * inverse[with_aliases])
+    between = ~wide & (narrow < 40.0)
+    for u in range(1, 5):
+        aliased[between] += 2.0 * np.exp(-narrow[between, None] * u * u) * np.cos(q * u)
+    unaliased *= np.sqrt(np.pi / t)[:, None]
+    aliased[wide] *= np.sqrt(np.pi / narrow[wide, None])
+    return aliased / np.sqrt(wider)[:, None], unaliased
 
 
 def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
@@ -244,21 +248,24 @@ class Lattice:
 
         With `edges` those of free ends, as in the expected power; without, the density alone.
         """
-        made: dict[tuple[float, int, int], list[Array]] = {}
-        keys = [(d, n, q.size) for n, d, q in zip(self.shape, self.spacing, self.wavenumbers, strict=True)]
-        for key, q in zip(keys, self.wavenumbers, strict=True):
-            if key not in made:
-                made[key] = self._transform(key[0], key[1], q, spread, edges and not self.periodic)
-        return [[made[key][form] for key in keys] for form in FORMS]
+        columns = self._transform(1, spread, edges and not self.periodic)
+        is_alike = self.shape[0] == self.shape[1] and self.spacing[0] == self.spacing[1] and not self.periodic
+        rows = columns if is_alike else self._transform(0, spread, edges and not self.periodic)
+        return [[along_y, along_x] for along_y, along_x in zip(rows, columns, strict=True)]
 
-    def _transform(self, d: float, n: int, q: Array, spread: float, edges: bool) -> list[Array]:
+    @cached_property
+    def _sampled(self) -> list[Array]:
+        """Densities along y and x of Gaussians that were sampled without a blur."""
+        edges = zip(self.spacing, self.wavenumbers, strict=True)
+        return [densities(self.t * d * d, 0.0, q * d)[0] for d, q in edges]
+
+    def _transform(self, axis: int, spread: float, edges: bool) -> list[Array]:
+        n, d, q = self.shape[axis], self.spacing[axis], self.wavenumbers[axis]
         if n == 1:
             return [np.ones((self.t.size, 1))] * len(FORMS)
         t, s = self.t * d * d, spread / d
-        aliased = clean_density(t, s, ALIASED, q * d)
-        sampled = aliased if s == 0.0 else clean_density(t, 0.0, ALIASED, q * d)
-        filtered = np.square(kernel_transfer(s, q * d)) * sampled
-        unaliased = clean_density(t, s, UNALIASED, q * d)
+        aliased, unaliased = densities(t, s, q * d)
+        filtered = np.square(kernel_transfer(s, q * d)) * self._sampled[axis]
         if not edges:
             return [aliased, filtered, unaliased]
         power = free_power(n, t, s, self.axes == 1)

@@ -22,6 +22,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 _SAMPLE = 64  # modes of a bin over which an expectation is averaged: error below that of the pilot, .1 %
+_MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _LEAK = 0.5  # share of the edges in the expected power from which on neighbouring modes are correlated
 _TAIL = 1e-3  # squared transfer function below which no form of a filter holds
 _ALIASED = (
@@ -56,13 +57,14 @@ def clear_modes(total: Array, clean: Array, unblurred: Array) -> Array:
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
     """Return power over pilot, with the median of each half octave as expected of Gaussian heights."""
+    number, count = _classes(lattice, keep, 0.5 * _OCTAVE, math.inf)
     ratio = power / pilot
-    half = np.floor(2.0 / _OCTAVE * np.log(lattice.q / lattice.q.min())).astype(np.int16)
-    for octave in range(int(half.max()) + 1):
-        chosen = half == octave
-        known = chosen & keep
-        if np.count_nonzero(known) >= LEAST:
-            ratio[chosen] *= lattice.median / max(float(np.median(ratio[known])), 1e-300)
+    places = _Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE).places
+    factor = np.ones(count.size + 1)  # the last one of modes that do not count
+    for octave in np.flatnonzero(count >= LEAST):
+        values = ratio.ravel()[places[octave][places[octave] >= 0]]
+        factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
+    ratio *= factor[number]
     return ratio
 
 
@@ -131,40 +133,31 @@ def make_bins(
     """
     from scipy.special import digamma, polygamma
 
-    rows, columns = (place.astype(np.int32) for place in np.nonzero(keep))
-    lnq = np.log(lattice.q[keep])
-    number = _bin_numbers(lattice, rows, columns, lnq, is_tapered)
-    bins = int(number.max()) + 1
-    count = np.bincount(number, minlength=bins).astype(float)
-    inverse = 1.0 / pilot[keep]
-    ratio = power[keep] * inverse
-    order = np.argsort(number, kind="stable")
-    ends = np.cumsum(count).astype(int)
+    width = _OCTAVE / PER_OCTAVE
+    split = math.log(_ALIASED) if lattice.axes == 2 and not is_tapered else math.inf
+    number, count = _joined(*_classes(lattice, keep, width, split))
+    ratio = power / pilot
+    sums = _Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE if is_tapered else _SAMPLE)
+    mean = sums.total / count
     if is_tapered:
-        groups = np.split(ratio[order], ends[:-1])
-        level = np.log(np.maximum([np.median(group) for group in groups], 1e-300) / lattice.median)
-    else:
-        level = np.log(np.maximum(np.bincount(number, ratio, minlength=bins) / count, 1e-300))
-    share = (
-        information
-        if np.ndim(information) == 0
-        else np.bincount(number, np.asarray(information)[keep], minlength=bins) / count
-    )
+        values = np.where(sums.places >= 0, ratio.ravel()[sums.places], np.nan)
+        mean = np.nanmedian(values, axis=1) / lattice.median
+    share = information
+    if np.ndim(information) > 0:
+        share = _Sums(number, count, np.asarray(information), lattice, 1).total / count
     degrees = 0.5 * lattice.degrees * count * share * (0.25 if is_tapered else 1.0)
-    level += np.log(degrees) - digamma(degrees)
-    # an even sample of each bin
-    first = np.repeat(ends - count.astype(int), count.astype(int))
-    every = np.maximum(count / _SAMPLE, 1.0)[number[order]]
-    rank = np.arange(order.size) - first
-    sample = order[np.floor((rank + 1) / every) > np.floor(rank / every)]
+    level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
+    # expectations of an even sample of each bin
+    chosen = sums.places[:, :: max(1, sums.places.shape[1] // _SAMPLE)]
+    bins, place = np.nonzero(chosen >= 0)[0], chosen[chosen >= 0]
+    weight = 1.0 / (pilot.ravel()[place] * np.bincount(bins)[bins])
+    rows, columns = np.divmod(place, pilot.shape[1])
     spreads, nodes = spread_nodes(max(1.0, lattice.shortest_edge / 12.0))
-    tables = np.zeros((len(FORMS), spreads.size, bins, lattice.t.size))
-    weight = inverse[sample] / np.bincount(number[sample], minlength=bins)[number[sample]]
+    tables = np.zeros((len(FORMS), spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):
-        for table, (along_y, along_x) in zip(
-            tables, lattice.transforms(float(spread), edges=True), strict=True
-        ):
-            _average(weight, number[sample], rows[sample], columns[sample], along_y, along_x, table[k])
+        transforms = lattice.transforms(float(spread), edges=True)
+        for table, (along_y, along_x) in zip(tables, transforms, strict=True):
+            _average(weight, bins, rows, columns, along_y, along_x, table[k])
     return Bins(
         level=level,
         variance=np.asarray(polygamma(1, degrees)),
@@ -172,32 +165,102 @@ def make_bins(
         spreads=spreads,
         nodes=nodes,
         t=lattice.t,
-        white=np.bincount(number, inverse, minlength=bins) / count,
-        lnq=np.bincount(number, lnq, minlength=bins) / count,
+        white=np.bincount(bins, weight),
+        lnq=sums.lnq / count,
         extent=lattice.longest,
         axes=lattice.axes,
     )
 
 
-def _bin_numbers(lattice: Lattice, rows: Array, columns: Array, lnq: Array, is_tapered: bool) -> Array:
-    """Return the bin of each mode; bins of few modes are joined with the next."""
-    width = _OCTAVE / PER_OCTAVE
-    lowest = float(lnq.min())
-    ring = ((lnq - lowest) / width + 1e-9).astype(np.int64)
-    number = 2 * ring
-    if lattice.axes == 2 and not is_tapered:
-        y, x = (np.abs(q) * d for q, d in zip(lattice.wavenumbers, lattice.spacing, strict=True))
-        y, x = y[rows], x[columns]
-        is_diagonal = np.minimum(y, x) > math.tan(math.pi / 8.0) * np.maximum(y, x)
-        number += is_diagonal & (lowest + width * ring > math.log(_ALIASED))
-    count = np.bincount(number)
-    joined, total, bins = np.zeros(count.size, dtype=np.int64), 0, 0
+class _Sums:
+    """Sums over the modes of each class, and an even sample of them.
+
+    Attributes
+    ----------
+    total, lnq : ndarray, shape (classes,)
+        Of the values and of the logarithms of the wavenumbers.
+    places : ndarray of int, shape (classes, size)
+        Flat indices of the sample, -1 where a class has fewer modes.
+    """
+
+    def __init__(self, number: Array, count: Array, values: Array, lattice: Lattice, size: int) -> None:
+        self.total, self.lnq = np.zeros(count.size), np.zeros(count.size)
+        self.places = np.full((count.size, size), -1)
+        y, x = lattice.wavenumbers
+        _add(number, values, y, x, count, self.total, self.lnq, self.places)
+
+
+def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> tuple[Array, Array]:
+    """Return the class of each mode, -1 of those that do not count, and the number of modes in each class.
+
+    Rings of `width` in ln q; from ln q = `split` on, modes near a diagonal are a class of their own.
+    """
+    lowest = math.log(float(np.min(lattice.q, where=keep, initial=math.inf)))
+    rings = int((math.log(float(lattice.q.max())) - lowest) / width) + 2
+    number, count = np.full(keep.shape, -1, dtype=np.int16), np.zeros(2 * rings)
+    y, x = lattice.wavenumbers
+    _classify(y, x, lattice.spacing[0], keep, lowest, width, split, number, count)
+    return number, count
+
+
+def _joined(number: Array, count: Array) -> tuple[Array, Array]:
+    """Join classes of few modes with the next."""
+    joined, total, bins = np.zeros(count.size + 1, dtype=np.int16), 0.0, 0
     for k, modes in enumerate(count):
         joined[k] = bins
         total += modes
         if total >= LEAST:
-            bins, total = bins + 1, 0
-    return np.minimum(joined, max(bins - 1, 0))[number]
+            bins, total = bins + 1, 0.0
+    joined = np.minimum(joined, max(bins - 1, 0))
+    sums = np.bincount(joined[:-1], count)
+    joined[-1] = -1
+    return joined[number], sums
+
+
+@kernel
+def _classify(
+    y: Array,
+    x: Array,
+    dy: float,
+    keep: Array,
+    lowest: float,
+    width: float,
+    split: float,
+    number: Array,
+    count: Array,
+) -> None:
+    """Fill the class of each mode, and count them; see `_classes`."""
+    for r in range(y.size):
+        for c in range(x.size):
+            if not keep[r, c]:
+                continue
+            ring = int((0.5 * math.log(y[r] * y[r] + x[c] * x[c]) - lowest) / width + 1e-9)
+            k = 2 * ring
+            if lowest + width * ring > split:
+                a, b = abs(y[r]) * dy, abs(x[c])
+                k += min(a, b) > math.tan(math.pi / 8.0) * max(a, b)
+            number[r, c] = k
+            count[k] += 1.0
+
+
+@kernel
+def _add(
+    number: Array, values: Array, y: Array, x: Array, count: Array, total: Array, lnq: Array, places: Array
+) -> None:
+    """Add the values and ln q of the modes of each class; fill the sample."""
+    rank, filled = np.zeros(count.size), np.zeros(count.size, dtype=np.int64)
+    size = places.shape[1]
+    for r in range(y.size):
+        for c in range(x.size):
+            k = number[r, c]
+            if k < 0:
+                continue
+            total[k] += values[r, c]
+            lnq[k] += 0.5 * math.log(y[r] * y[r] + x[c] * x[c])
+            if rank[k] * min(1.0, size / count[k]) >= filled[k]:
+                places[k, filled[k]] = r * x.size + c
+                filled[k] += 1
+            rank[k] += 1.0
 
 
 @kernel

@@ -312,9 +312,15 @@ def tail(hurst: float, t: float, spread: float, form: int, axes: int) -> float:
         return float(1.0 / (1.0 - 2.0 ** -(hurst + 0.5 * axes)))
     if form == FILTERED or spread == 0.0:
         return float(1.0 / (1.0 - 2.0**-hurst))
-    total, wider = 0.0, 1.0 + 4.0 * t * spread**2
-    for i in range(40):
-        total += 2.0 ** (-i * hurst) * (wider / (1.0 + 4.0 * t * 2.0**i * spread**2)) ** (0.5 * axes)
+    blur = 4.0 * t * spread**2
+    total, weight, ratio, narrower = 0.0, 1.0, 2.0**-hurst, 1.0
+    for _ in range(40):
+        term = weight * ((1.0 + blur) / (1.0 + blur * narrower)) ** (0.5 * axes)
+        total += term
+        if term < 1e-12:
+            break
+        weight *= ratio
+        narrower *= 2.0
     return total
 
 
@@ -356,15 +362,20 @@ def bin_power(
     below, here, above, beyond = table[abs(i - 1)], table[i], table[i + 1], table[i + 2]
     for b in range(bins):
         p0, p1, p2, p3 = 0.0, 0.0, 0.0, 0.0
-        for j in range(t.size):
-            p0 += weights[j] * below[b, j]
-            p1 += weights[j] * here[b, j]
-            p2 += weights[j] * above[b, j]
-            p3 += weights[j] * beyond[b, j]
-        # where a blur leaves nothing, a slope that no surface has
-        least = 1e-200 * math.exp(-40.0 * lnq[b])
-        logarithm = a0 * math.log(p0 + least) + a1 * math.log(p1 + least)
-        power = math.exp(logarithm + a2 * math.log(p2 + least) + a3 * math.log(p3 + least))
+        if theta[1] == 0.0:
+            for j in range(t.size):
+                p1 += weights[j] * here[b, j]
+            power = p1
+        else:
+            for j in range(t.size):
+                p0 += weights[j] * below[b, j]
+                p1 += weights[j] * here[b, j]
+                p2 += weights[j] * above[b, j]
+                p3 += weights[j] * beyond[b, j]
+            # where a blur leaves nothing, a slope that no surface has
+            least = 1e-200 * math.exp(-40.0 * lnq[b])
+            logarithm = a0 * math.log(p0 + least) + a1 * math.log(p1 + least)
+            power = math.exp(logarithm + a2 * math.log(p2 + least) + a3 * math.log(p3 + least))
         if theta[3] > 0.0:
             x = 2.0 * theta[5] * (math.log(theta[3]) - lnq[b])
             bend = x if x > 30.0 else math.log1p(math.exp(x))
@@ -489,11 +500,11 @@ def _maxima(
                     bin_power(values, form, axes, table, nodes, t, white, lnq, model)
                     if _whitened(whitening[k], level, model, residual) + np.sum(before * before) < total:
                         u[:] = before
-                damping, objective = 0.0, np.inf
+                damping = 0.0
+                _parameters(u, fixed[m], prior, values)
+                bin_power(values, form, axes, table, nodes, t, white, lnq, model)
+                objective = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
                 for _step in range(_STEPS):
-                    _parameters(u, fixed[m], prior, values)
-                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
-                    objective = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
                     for i in range(p):
                         jacobian[i] = 0.0
                         if math.isnan(fixed[m, i]):
@@ -524,7 +535,7 @@ def _maxima(
                         if total < objective:
                             gain = objective - total
                             objective = total
-                            u[:] = trial
+                            u[:], model[:], residual[:] = trial, shifted, trial_residual
                             damping *= 0.2
                             break
                         damping = max(0.1, 5.0 * damping)

@@ -91,10 +91,10 @@ WANTED = {
 # number of kernels of each subpackage
 COMPILED = {
     "rigid": {},
-    "dimension": {"dimensions": 4},
+    "dimension": {"dimensions": 6},
     "pressed": {"contact": 8},
     "closure": {"contact": 10},
-    "paper": {"dimensions": 5, "domains": 4, "contact": 10},
+    "paper": {"dimensions": 7, "domains": 4, "contact": 10},
 }
 
 
