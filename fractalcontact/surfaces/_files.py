@@ -8,11 +8,13 @@ import math
 import re
 import zipfile
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.memory import require_unpacked, unpacked_limit
@@ -21,7 +23,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
 _BLOCK = 1 << 22  # bytes
-HEADER = 200  # lines; no format has a longer header
 COMMENTS = ("//", "%")
 DECIMAL = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 HEADED = re.compile(r"(?P<name>[^\s\[(][^\[(\s]*(?: [^\[(\s]+)*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?(?=\s|$)")
@@ -83,16 +84,35 @@ def _hdf5_size(file: IO[bytes]) -> int:
     return sum(sizes)
 
 
+@dataclass(frozen=True)
+class Request:
+    """A file, and what the caller states of it: the arguments of `surfaces.read`."""
+
+    path: Path
+    channel: str | int | None = None
+    units: str | None = None
+    spacing: Any = None
+    first_row: str | None = None
+    columns: Sequence[str | int] | None = None
+    plane: Any = None
+
+    @property
+    def suffix(self) -> str:
+        """The suffix of the format."""
+        return file_suffix(self.path)
+
+
+@dataclass(frozen=True)
+class FileContent:
+    """A surface with metadata of its file: entries of the provenance, and whether it is a microscope's."""
+
+    surface: xr.DataArray
+    entries: dict[str, Any] = field(default_factory=dict)
+    is_microscope: bool = False
+
+
 class NotATable(ValueError):
-    """A text is not a table of numbers; the message names the line and the column.
-
-    `is_damaged` if the wrong line is not in a header: it is no list of points after a header either.
-    """
-
-    def __init__(self, message: str, line: int = 0) -> None:
-        super().__init__(message)
-        self.line = line
-        self.is_damaged = False
+    """A text is not a table of numbers; the message names the line and the column."""
 
 
 class EmptyTable(NotATable):
@@ -154,18 +174,14 @@ def read_table(path: Path) -> Table:
         pointed = next((number for number, content in rows if "." in content), 0)
         if pointed:
             fault = f"line {pointed}: expected decimal commas as in the lines before, got a decimal point"
-            raise NotATable(fault, pointed)
+            raise NotATable(fault)
         rows = [(number, content.replace(",", ".")) for number, content in rows]
     try:
         # the fast path, for a table without missing cells
         contents = [content for _, content in rows]
         values = np.loadtxt(contents, delimiter=delimiter, ndmin=2, comments=None)
     except ValueError:
-        try:
-            values = _parsed(rows, delimiter)
-        except NotATable as error:
-            error.is_damaged = _is_damaged(rows)
-            raise
+        values = _parsed(rows, delimiter)
     names, units = _header(first if is_named else comment, delimiter, values.shape[1])
     return Table(values, names, units, is_named, comma)
 
@@ -217,26 +233,6 @@ def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, 
     return tuple(match["name"].strip() for match in found), tuple(match["unit"] or "" for match in found)
 
 
-def _is_damaged(lines: list[tuple[int, str]]) -> bool:
-    """Return whether lines that are no table are no list of points either, after a header of any length."""
-    header = next((k for k, (_, line) in enumerate(lines[:HEADER]) if _has_numbers(line)), HEADER)
-    if header in (0, HEADER):
-        return header == 0
-    try:
-        _parsed(lines[header:], _delimiter(lines[header][1]))
-    except NotATable as beyond:
-        return beyond.line > lines[header][0] + HEADER
-    return False
-
-
-def _has_numbers(line: str) -> bool:
-    """Return whether a line has nothing else than numbers."""
-    try:
-        return bool([_number(cell, 0, 0) for cell in line.split(_delimiter(line))])
-    except NotATable:
-        return False
-
-
 def _delimiter(line: str) -> str | None:
     return next((mark for mark in ";\t," if mark in line), None)
 
@@ -249,7 +245,7 @@ def _parsed(lines: list[tuple[int, str]], delimiter: str | None) -> Array:
     (first, head), values = rows[0], []
     for number, cells in rows:
         if len(cells) != len(head):
-            raise NotATable(f"line {number} has {len(cells)} values, line {first} has {len(head)}", number)
+            raise NotATable(f"line {number} has {len(cells)} values, line {first} has {len(head)}")
         values.append([_number(cell, number, column) for column, cell in enumerate(cells, 1)])
     return np.array(values)
 
@@ -263,7 +259,7 @@ def _number(cell: str, line: int, column: int) -> float:
     except ValueError:
         hint = ", a decimal comma" if "," in word else ""
         fault = f"line {line}, column {column}: expected a number, got {word[:40]!r}{hint}"
-        raise NotATable(fault, line) from None
+        raise NotATable(fault) from None
 
 
 def read_npy(path: Path) -> Array:

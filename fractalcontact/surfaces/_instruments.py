@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,8 @@ from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._files import check_unpacked, file_suffix, open_bytes
+from fractalcontact.surfaces._files import FileContent, Request, check_unpacked, file_suffix, open_bytes
+from fractalcontact.surfaces._grid_input import surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
@@ -29,57 +29,12 @@ PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not sp
 # rows of X3P (ISO 25178-72) have the coordinate y = offset + row * increment
 FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "x3p", "xyz")
 POINTS = "xyz"
+PROFILERS = (b"X;Y;valid", b"Scan Parameters")  # heads of lists by profilers, HFM and Dektak
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """One channel of a file.
-
-    Attributes
-    ----------
-    heights : ndarray, shape (ny, nx) or (nx,)
-        In metres, rows as the reader library orders them, NaN where missing.
-    spacing : tuple of float
-        (y, x) in metres.
-    periodic : bool
-    microscope : bool
-        The format is that of a microscope or a profiler.
-    entries : dict
-        For the provenance: what the file states, and the reader.
-    first_row : {"bottom", "top"}
-        Where the format has its first row.
-    """
-
-    heights: Array
-    spacing: tuple[float, ...]
-    periodic: bool
-    microscope: bool
-    entries: dict[str, Any]
-    first_row: str
-
-
-def read_instrument(
-    path: Path,
-    channel: str | int | None,
-    units: str | None,
-    spacing: Sequence[float] | None,
-    try_points: bool = True,
-) -> Reading:
-    """Read one channel of an instrument's file.
-
-    Parameters
-    ----------
-    path : Path
-        An existing file; `.gz` is decompressed in memory.
-    channel : str, int or None
-        Name or number of the channel; None takes the default of the format.
-    units : str or None
-        Unit of the heights, for a file that states none (or a wrong one).
-    spacing : sequence of float or None
-        (y, x) in metres, or one of them for both, for a file that states none (or a wrong one).
-    try_points : bool
-        False if the file is no list of points: its reader takes minutes to find that out.
+def read_instrument(request: Request) -> FileContent:
+    """Read one channel of an instrument's file; `.gz` is decompressed in memory.
 
     Raises
     ------
@@ -88,22 +43,21 @@ def read_instrument(
     UnreadableFile
         Corrupt, of an unknown format, without a unit or a size, or not on a grid.
     """
+    path, units, spacing = request.path, request.units, request.spacing
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
     # some of the readers open NetCDF files, and filters of warnings are shared by all threads
     with NETCDF_LOCK, _quiet() as messages, open_bytes(path) as file:
         check_unpacked(path.name, file)
-        other_unit = _other_unit(file.read(4096))
-        file.seek(0)
-        reader = _open(file, path, try_points)
-        chosen = _channel(reader, channel, path.name)
+        reader, other_unit = _open(file, path)
+        chosen = _channel(reader, request.channel, path.name)
         name = str(reader.format())
         size, unit, lateral = _stated(chosen, other_unit, units or ("m" if name in ARRAYS else None))
         with Problems(WHERE, UnreadableFile) as problems:
             _check(problems, chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
-    points = tuple(int(n) for n in heights.shape)
-    steps = _steps(points, size, lateral, spacing)
+    steps = _steps(heights.shape, size, lateral, spacing)
+    row = request.first_row or ("bottom" if name in FROM_BOTTOM else "top")
     entries = {
         "format": name,
         "channel": str(chosen.name),
@@ -111,9 +65,16 @@ def read_instrument(
         "stated_size": None if size is None else [float(edge) for edge in size],
         "reader": f"SurfaceTopography {_version()}",
         "reader_warnings": sorted({str(message.message) for message in messages}) or None,
+        "first_row": row,
     }
-    first_row = "bottom" if name in FROM_BOTTOM else "top"
-    return Reading(in_metres(heights, str(unit)), steps, periodic, name not in PLAIN, entries, first_row)
+    metres = from_bottom(in_metres(heights, str(unit)), row)
+    surface = surface_array(metres, steps, (periodic,) * len(steps))
+    return FileContent(surface, entries, name not in PLAIN)
+
+
+def from_bottom(values: Array, first_row: str | None) -> Array:
+    """Return heights with the first row at the smallest y."""
+    return values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
 
 
 @contextmanager
@@ -125,49 +86,30 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
         yield messages
 
 
-def _open(file: Any, path: Path, try_points: bool) -> Any:
-    """Return the library's reader of an open file."""
-    from SurfaceTopography.IO import open_topography
+def _open(file: Any, path: Path) -> tuple[Any, str | None]:
+    """Return the library's reader of an open file, and the unit of its data if that is no length.
 
-    try:
-        return open_topography(file) if try_points else _open_without_points(file)
-    except Exception as error:
-        raise UnreadableFile(WHERE, [_reason(str(error), path)]) from error
-
-
-def _open_without_points(file: Any) -> Any:
-    """Return what `open_topography` does, without a try of the reader of lists of points."""
+    Lists of points are read here: its own reader tries 600 times to skip rows, 40 s for 512 x 512 points.
+    """
     from SurfaceTopography.IO import open_topography, readers
     from SurfaceTopography.IO.Reader import MagicMatch
 
-    faults, head = [], file.read(4096)
-    file.seek(0)
+    head, suffix = file.read(4096), file_suffix(path).lstrip(".")
+    reasons, tried = [], 0
     for reader in readers:
-        if reader.format() == POINTS or reader.can_read(head) == MagicMatch.NO:
+        is_list = reader.format() == POINTS and not head.startswith(PROFILERS)
+        if is_list or reader.can_read(head) == MagicMatch.NO:
             continue
+        file.seek(0)
         try:
-            return open_topography(file, format=reader.format())
+            return open_topography(file, format=reader.format()), _other_unit(head)
         except Exception as error:
-            faults.append(f"tried {reader.__name__}: \n {error}\n\n")
-            file.seek(0)
-    raise ValueError("".join(faults))
-
-
-def _reason(text: str, path: Path) -> str:
-    """Return one line from the library's long report of every format it tried."""
-    from SurfaceTopography.IO import readers
-
-    suffix = file_suffix(path).lstrip(".")
-    named = {reader.__name__ for reader in readers if suffix in (reader._file_extensions or ())}
-    named |= {reader.__name__ for reader in readers if reader._format == suffix}
-    tried = re.findall(r"tried (\w+):\s*\n\s*(.*)", text)
-    reasons = [
-        f"{name.removesuffix('Reader')} reader: {reason.strip()}" for name, reason in tried if name in named
-    ]
-    expected = f"path: {path.name!r} is corrupt or of an unknown format"
-    if reasons:
-        return f"{expected} ({'; '.join(reasons)[:300]})"
-    return f"{expected} ({len(tried)} readers tried)" if tried else f"{expected} ({text.strip()[:300]})"
+            tried += 1
+            if suffix == reader.format() or suffix in (reader._file_extensions or ()):
+                lines = str(error).splitlines() or [type(error).__name__]
+                reasons.append(f"{reader.__name__.removesuffix('Reader')} reader: {lines[0].strip()}")
+    reason = "; ".join(reasons)[:300] or f"{tried} readers tried"
+    raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt or of an unknown format ({reason})"])
 
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
@@ -266,8 +208,9 @@ def _steps(
     return tuple(edge / n for edge, n in zip(edges, points, strict=True))
 
 
-def read_raster(path: Path, channel: str | int | None, units: str | None, spacing: Any) -> Reading:
-    """Read one band of a raster in projected coordinates; the arguments are those of `read_instrument`."""
+def read_raster(request: Request) -> FileContent:
+    """Read one band of a raster in projected coordinates."""
+    path, channel, units, spacing = request.path, request.channel, request.units, request.spacing
     if importlib.util.find_spec("rasterio") is None:
         raise MissingExtra(f"reading {path.name!r}", "rasterio", "geo")
     import rasterio
@@ -305,8 +248,9 @@ def read_raster(path: Path, channel: str | int | None, units: str | None, spacin
         "projection": system.to_string() if system else None,
         "origin": [transform.c * factor, transform.f * factor],
         "reader": f"rasterio {rasterio.__version__}",
+        "first_row": "bottom",
     }
-    return Reading(_observed(heights), (float(steps[0]), float(steps[1])), False, False, entries, "bottom")
+    return FileContent(surface_array(_observed(heights), steps.tolist(), (False, False)), entries)
 
 
 def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:

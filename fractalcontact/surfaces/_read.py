@@ -6,7 +6,7 @@ import contextlib
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any, TypeVar
@@ -16,16 +16,19 @@ import xarray as xr
 
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
-from fractalcontact.base.grid import METRES, core_dims, is_length, plane_coords, read_grid
+from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.surface_argument import usual_form
 from fractalcontact.base.validation import NONE, Problems, reading
 from fractalcontact.surfaces._files import (
     EmptyTable,
+    FileContent,
     NotATable,
+    Request,
     file_suffix,
     open_bytes,
     read_npy,
@@ -34,8 +37,8 @@ from fractalcontact.surfaces._files import (
 )
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
-from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing, surface_array
-from fractalcontact.surfaces._instruments import Reading, read_instrument, read_raster
+from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing
+from fractalcontact.surfaces._instruments import from_bottom, read_instrument, read_raster
 from fractalcontact.surfaces._read_points import (
     ALWAYS_POINTS,
     CLOUDS,
@@ -71,15 +74,6 @@ GRIDDING = (
     "overhang_share",
 )  # entries of the provenance of `from_points`
 WIDEST = 1.0  # m: wider than the field of any microscope
-
-
-@dataclass(frozen=True)
-class FileContent:
-    """A surface with metadata of its file: entries of the provenance, and whether it is a microscope's."""
-
-    surface: xr.DataArray
-    entries: dict[str, Any] = field(default_factory=dict)
-    is_microscope: bool = False
 
 
 def _check(
@@ -190,15 +184,7 @@ def read(
     """
     source = Path(path)
     with reading(WHERE, source):
-        content = file_content(
-            source,
-            channel=channel,
-            units=units,
-            spacing=spacing,
-            first_row=first_row,
-            columns=columns,
-            plane=plane,
-        )
+        content = file_content(Request(source, channel, units, spacing, first_row, columns, plane))
         digest = file_checksum(source)
     stated = content.entries["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
@@ -217,66 +203,47 @@ def read(
     return surface
 
 
-def file_content(
-    path: Path,
-    *,
-    channel: str | int | None = None,
-    units: str | None = None,
-    spacing: Any = None,
-    first_row: str | None = None,
-    columns: Sequence[str | int] | None = None,
-    plane: Any = None,
-) -> FileContent:
+def file_content(request: Request) -> FileContent:
     """Read a file with the reader of its format."""
-    suffix = file_suffix(path)
+    path, suffix = request.path, request.suffix
     if suffix in NETCDF:
-        return _netcdf_content(path, channel, units, spacing)
+        return _netcdf_content(request)
     if suffix in (*MESHES, *CLOUDS):
-        return _gridded_points(point_content(path, columns), path, units, spacing, plane)
+        return _gridded_points(point_content(path, request.columns), request)
     if suffix == ".npy":
-        return _array_content(path, _loaded(read_npy, path), units, spacing, first_row)
+        return _array_content(_loaded(read_npy, path), request)
     if suffix == ".npz":
-        return _archive_content(path, channel, units, spacing, first_row)
+        return _archive_content(request)
     with open_bytes(path) as file:
         head = file.read(8)
     if not head:
         raise UnreadableFile(WHERE, [f"path: expected data, got the empty file {path.name!r}"])
     if head.startswith(RASTERS):
-        return _reading_content(read_raster(path, channel, units, spacing), "bottom")
+        return read_raster(request)
     if head.startswith(IMAGES):
         expected = "heights; fractalcontact.domains.read_mask reads the mask of an image"
         raise UnreadableFile(WHERE, [f"path: expected {expected}, got {path.name!r}"])
-    if suffix in TABLES:
-        return _text_content(path, channel, units, spacing, first_row, columns, plane)
-    return _instrument_content(path, channel, units, spacing, first_row)
+    return _text_content(request) if suffix in TABLES else read_instrument(request)
 
 
-def _text_content(
-    path: Path,
-    channel: str | int | None,
-    units: str | None,
-    spacing: Any,
-    first_row: str | None,
-    columns: Sequence[str | int] | None,
-    plane: Any,
-) -> FileContent:
+def _text_content(request: Request) -> FileContent:
     """Read text: a list of points, a table of heights, or the file of an instrument."""
+    path = request.path
     try:
         table = read_table(path)
     except NotATable as error:
-        if columns is None and spacing is None and file_suffix(path) not in ALWAYS_POINTS:
-            points = not error.is_damaged
-            return _instrument_content(path, channel, units, spacing, first_row, try_points=points)
-        if not isinstance(error, EmptyTable) and not error.is_damaged:
+        is_points = request.columns is not None or request.suffix in ALWAYS_POINTS
+        if not (is_points or isinstance(error, EmptyTable)):
+            if request.spacing is None:
+                return _instrument_or_table(request)
             with contextlib.suppress(UnreadableFile, MissingExtra):
-                # a list of points has a size too, whatever its lines are
-                content = _instrument_content(path, channel, units, spacing, first_row, try_points=False)
-                if content.entries["stated_size"] is not None:
+                content = read_instrument(request)
+                if content.entries["stated_size"] is not None:  # any text has numbers to some reader
                     return content
         fault = f"is not a table of numbers ({error})"
         raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault}"]) from error
-    if is_list(table, path, columns):
-        return _gridded_points(listed_points(table, path, columns), path, units, spacing, plane)
+    if is_list(table, path, request.columns):
+        return _gridded_points(listed_points(table, path, request.columns), request)
     rows, number = table.values.shape
     with Problems(WHERE, UnreadableFile) as problems:
         if table.is_named:
@@ -287,33 +254,45 @@ def _text_content(
         expected = "a grid of heights, or `columns`, the names or numbers of those of x, y, z"
         is_tall = number < MOST_COLUMNS and rows > TALL * number
         problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
-    if spacing is None:
-        return _instrument_content(path, channel, units, spacing, first_row)
+    if request.spacing is None:
+        return _instrument_or_table(request)
     with Problems(WHERE, UnreadableFile) as problems:
         expected = "a grid of heights, one row to a line"
         problems.require(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
-    return _heights_content(path, table.values, units, spacing, first_row)
+    return _heights_content(table.values, request)
 
 
-def _gridded_points(points: Points, path: Path, units: str | None, spacing: Any, plane: Any) -> FileContent:
+def _instrument_or_table(request: Request) -> FileContent:
+    """Read text that no spacing makes a table of heights as the file of an instrument."""
+    try:
+        return read_instrument(request)
+    except MissingExtra:
+        expected = f"the spacing in metres, for {request.path.name!r} as a table of heights"
+        raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
+
+
+def _gridded_points(points: Points, request: Request) -> FileContent:
     """Grid the points of a file."""
     from fractalcontact.surfaces._from_points import from_points  # loads numba
 
-    unit = units or points.unit or "m"
-    step = None if spacing is None else float(np.atleast_1d(spacing)[0])
+    units, spacing, unit = request.units, request.spacing, request.units or points.unit or "m"
     with Problems(WHERE, UnreadableFile) as problems:
         problems.require(
             np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing
         )
+    step = None if spacing is None else float(np.atleast_1d(spacing)[0])
     with Problems(WHERE, UnreadableFile):  # its problems are those of the file
-        surface = from_points(points.position, step, triangles=points.triangles, units=unit, plane=plane)
+        surface = from_points(
+            points.position, step, triangles=points.triangles, units=unit, plane=request.plane
+        )
     gridding = {key: value for key, value in provenance_of(surface).items() if key in GRIDDING}
     widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
     if units is None and points.unit is None and widest > WIDE_CLOUD:
         message = (
-            f"{path.name}: the points extend over {widest:.3g} m and the file states no unit: if they are "
+            f"{request.path.name}: the points extend over {widest:.3g} m and the file states no unit: if "
+            "they are in millimetres, give units='mm'; else units='m'"
         )
-        warnings.warn(message + "in millimetres, give units='mm'; else units='m'", ScaleWarning, stacklevel=6)
+        warnings.warn(message, ScaleWarning, stacklevel=6)
     return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
 
 
@@ -327,13 +306,12 @@ def _loaded(function: Callable[[Path], T], path: Path) -> T:
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
 
 
-def _archive_content(
-    path: Path, channel: str | int | None, units: str | None, spacing: Any, first_row: str | None
-) -> FileContent:
+def _archive_content(request: Request) -> FileContent:
     """Return an array of an npz file: the only one of heights, or that called `channel`.
 
     One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
     """
+    path, channel, spacing = request.path, request.channel, request.spacing
     arrays = _loaded(read_npz, path)
     names = [name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)]
     default = names[0] if len(names) == 1 else "height"
@@ -347,85 +325,62 @@ def _archive_content(
     axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
     axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
     if spacing is None and [axis.size for axis in axes] == list(values.shape[-2:]):
-        steps = [np.diff(in_metres(axis, units or "m")) for axis in axes]
+        steps = [np.diff(in_metres(axis, request.units or "m")) for axis in axes]
         with Problems(WHERE, UnreadableFile) as problems:
             for dim, step in zip(("y", "x"), steps, strict=True):
                 is_even = bool(np.ptp(step) <= 1e-6 * abs(step[0])) and step[0] != 0
                 problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
         values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
         spacing = [float(abs(step).mean()) for step in steps]
-    return _array_content(path, values, units, spacing, first_row)
+    return _array_content(values, replace(request, spacing=spacing))
 
 
-def _array_content(
-    path: Path, values: Array, units: str | None, spacing: Any, first_row: str | None
-) -> FileContent:
+def _array_content(values: Array, request: Request) -> FileContent:
     """Return an array of a numpy file: heights, or points in two or three columns."""
     has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
     if has_points and len(values) >= LEAST_POINTS:
-        return _gridded_points(Points(values.astype(np.float64)), path, units, spacing, None)
-    return _heights_content(path, values, units, spacing, first_row)
+        return _gridded_points(Points(values.astype(np.float64)), replace(request, plane=None))
+    return _heights_content(values, request)
 
 
-def _heights_content(
-    path: Path, values: Array, units: str | None, spacing: Any, first_row: str | None
-) -> FileContent:
+def _heights_content(values: Array, request: Request) -> FileContent:
     """Return an array of heights without coordinates as a surface."""
+    spacing = request.spacing
     with Problems(WHERE, UnreadableFile) as problems:
-        expected = f"the spacing in metres, which {path.name!r} does not state"
+        expected = f"the spacing in metres, which {request.path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
         if not problems.messages:
             check_spacing(problems, spacing, check_heights(problems, values))
-    heights = labelled_heights(_from_bottom(values, first_row), spacing, units=units or "m")
+    heights = labelled_heights(from_bottom(values, request.first_row), spacing, units=request.units or "m")
     return FileContent(heights, {"stated_unit": None})
 
 
-def _from_bottom(values: Array, first_row: str | None) -> Array:
-    """Return heights with the first row at the smallest y."""
-    return values[..., ::-1, :] if first_row == "top" and values.ndim > 1 else values
-
-
-def _instrument_content(
-    path: Path,
-    channel: str | int | None,
-    units: str | None,
-    spacing: Any,
-    first_row: str | None,
-    try_points: bool = True,
-) -> FileContent:
-    try:
-        reading = read_instrument(path, channel, units, spacing, try_points)
-    except MissingExtra:
-        if file_suffix(path) in TABLES and spacing is None:
-            expected = f"the spacing in metres, for {path.name!r} as a table of heights"
-            raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
-        raise
-    return _reading_content(reading, first_row)
-
-
-def _reading_content(reading: Reading, first_row: str | None) -> FileContent:
-    """Return what an optional library has read as a surface."""
-    periodic = (reading.periodic,) * len(reading.spacing)
-    row = first_row or reading.first_row
-    heights = surface_array(_from_bottom(reading.heights, row), reading.spacing, periodic)
-    return FileContent(heights, reading.entries | {"first_row": row}, reading.microscope)
-
-
-def _netcdf_content(path: Path, channel: Any, units: str | None, spacing: Any) -> FileContent:
+def _netcdf_content(request: Request) -> FileContent:
     """Read `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x)."""
+    path, channel, spacing = request.path, request.channel, request.spacing
     with Problems(WHERE, UnreadableFile) as problems:
         candidates = _height_variables(netcdf.open(path))
-        name = next(iter(candidates)) if channel is None and len(candidates) == 1 else channel or "height"
+        name = (
+            next(iter(candidates)) if channel is None and len(candidates) == 1 else str(channel or "height")
+        )
         expected = (
             f"one of {', '.join(map(repr, candidates))}" if candidates else "a variable with dims (y, x)"
         )
         if problems.require(name in candidates, "channel", f"{expected} in {path.name!r}", name):
-            array = _in_metres(candidates[name], units, spacing, problems)
+            array = candidates[name]
+            stated = array.attrs.get("units")
+            unit = request.units or stated
+            expected = 'a unit of length, or give `units` ("m", "um" ...)'
+            is_unit = isinstance(unit, str) and unit in (*UNITS, *METRES)
+            problems.require(is_unit, f"{name}.units", expected, NONE if stated is None else stated)
+            array = usual_form(WHERE, array.assign_attrs(units=unit))[0].astype(np.float64)
+            array.attrs["units"] = "m"
+            if spacing is not None and check_spacing(problems, spacing, len(core_dims(array))):
+                array = _with_spacing(array, spacing)
             problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
-    stated = candidates[name].attrs.get("units")
     stated = stated if stated is None else str(stated)
     array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
     return FileContent(array, {"stated_unit": stated, "before": provenance_of(candidates[name]) or None})
@@ -445,40 +400,12 @@ def _height_variables(content: Any) -> dict[str, xr.DataArray]:
     }
 
 
-def _in_metres(array: xr.DataArray, units: str | None, spacing: Any, problems: Problems) -> xr.DataArray:
-    """Return heights and ascending coordinates in metres: those of the file, or from `spacing`."""
+def _with_spacing(array: xr.DataArray, spacing: Any) -> xr.DataArray:
+    """Return heights with coordinates of another spacing."""
     core = core_dims(array)
-    array = array.transpose(..., *core)
-    stated = array.attrs.get("units")
-    unit = units or ("m" if isinstance(stated, str) and stated in METRES else stated)
-    expected = 'a unit of length, or give `units` ("m", "um" ...)'
-    is_unit = isinstance(unit, str) and unit in UNITS
-    if problems.require(is_unit, f"{array.name}.units", expected, NONE if stated is None else stated):
-        array = array.copy(data=in_metres(np.asarray(array.values, dtype=np.float64), str(unit)))
-    array.attrs["units"] = "m"
-    for dim in set(core) & set(array.coords):
-        array = _ascending_metres(array, dim)
-    if spacing is not None and check_spacing(problems, spacing, len(core)):
-        sizes = [array.sizes[dim] for dim in core]
-        array = array.assign_coords(
-            plane_coords(sizes, axis_spacing(spacing, len(core)), [False] * len(core), core)
-        )
-    return array
-
-
-def _ascending_metres(array: xr.DataArray, dim: str) -> xr.DataArray:
-    """Convert the coordinate of a dim to metres, and reverse the array if it descends."""
-    axis = array.coords[dim]
-    unit = axis.attrs.get("units", "m")
-    is_other = isinstance(unit, str) and unit not in METRES and unit in UNITS
-    if is_other and axis.dtype.kind in "iuf":
-        attributes = dict(axis.attrs) | {"units": "m"}
-        if is_length(attributes.get("period")):  # another one is refused afterwards
-            attributes["period"] = in_metres(float(attributes["period"]), unit)
-        centres = in_metres(axis.values.astype(np.float64), unit)
-        array = array.assign_coords({dim: (dim, centres, attributes)})
-    descends = axis.size > 1 and axis.values[0] > axis.values[-1]
-    return array.isel({dim: slice(None, None, -1)}) if descends else array
+    sizes = [array.sizes[dim] for dim in core]
+    coords = plane_coords(sizes, axis_spacing(spacing, len(core)), [False] * len(core), core)
+    return array.assign_coords(coords)
 
 
 def _warn_of_scale(content: FileContent, name: str) -> None:

@@ -15,6 +15,7 @@ from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._files import Request
 from fractalcontact.surfaces._from_array import labelled_heights
 from fractalcontact.surfaces._read import file_content
 
@@ -130,7 +131,7 @@ def _measured(name: str) -> xr.DataArray:
 
 
 def _concrete_crack() -> xr.DataArray:
-    content = file_content(datasets_folder() / "concrete_crack.nc")
+    content = file_content(Request(datasets_folder() / "concrete_crack.nc"))
     surface = content.surface
     surface.attrs = {"title": "Synthetic crack face of concrete", "before": content.entries["before"]}
     return surface

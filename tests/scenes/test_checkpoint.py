@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 
 import netCDF4
 import numpy as np
@@ -151,13 +152,12 @@ def damaged(folder, how):
         elif how == "NetCDF":
             surface = fc.surfaces.fbm((8, 8), 1.0, hurst=0.5, rms_increment=1.0, rng=1)
             fc.save(surface, path.with_suffix(".nc")).replace(path)
-        elif how == "changed":
-            with np.load(path) as file:
-                arrays = dict(file)
-            for name, values in arrays.items():
-                if values.dtype == float and values.size:
-                    arrays[name] = np.nextafter(values, np.inf)
-            np.savez(path, **arrays)
+        elif how == "flipped bit":
+            with zipfile.ZipFile(path) as archive:
+                largest = max(archive.infolist(), key=lambda member: member.file_size)
+            content = bytearray(path.read_bytes())
+            content[largest.header_offset + largest.file_size // 2] ^= 1
+            path.write_bytes(content)
         else:
             path.write_text("not an archive", encoding="utf-8")
 
@@ -178,7 +178,7 @@ def test_surface_read_from_a_file_is_not_kept_again(uninterrupted, tmp_path, mon
     assert not [name for name in part_names if name.startswith("surfaces")]
 
 
-@pytest.mark.parametrize("how", ["truncated", "foreign", "NetCDF", "changed", "text"])
+@pytest.mark.parametrize("how", ["truncated", "foreign", "NetCDF", "flipped bit", "text"])
 def test_damaged_part_is_reported_and_computed_again(uninterrupted, tmp_path, monkeypatch, how):
     with monkeypatch.context() as patch:
         watch_calls(patch, lambda name: signal.raise_signal(signal.SIGINT))
