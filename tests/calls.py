@@ -250,7 +250,6 @@ CALLS = {
     "joints.hydraulic_aperture": lambda: {"aperture": 1e-4, "roughness_coefficient": 10},
     "joints.closure": lambda: {"crack": crack(), "shear": [1e-4], "normal_force": [1.0, 10.0]},
     "joints.closure_laws": lambda: {"closure": closed()},
-    "joints.cyclic_shear": lambda: {"dilatancy": slid(), "path": [0.0, 3e-4, -3e-4, 0.0]},
     "joints.decorrelation_length": lambda: {"crack": crack()},
     "joints.delta_dimension": lambda: {"crack": crack(), "shear": [1e-4]},
     "joints.delta_surface": lambda: {"crack": crack(), "shear": [1e-4], "direction": "W"},

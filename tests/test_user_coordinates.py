@@ -66,7 +66,6 @@ FUNCTIONS = {
         annotated(fc.joints.closure(crack(z), shear=SHEAR, normal_force=[1.0, 2.0, 3.0]))
     ),
     "friction": lambda z: fc.joints.friction(annotated(sheared(z, normal_force=[1.0]))),
-    "cyclic_shear": lambda z: fc.joints.cyclic_shear(annotated(sheared(z)), [0.0, 1e-4, -1e-4]),
     "partial_slip": lambda z: fc.joints.partial_slip(
         crack(z), shear=SHEAR, normal_force=1.0, tangential_force=[0.3, -0.3], keep=("slip_state",)
     ),

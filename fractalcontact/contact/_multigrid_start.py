@@ -65,28 +65,17 @@ def bearing_start(problem: Problem, force: float, dtype: Any) -> tuple[Array, fl
 
 
 def coarsen(problem: Problem, factors: tuple[int, ...]) -> Problem:
-    """Return the problem of the mean gap over cells of `factors` nodes; the extent stays what it is."""
-    body = problem.body
-    shape = (-(-body.shape[0] // factors[0]), -(-body.shape[1] // factors[1]))
-    spacing = (
-        body.spacing[0] * body.shape[0] / shape[0],
-        body.spacing[1] * body.shape[1] / shape[1],
-    )
-    gap = problem.gap
-    for axis, factor in enumerate(factors):
-        if factor > 1:
-            gap = mean_of_neighbours(gap, axis)
-    coarse = Body(shape, spacing, body.periodic, body.influence, coarse_radius(body, spacing))
+    """Return the problem of the mean gap over cells of `factors` nodes; the extent stays what it is.
+
+    A last node without neighbour is its own mean.
+    """
+    body, (fy, fx) = problem.body, factors
+    padded = np.pad(problem.gap, [(0, -n % f) for n, f in zip(body.shape, factors, strict=True)], mode="edge")
+    ny, nx = padded.shape[0] // fy, padded.shape[1] // fx
+    gap = padded.reshape(ny, fy, nx, fx).mean(axis=1).mean(axis=2)
+    spacing = (body.spacing[0] * body.shape[0] / ny, body.spacing[1] * body.shape[1] / nx)
+    coarse = Body((ny, nx), spacing, body.periodic, body.influence, coarse_radius(body, spacing))
     return Problem(coarse, gap, problem.p_max)
-
-
-def mean_of_neighbours(gap: Array, axis: int) -> Array:
-    """Return the mean of every two nodes along an axis; a last one without neighbour stays."""
-    lines = np.moveaxis(gap, axis, 0)
-    means, others = lines[::2].copy(order="K"), lines[1::2]
-    means[: len(others)] += others
-    means[: len(others)] /= 2
-    return np.moveaxis(means, 0, axis)
 
 
 def coarse_radius(body: Body, spacing: tuple[float, float]) -> float:

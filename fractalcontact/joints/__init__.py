@@ -10,7 +10,8 @@ closure_laws          exponential and hyperbolic laws fitted to the closure, and
 dilatancy             the opening of the faces during shear: rigid, under a normal force, or against a spring
 friction              friction angle and shear strength from the dilatancy
 self_weight           shear strength against the size of the structure that loads the joint
-cyclic_shear          shear stress along a path of shear that reverses
+direct_shear          shear test with wear, along a path of shear that may reverse
+partial_slip          stick, slip and stiffness under a shear force below that of sliding
 decorrelation_length  the shear at which the facing heights have decorrelated
 transmissivity        the flow through the open part of the joint
 uplift                the force of the water in the joint, and its line of action

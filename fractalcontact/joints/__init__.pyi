@@ -3,7 +3,6 @@ from ._bandis_closure import bandis_closure as bandis_closure
 from ._closure import closure as closure
 from ._closure_laws import closure_laws as closure_laws
 from ._crack import Crack as Crack
-from ._cyclic_shear import cyclic_shear as cyclic_shear
 from ._decorrelation import decorrelation_length as decorrelation_length
 from ._delta_dimension import delta_dimension as delta_dimension
 from ._delta_surface import delta_surface as delta_surface
@@ -28,7 +27,6 @@ __all__ = [
     "bandis_closure",
     "closure",
     "closure_laws",
-    "cyclic_shear",
     "decorrelation_length",
     "delta_dimension",
     "delta_surface",

@@ -12,37 +12,31 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints import _criteria
-from fractalcontact.joints._criteria import CLOSURE_FITS, LARGEST_JRC
+from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quantities
 
 Array = np.ndarray[Any, np.dtype[Any]]
-
-POSITIVE: dict[str, Any] = {"at_least": 1e-100, "at_most": 1e100}  # products and powers do not overflow
 
 
 def _check(
     problems: Problems,
     *,
     nominal_pressure: Any,
-    roughness_coefficient: Any,
-    wall_strength: Any,
-    compressive_strength: Any,
     aperture: Any,
+    compressive_strength: Any,
     cycle: Any,
+    **joint: Any,
 ) -> None:
-    problems.numbers("nominal_pressure", nominal_pressure, at_least=0, at_most=POSITIVE["at_most"])
-    problems.number("roughness_coefficient", roughness_coefficient, at_least=0, at_most=LARGEST_JRC)
-    problems.number("wall_strength", wall_strength, **POSITIVE)
-    problems.number("compressive_strength", compressive_strength, **POSITIVE, optional=True)
-    problems.number("aperture", aperture, **POSITIVE, optional=True)
+    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE | {"at_least": 0})
+    check_quantities(problems, **joint)
+    optional = {"aperture": aperture, "compressive_strength": compressive_strength}
+    check_quantities(problems, optional=True, **optional)
     problems.integer("cycle", cycle, at_least=1, at_most=len(CLOSURE_FITS))
     if problems.messages:
         return
     if compressive_strength is not None:
-        weakest = bool(float(wall_strength) <= float(compressive_strength))
-        problems.require(weakest, "wall_strength", "at most compressive_strength", wall_strength)
-    opening, stiffness, closure = _constants(
-        roughness_coefficient, wall_strength, compressive_strength, aperture, cycle
-    )
+        weakest = float(joint["wall_strength"]) <= float(compressive_strength)
+        problems.require(weakest, "wall_strength", "at most compressive_strength", joint["wall_strength"])
+    opening, stiffness, closure = _constants(cycle=cycle, **joint, **optional)
     problems.require(
         stiffness > 0 and 0 < closure <= opening,
         "roughness_coefficient, wall_strength, aperture",
@@ -135,10 +129,15 @@ def bandis_closure(
 
 
 def _constants(
-    roughness: float, wall_strength: float, intact: float | None, aperture: float | None, cycle: int
+    roughness_coefficient: float,
+    wall_strength: float,
+    compressive_strength: float | None,
+    aperture: float | None,
+    cycle: int,
 ) -> tuple[float, float, float]:
     """Return aperture under no load, initial stiffness and greatest closure."""
-    jrc, jcs, ucs = float(roughness), float(wall_strength), float(intact or wall_strength)
+    jrc, jcs = float(roughness_coefficient), float(wall_strength)
+    ucs = float(compressive_strength or wall_strength)
     opening = _criteria.bandis_aperture(jrc, jcs, ucs) if aperture is None else float(aperture)
     if not opening > 0:  # a joint without roughness is closed
         return opening, math.nan, math.nan

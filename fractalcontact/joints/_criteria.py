@@ -14,14 +14,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fractalcontact.base.validation import Problems
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MPA, MM, MICRON = 1e6, 1e-3, 1e-6  # units of the published fits
+SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer
+LARGEST_JRC = 20.0  # end of the scale of standard profiles (Barton and Choubey 1977)
+POSITIVE: dict[str, Any] = {"at_least": 1e-30, "at_most": 1e30}  # ratios and powers do not overflow
+# of the arguments of the functions around these formulas
+BOUNDS: dict[str, dict[str, Any]] = {
+    "aperture": POSITIVE,
+    "asperity_angle": {"at_least": 0, "below": 90},
+    "basic_friction_angle": {"above": 0, "below": 90},
+    "cohesion": POSITIVE | {"at_least": 0},
+    "compressive_strength": POSITIVE,
+    "length": POSITIVE | {"at_least": SAMPLE_LENGTH},
+    "residual_friction_angle": {"above": 0, "below": 90},
+    "roughness_coefficient": {"at_least": 0, "at_most": LARGEST_JRC},
+    "tensile_strength": POSITIVE,
+    "wall_strength": POSITIVE,
+}
 
 # Shear strength
 
-SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer
-LARGEST_JRC = 20.0  # end of the scale of standard profiles (Barton and Choubey 1977)
 LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
 FITTED_STRESS = (0.01, 0.3)  # normal stress over wall strength of the tests of Barton and Choubey (1977)
 SHEARED_POWER, DILATION_POWER = 1.5, 4.0  # L and K of Ladanyi and Archambault (1970)
@@ -33,6 +49,12 @@ FACING_SHARE = (0.4, 0.6)
 MOBILISED = np.array(
     [(0.3, 0.0), (0.6, 0.75), (1.0, 1.0), (2.0, 0.85), (4.0, 0.7), (10.0, 0.5), (100.0, 0.0)]
 )
+
+
+def check_quantities(problems: Problems, *, optional: bool = False, **given: Any) -> None:
+    """Check numbers of a joint against `BOUNDS`; `optional` allows None."""
+    for name, value in given.items():
+        problems.number(name, value, **BOUNDS[name], optional=optional)
 
 
 @dataclass(frozen=True)

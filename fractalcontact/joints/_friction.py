@@ -31,8 +31,9 @@ LOCKED = (
 UNRESOLVED = "NaN where the shears do not resolve the distance: a step of shear is longer, or it exceeds them"
 PEAKS = ("peak_friction_angle", "peak_shear_strength", "secant_friction_angle", "secant_shear_strength")
 PEAK_SHEARS = ("peak_shear", "peak_strength_shear")
-NOT_KNOWN = "depends on the distance in a way that is not known: the shears resolve one distance only"
-LOCKED_OVER_HALF = "is not known over half the distance: the faces lock"
+NOT_KNOWN = (
+    "depends on the distance in a way that is not known: the shears resolve one only, or the faces lock"
+)
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 ERROR = "that of the dilatancy"
 # a window given as a decimal must not lose a point to rounding, nor one of two equally near points
@@ -53,12 +54,39 @@ def _check(
     distance: Any,
     nominal_pressure: Any,
 ) -> None:
+    is_form = problems.choice("form", form, FORMS)
+    problems.number("smoothing", smoothing, above=0, optional=True)
     bounded = problems.number("distance", distance, above=0, optional=True)
-    if check_dilatancy(problems, dilatancy, basic_friction_angle, form, smoothing, nominal_pressure):
-        reach = float(np.ptp(read_dilatancy(dilatancy)[1]))
-        if bounded and distance is not None:
-            expected = f"at most the {reach:g} m that the shears cover"
-            problems.require(float(distance) <= reach * WINDOW_ROUNDING, "distance", expected, distance)
+    problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
+    problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
+    expected = "the Dataset of fractalcontact.joints.dilatancy"
+    if not isinstance(dilatancy, xr.Dataset):
+        problems.add("dilatancy", expected, f"an object of type {type(dilatancy).__name__}")
+        return
+    if not problems.result("dilatancy", dilatancy):
+        return
+    name = _dilatancy_name(dilatancy)
+    needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
+    if is_form and form == "energy":
+        expected_form = "'kinematic' for a dilatancy without forces, and where faces yield"
+        is_elastic = name == "dilatancy" and "plastic_work" not in dilatancy
+        problems.require(is_elastic, "form", expected_form, form)
+        needed += ENERGIES if is_elastic else []
+    absent = [variable for variable in needed if variable not in dilatancy.variables]
+    if absent or "shear" not in dilatancy[name].dims:
+        problems.add("dilatancy", expected, f"no {', '.join(absent) or 'dim shear'}")
+        return
+    if name == "dilatancy":
+        expected = "None where the dilatancy is that under forces"
+        problems.require(nominal_pressure is None, "nominal_pressure", expected, nominal_pressure)
+    basic_angle = _basic_angle(dilatancy, basic_friction_angle)
+    problems.number("basic_friction_angle", basic_angle, at_least=0, below=90)
+    shears = _shears(dilatancy)
+    ascending = shears.size > 1 and bool((np.diff(shears) > 0).all())
+    if problems.require(ascending, "dilatancy.shear", "at least two shears, ascending", shears):
+        reach = float(np.ptp(shears))
+        short = not bounded or distance is None or float(distance) <= reach * WINDOW_ROUNDING
+        problems.require(short, "distance", f"at most the {reach:g} m that the shears cover", distance)
 
 
 @public_result(title="friction of a joint", references=REFERENCES, achieved_error=ERROR, check=_check)
@@ -134,8 +162,8 @@ def friction(
     >>> (result.peak_shear_strength / 1e6).values.round(3).tolist()
     [[1.0]]
     """
-    name, shears = read_dilatancy(dilatancy)
-    basic_angle = read_basic_angle(dilatancy, basic_friction_angle)
+    name, shears = _dilatancy_name(dilatancy), _shears(dilatancy)
+    basic_angle = float(_basic_angle(dilatancy, basic_friction_angle))
     opening = drop_unknown_coords(dilatancy[name]).drop_attrs()
     lift = opening.copy(data=lift_curve(dilatancy, form))
     result = xr.Dataset({"dilatancy_angle": _angle(opening, smoothing)})
@@ -291,32 +319,26 @@ def _secant_means(values: xr.DataArray, distances: Array) -> xr.DataArray:
     return xr.DataArray(means, dims=("distance", *curves.dims), coords={"distance": distances})
 
 
-def _shears(curve: xr.DataArray) -> Array:
+def _shears(curve: xr.DataArray | xr.Dataset) -> Array:
     return np.asarray(curve["shear"].values, dtype=np.float64)
 
 
 def _dependence(secants: xr.DataArray) -> str:
     """Return how the peak depends on the distance, from the two shortest that the shears resolve."""
-    angles = secants.transpose("distance", "shear", ...).values
-    greatest = np.where(np.isfinite(angles), angles, -np.inf).max(axis=1).reshape(len(angles), -1)
-    resolved = np.flatnonzero(np.isfinite(greatest).any(axis=1))
-    if resolved.size < 2:
+    greatest = secants.max("shear").transpose("distance", ...)
+    peaks = greatest.where(greatest < LOCKED_ANGLE).values.reshape(greatest.sizes["distance"], -1)
+    resolved = np.flatnonzero(np.isfinite(greatest.values.reshape(peaks.shape)).any(axis=1))[:2]
+    change = np.abs(np.diff(peaks[resolved], axis=0))
+    if not np.isfinite(change).any():
         return NOT_KNOWN
-    both = np.isfinite(greatest[resolved[:2]]).all(axis=0)
-    if not both.any():
-        return NOT_KNOWN
-    both &= (greatest[resolved[:2]] < LOCKED_ANGLE).all(axis=0)
-    if not both.any():
-        return LOCKED_OVER_HALF
-    shortest, next_one = greatest[resolved[:2]][:, both]
-    change = float(np.abs(shortest - next_one).max())
-    shortest_text = quantity_text(float(secants["distance"][resolved[0]]), "m")
-    if change <= NEGLIGIBLE:
-        return f"changes by at most {change:.2g} degree when the distance is halved to {shortest_text}"
-    return (
-        f"changes by up to {change:.3g} degree when the distance is halved to {shortest_text}; the "
-        "shears resolve no further halving: no limit is reached; compare only peaks over equal distances"
+    words = f"{np.nanmax(change):.3g} degree when the distance is halved to"
+    words += f" {quantity_text(float(secants['distance'][resolved[0]]), 'm')}"
+    if np.nanmax(change) <= NEGLIGIBLE:
+        return f"changes by at most {words}"
+    limit = (
+        "the shears resolve no further halving: no limit is reached; compare only peaks over equal distances"
     )
+    return f"changes by up to {words}; {limit}"
 
 
 def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
@@ -339,65 +361,17 @@ def mark_locked(result: xr.Dataset, names: Sequence[str]) -> None:
             result[name].attrs["reason"] = LOCKED
 
 
-def check_dilatancy(
-    problems: Problems,
-    dilatancy: Any,
-    basic_friction_angle: Any,
-    form: Any,
-    smoothing: Any,
-    nominal_pressure: Any,
-) -> bool:
-    """Check the Dataset of `dilatancy` and the options that are common to friction and cyclic shear."""
-    is_form = problems.choice("form", form, FORMS)
-    problems.number("smoothing", smoothing, above=0, optional=True)
-    problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
-    problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
-    expected = "the Dataset of fractalcontact.joints.dilatancy"
-    if not isinstance(dilatancy, xr.Dataset):
-        problems.add("dilatancy", expected, f"an object of type {type(dilatancy).__name__}")
-        return False
-    if not problems.result("dilatancy", dilatancy):
-        return False
-    name = _dilatancy_name(dilatancy)
-    needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
-    if is_form and form == "energy":
-        expected_form = "'kinematic' for a dilatancy without forces, and where faces yield"
-        is_elastic = name == "dilatancy" and "plastic_work" not in dilatancy
-        problems.require(is_elastic, "form", expected_form, form)
-        needed += ENERGIES if is_elastic else []
-    absent = [variable for variable in needed if variable not in dilatancy.variables]
-    if absent or "shear" not in dilatancy[name].dims:
-        problems.add("dilatancy", expected, f"no {', '.join(absent) or 'dim shear'}")
-        return False
-    if name == "dilatancy" and nominal_pressure is not None:
-        expected = "None where the dilatancy is that under forces"
-        problems.add("nominal_pressure", expected, nominal_pressure)
-    basic_angle = _basic_angle(dilatancy, basic_friction_angle)
-    problems.number("basic_friction_angle", basic_angle, at_least=0, below=90)
-    shears = np.asarray(dilatancy["shear"].values, dtype=np.float64)
-    ascending = shears.size > 1 and bool((np.diff(shears) > 0).all())
-    return problems.require(ascending, "dilatancy.shear", "at least two shears, ascending", shears)
-
-
-def read_dilatancy(dilatancy: xr.Dataset) -> tuple[str, Array]:
-    """Return the name of the dilatancy to use (under force if present, otherwise rigid) and the shears."""
-    return _dilatancy_name(dilatancy), np.asarray(dilatancy["shear"].values, dtype=np.float64)
-
-
-def read_basic_angle(dilatancy: xr.Dataset, basic_friction_angle: float | None) -> float:
-    """Return the given basic friction angle, or the one stored with the dilatancy."""
-    return float(_basic_angle(dilatancy, basic_friction_angle))
-
-
 def _dilatancy_name(dilatancy: xr.Dataset) -> str:
+    """Return the name of the dilatancy to use: under force if present, otherwise rigid."""
     return "dilatancy" if "dilatancy" in dilatancy else "rigid_dilatancy"
 
 
-def _basic_angle(dilatancy: xr.Dataset, basic_friction_angle: Any) -> Any:
-    value = basic_friction_angle
-    if basic_friction_angle is None:
-        value = dilatancy.get("basic_friction_angle")
-    return value.item() if hasattr(value, "item") and getattr(value, "size", 0) == 1 else value
+def _basic_angle(dilatancy: xr.Dataset, basic_friction_angle: float | None) -> Any:
+    """Return the given basic friction angle, or the one stored with the dilatancy."""
+    if basic_friction_angle is not None:
+        return basic_friction_angle
+    stored = dilatancy.get("basic_friction_angle")
+    return stored.item() if stored is not None and stored.size == 1 else stored
 
 
 def dilatancy_slopes(shears: Array, curves: Array, smoothing: float | None) -> tuple[Array, Array]:

@@ -15,28 +15,24 @@ from fractalcontact.joints._criteria import (
     GREATEST_VARIATION,
     HYDRAULIC_APERTURE,
     LARGEST_JRC,
+    POSITIVE,
 )
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-LARGEST = 1e100  # products and powers of such numbers do not overflow
+
+BOUNDS: dict[str, dict[str, Any]] = {
+    "aperture": POSITIVE,
+    "roughness_coefficient": {"above": 0, "at_most": LARGEST_JRC},
+    "spread": {"at_least": 0, "at_most": POSITIVE["at_most"]},
+    "contact_fraction": {"at_least": 0, "at_most": GREATEST_CONTACT},
+}
 
 
 def _check(problems: Problems, *, aperture: Any, model: Any, **given: Any) -> None:
-    bounds: dict[str, dict[str, Any]] = {
-        "aperture": {"at_least": 1 / LARGEST, "at_most": LARGEST},
-        "roughness_coefficient": {"above": 0, "at_most": LARGEST_JRC},
-        "spread": {"at_least": 0, "at_most": LARGEST},
-        "contact_fraction": {"at_least": 0, "at_most": GREATEST_CONTACT},
-    }
     for name, value in ({"aperture": aperture} | given).items():
-        problems.numbers(
-            name,
-            value,
-            **bounds[name],
-            optional=name != "aperture",
-            any_shape=isinstance(value, xr.DataArray),
-        )
+        options = BOUNDS[name] | {"optional": name in given, "any_shape": isinstance(value, xr.DataArray)}
+        problems.numbers(name, value, **options)
     if problems.choice("model", model, HYDRAULIC_APERTURE):
         for name, value in given.items():
             if name in HYDRAULIC_APERTURE[model].needs:
@@ -48,13 +44,10 @@ def _check(problems: Problems, *, aperture: Any, model: Any, **given: Any) -> No
     arrays = [_labelled(value) for value in (aperture, *given.values()) if value is not None]
     lengths = {array.size for array in arrays if array.dims == ("point",)}
     if problems.require(len(lengths) < 2, "aperture", "arrays of one shape, or numbers", sorted(lengths)):
-        variation = _largest_variation(aperture, given["spread"]) if model == "zimmerman_bodvarsson" else 0.0
+        spread = given["spread"] if model == "zimmerman_bodvarsson" else 0.0
+        variation = float((_labelled(spread) / _labelled(aperture)).max())
         expected = f"at most {GREATEST_VARIATION:g} of the aperture"
         problems.require(variation <= GREATEST_VARIATION, "spread", expected, f"{variation:.3g} of it")
-
-
-def _largest_variation(aperture: Any, spread: Any) -> float:
-    return float((_labelled(spread) / _labelled(aperture)).max())
 
 
 @public_result(

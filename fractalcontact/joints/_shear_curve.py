@@ -13,13 +13,19 @@ from fractalcontact.base.compass import checked_direction, read_direction
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints import _criteria
-from fractalcontact.joints._criteria import FITTED_STRESS, LARGEST_ANGLE, LARGEST_JRC, SAMPLE_LENGTH
+from fractalcontact.joints._criteria import (
+    FITTED_STRESS,
+    LARGEST_ANGLE,
+    LARGEST_JRC,
+    POSITIVE,
+    SAMPLE_LENGTH,
+    check_quantities,
+)
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
-from fractalcontact.joints._strength_envelope import OUTSIDE, STRESS
+from fractalcontact.joints._strength_envelope import OUTSIDE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-LARGEST = STRESS["at_most"]
 SMALLEST_PEAK = (
     1e-4  # displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
 )
@@ -35,26 +41,22 @@ def _check(
     surface: Any,
     displacement: Any,
     nominal_pressure: Any,
-    wall_strength: Any,
-    residual_friction_angle: Any,
     direction: Any,
     roughness_coefficient: Any,
-    length: Any,
     damage_coefficient: Any,
     normal_stiffness: Any,
+    **joint: Any,
 ) -> None:
-    if problems.numbers("displacement", displacement, at_least=0, at_most=LARGEST):
+    if problems.numbers("displacement", displacement, at_least=0, at_most=POSITIVE["at_most"]):
         ascending = bool((np.diff(float_array(displacement)) > 0).all())
         problems.require(ascending, "displacement", "ascending values", displacement)
-    problems.numbers("nominal_pressure", nominal_pressure, **STRESS)
-    problems.number("wall_strength", wall_strength, **STRESS)
-    problems.number("residual_friction_angle", residual_friction_angle, above=0, below=LARGEST_ANGLE)
-    problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=LARGEST)
+    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
+    residual = joint.pop("residual_friction_angle")
+    problems.number("residual_friction_angle", residual, above=0, below=LARGEST_ANGLE)
+    check_quantities(problems, **joint)
+    check_quantities(problems, optional=True, roughness_coefficient=roughness_coefficient)
     problems.number("damage_coefficient", damage_coefficient, at_least=1, at_most=2, optional=True)
-    problems.number("normal_stiffness", normal_stiffness, above=0, at_most=LARGEST, optional=True)
-    problems.number(
-        "roughness_coefficient", roughness_coefficient, at_least=0, at_most=LARGEST_JRC, optional=True
-    )
+    problems.number("normal_stiffness", normal_stiffness, **POSITIVE, optional=True)
     direction = checked_direction(problems, direction)
     if surface is None:
         expected = "heights, or a roughness_coefficient in their place"

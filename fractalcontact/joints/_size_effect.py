@@ -10,14 +10,13 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.joints._criteria import POSITIVE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-LARGEST = 1e100  # powers of such a ratio do not overflow
-
 
 def _check(problems: Problems, *, size_ratio: Any, contact_dimension: Any, roughness_dimension: Any) -> None:
-    problems.numbers("size_ratio", size_ratio, at_least=1 / LARGEST, at_most=LARGEST)
+    problems.numbers("size_ratio", size_ratio, **POSITIVE)
     is_number = problems.number("contact_dimension", contact_dimension, at_least=0, at_most=2)
     lowest = float(contact_dimension) if is_number else 0.0
     problems.number("roughness_dimension", roughness_dimension, at_least=lowest, at_most=2)

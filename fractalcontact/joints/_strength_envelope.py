@@ -14,14 +14,20 @@ from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints import _criteria
-from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, STRENGTH, STRENGTH_REFERENCES, Joint
+from fractalcontact.joints._criteria import (
+    POSITIVE,
+    SAMPLE_LENGTH,
+    STRENGTH,
+    STRENGTH_REFERENCES,
+    Joint,
+    check_quantities,
+)
 from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.strength_envelope"
-STRESS: dict[str, Any] = {"at_least": 1e-30, "at_most": 1e30}  # Pa: ratios and powers do not overflow
 STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray 1981)
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
@@ -37,22 +43,11 @@ def _check(
     basic_friction_angle: Any,
     criterion: Any,
     direction: Any,
-    tensile_strength: Any,
     **needed: Any,
 ) -> None:
-    problems.numbers("nominal_pressure", nominal_pressure, **STRESS)
-    problems.number("wall_strength", wall_strength, **STRESS)
-    problems.number("basic_friction_angle", basic_friction_angle, above=0, below=90)
-    problems.number("tensile_strength", tensile_strength, **STRESS, optional=True)
-    bounds: dict[str, dict[str, Any]] = {
-        "residual_friction_angle": {"above": 0, "below": 90},
-        "asperity_angle": {"at_least": 0, "below": 90},
-        "roughness_coefficient": {"at_least": 0, "at_most": LARGEST_JRC},
-        "cohesion": {"at_least": 0, "at_most": STRESS["at_most"]},
-        "length": {"at_least": SAMPLE_LENGTH, "at_most": STRESS["at_most"]},
-    }
-    for name, value in needed.items():
-        problems.number(name, value, **bounds[name], optional=True)
+    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
+    check_quantities(problems, wall_strength=wall_strength, basic_friction_angle=basic_friction_angle)
+    check_quantities(problems, optional=True, **needed)
     if criterion is None:
         usable = _usable(surface, needed)
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"

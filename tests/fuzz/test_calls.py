@@ -157,7 +157,7 @@ KEPT = {
         rough(48)).isel(wavelength=slice(0)), "result.wavelength"),
     "no sizes in a figure": ("plotting.estimator_errors", "bench", lambda: estimators().isel(size=slice(0)),
                              "bench.size"),
-    "azimuth in time": ("joints.cyclic_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
+    "azimuth in time": ("joints.direct_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
 }  # fmt: skip
 
 

@@ -30,7 +30,6 @@ def results(make_face, rough):
         "closure_laws": fc.joints.closure_laws(
             fc.joints.closure(crack, shear=shear, normal_force=[1, 5, 50])
         ),
-        "cyclic_shear": fc.joints.cyclic_shear(sprung, [0.0, 2e-4, -1e-4]),
         "roughness_coefficient": fc.joints.roughness_coefficient(crack.lower, direction=["E", 30]),
         "friction": fc.joints.friction(opening),
         "rigid_friction": fc.joints.friction(fc.joints.dilatancy(crack, shear=shear)),
@@ -41,7 +40,7 @@ def results(make_face, rough):
 
 
 NAMES = (
-    "sprung", "closure_laws", "cyclic_shear", "roughness_coefficient",
+    "sprung", "closure_laws", "roughness_coefficient",
     "delta_surface", "one_delta_surface", "rigid", "dilatancy", "closure", "friction", "rigid_friction",
     "transmissivity", "decorrelation_length", "register",
 )  # fmt: skip

@@ -46,13 +46,7 @@ def test_validate_accepts_a_call_and_computes_nothing(crack, make_face, teeth, m
     fc.joints.dilatancy.validate(crack, shear=S, normal_force=1.0, normal_stiffness=1e9)
     fc.joints.decorrelation_length.validate(crack)
     fc.joints.friction.validate(teeth, nominal_pressure=1e6)
-    fc.joints.cyclic_shear.validate(teeth, [0.0, 4e-3, -4e-3])
     face = make_face(np.zeros((20, 20)), S)
     fc.joints.register.validate(face, face)
     fc.joints.transmissivity.validate(face)
     fc.joints.roughness_coefficient.validate(face, lag=S)
-
-
-def test_validate_refuses_a_dilatancy_that_does_not_cover_the_path(teeth):
-    with pytest.raises(ValueError, match="path: expected positions from 0 to 0.008 m"):
-        fc.joints.cyclic_shear.validate(teeth, [0.0, 9e-3])
