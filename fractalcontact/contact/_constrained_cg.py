@@ -99,12 +99,15 @@ SLIGHT_CHANGE = 0.001  # share of the free set that may change without loss of t
 MAX_ITERATIONS = 2000  # 206 solutions on rough surfaces took 20 at most at a tolerance of 1e-10
 MAX_TRANSFORMS = 1500  # pairs of one run from 512 x 512 nodes on: ten times those of hard problems, a minute
 SMALLER_PLANES = 4.0  # times as many at most on smaller planes: spikes that yield took up to 1900 at n = 160
-PATIENCE = 40  # iterations without progress: twice those of a whole solution
-SMALLEST_FALL = 1e-3  # of the objective, over the sums it is made of: less is no progress
+PATIENCE = 40  # iterations without progress: twice those of a whole solution; 10 and 160 changed no solution
+# of the objective, over its rounding: less is no progress; 1e-4 and 1e-2 changed nothing
+SMALLEST_FALL = 1e-3
 MAX_HALVINGS = 20  # of a step, a factor 1e-6; none in 206 solutions on rough surfaces with and without p_max
 # elements at a time, which stay in the cache; threads that take fewer wait for each other's calls of NumPy
 STRIP = 1 << 17
-ROUNDING_OF_STEPS = 0.01  # share of the tolerance: what rounding may add to a displacement that follows steps
+# share of the tolerance: what rounding may add to a displacement that follows steps; .001 and .1 took as many
+# transforms
+ROUNDING_OF_STEPS = 0.01
 RELEASED: Array = np.empty((0, 0))  # stands in for an array whose memory is free for the next one
 
 

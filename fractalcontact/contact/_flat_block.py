@@ -29,7 +29,7 @@ from fractalcontact.contact._scaled_problem import (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_ITERATIONS = 500  # 11 to 17 are usual, 26 for 3 x 400 nodes
-TARGET = 1e-14  # spread of the displacement over its mean at which the solve stops
+TARGET = 1e-14  # spread of the displacement over its mean at which the solve stops: what rounding leaves
 
 
 def flat_stiffness(

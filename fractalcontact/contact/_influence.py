@@ -19,7 +19,7 @@ DISC_RADII = ("second_order", "inscribed", "equal_area")
 # operator positive: its least value over that of the half-space is .30 there, and -.09 at 2.5
 GREATEST_RATIO = 2.0
 SQUARE_RADIUS = 0.4365941077293225  # the second-order radius on a square grid
-NEAR = 12  # cells summed one by one before the tail of a lattice sum
+NEAR = 12  # cells summed one by one before the tail of a lattice sum; 8 and 20 give the same radius to 3e-16
 
 
 def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radius: float) -> Array:

@@ -34,21 +34,23 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
             y, x = i * dy, j * dx
             reach = max(y, x) / largest
             total = 0.0
-            if i < 3 and j < 3:
+            if i < 3 and j < 3:  # too near for quadrature, and near enough for the digits of the closed form
                 for sy in (-0.5, 0.5):
                     for sx in (-0.5, 0.5):
                         b, a = y + sy * dy, x + sx * dx
                         corner = b * np.arcsinh(a / abs(b)) + a * np.arcsinh(b / abs(a))
                         total += corner if sy * sx > 0 else -corner
                 table[i, j] = total / (np.pi * dy * dx)
-            elif reach > 4:
+            elif (
+                reach > 4
+            ):  # each order from the distance on at which the next lower one still leaves rounding
                 rule = 0 if reach > 100 else 1 if reach > 30 else 2 if reach > 10 else 3
                 for k in range(orders[rule]):
                     for m in range(orders[rule]):
                         b, a = y + nodes[rule, k] * dy, x + nodes[rule, m] * dx
                         total += weights[rule, k] * weights[rule, m] / np.sqrt(a * a + b * b)
                 table[i, j] = total / np.pi
-            elif i >= j:
+            elif i >= j:  # closed along x, where the cell is near; quadrature across, where r changes least
                 for k in range(orders[4]):
                     b = y + nodes[4, k] * dy
                     total += weights[4, k] * (np.arcsinh((x + dx / 2) / b) - np.arcsinh((x - dx / 2) / b))

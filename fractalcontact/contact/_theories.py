@@ -24,7 +24,8 @@ THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
 SMALL_CONTACT = 0.05  # contact fraction beyond which asperities no longer deform independently
 GAMMA = 0.45  # gamma of Yang and Persson (2008): elastic energy over that of complete contact, at small loads
 FULL = 26.0  # argument of erf at which contact is complete: exp(-FULL^2) is the smallest number
-SEPARATIONS = (-8.0, 36.0)  # of the flat from the mean summit, in standard deviations of the summits
+# of the flat from the mean summit, in standard deviations of the summits: F_3/2 from 23 down to 3e-286
+SEPARATIONS = (-8.0, 36.0)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)  # exp(-t^2) erf(t)^2 on 0 ... 7: error below 1e-13
 TAIL = 7.0  # exp(-t^2) beyond this is below 1e-21
 
@@ -36,7 +37,7 @@ SMOOTH = 1e-3  # rms distance of a surface from a paraboloid, over its range: be
 # curvature along a summit over that across it: the fit of a cylinder leaves 1e-16 of it, and the ratio of the
 # axes, found between 0 and 1 - 1e-12, holds up to 7e10
 CYLINDER = 1e-9
-ROUND = 1e-6  # squared eccentricity below which an ellipse is a circle to rounding
+ROUND = 1e-6  # squared eccentricity below which an ellipse is a circle: 1e-8 and 1e-4 gave the same areas
 PARABOLOID = (
     "hertz holds on one smooth summit (no cylinder) without periods, while the contact is inside the surface"
 )

@@ -24,7 +24,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[float, float]
 
 WHERE = "fractalcontact.joints.delta_dimension"
-WINDOW = (1.0, 16.0)  # cells
+WINDOW = (1.0, 16.0)  # cells; 8 in place of 16 and 2 in place of 1 change the dimensions by up to 5 and 7 %
 ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a lower delta-surface is flat
 FLAT = "NaN where the delta-surface is flat: a plane has no exponent"
 DIFFERENCE_QUOTIENT = (

@@ -26,9 +26,10 @@ from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords,
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.delta_surface"
-DEGREE = 5  # of the spline
+DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
 SPLINE_REACH = 48  # cells beyond which a height no longer changes a quintic spline (0.43^48 = 3e-18)
-# the error of the spline is measured on so many lines of at least so many points, without so many at the ends
+# the error of the spline is measured on so many lines of at least so many points, without so many at the
+# ends; 64 lines change it by .2 %, 1024 by none, a margin of 0 and 5 by .3 and .02 %
 ERROR_LINES, SHORTEST_LINE, ERROR_MARGIN = 256, 40, 2
 
 

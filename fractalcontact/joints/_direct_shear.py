@@ -19,6 +19,7 @@ from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array, word_tuple
 from fractalcontact.joints._crack import FILL, Crack, check_crack
+from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
 from fractalcontact.joints._sheared_contact import Pressing, check_pressing
 from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, balanced_step, shear_stiffness
@@ -27,7 +28,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 MAPS = ("residual_lower", "residual_upper")
 LARGEST_STEP = 8  # cells along an axis in which the block comes back onto the grid
-SMALLEST, LARGEST = 1e-30, 1e30  # of stresses and stiffnesses: their ratios do not overflow
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
 
 
@@ -45,23 +45,20 @@ def _check(
     keep: Any,
     **solver: Any,
 ) -> None:
-    bounds: Any = {"at_least": SMALLEST, "at_most": LARGEST}
-    problems.number("normal_stiffness", normal_stiffness, **bounds, optional=True)
-    problems.number("shear_stiffness", shear_stiffness, **bounds, optional=True)
+    problems.number("normal_stiffness", normal_stiffness, **POSITIVE, optional=True)
+    problems.number("shear_stiffness", shear_stiffness, **POSITIVE, optional=True)
     problems.number("distance", distance, above=0, optional=True)
     if keep is not None:
         problems.choices("keep", keep, MAPS)
-    hardness_is_valid = problems.number("hardness", hardness, **bounds)
-    has_load = problems.numbers("nominal_pressure", nominal_pressure, **bounds)
+    hardness_is_valid = problems.number("hardness", hardness, **POSITIVE)
+    has_load = problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
     if has_load and hardness_is_valid:
         greatest = float(float_array(nominal_pressure).max())
         problems.require(greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest)
     check_crack(problems, crack)
-    pressure = nominal_pressure if has_load else 0.0
-    check_pressing(
-        problems, crack, nominal_pressure=pressure, hardness=hardness if hardness_is_valid else None, **solver
-    )
-    path_is_valid = problems.numbers("path", path, at_least=-LARGEST, at_most=LARGEST)
+    solver["hardness"] = hardness if hardness_is_valid else None
+    check_pressing(problems, crack, nominal_pressure=nominal_pressure if has_load else 0.0, **solver)
+    path_is_valid = problems.numbers("path", path, at_least=-POSITIVE["at_most"], at_most=POSITIVE["at_most"])
     if check_direction(problems, direction) and path_is_valid and isinstance(crack, Crack):
         _check_path(problems, crack, _turning_points(path), read_direction(direction))
 

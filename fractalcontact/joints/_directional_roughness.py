@@ -19,7 +19,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 EVERY_5_DEGREES = tuple(5.0 * i for i in range(72))
 THRESHOLDS = 200  # thresholds of dip at which the law is fitted; 100 or 400 change C by less than 0.1 %
-LARGEST_SHAPE = 1e6
+LARGEST_SHAPE = 1e6  # ends the search where all dips but the greatest are nearly zero
 ROUNDING = 64 * np.finfo(np.float64).eps  # smallest slope, over the greatest height over the spacing
 NO_FACET = "NaN where no facet faces the shear"
 REFERENCES = (

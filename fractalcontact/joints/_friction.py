@@ -40,7 +40,7 @@ ERROR = "that of the dilatancy"
 WINDOW_ROUNDING = 1.0 + 1e-9
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
 FEWEST_STEPS = 2  # of shear in the default distance: the peak over half of it is then known as well
-HALVINGS = 20  # of the distance, and doublings: a factor of a million both ways
+HALVINGS = 20  # of the distance, and doublings: a factor of a million, more than any path of shears resolves
 NEGLIGIBLE = 1.0  # degree; change of the peak when the distance is halved
 
 

@@ -14,6 +14,7 @@ from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.joints._crack import Crack
+from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._dilatancy import dilatancy
 from fractalcontact.joints._friction import LOCKED_ANGLE, mark_locked
 
@@ -21,7 +22,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
 FROM_RIGID = ("rigid_dilatancy", "basic_friction_angle", "nominal_area")
-LARGEST = 1e100  # products of such numbers do not overflow
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
 RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
@@ -37,11 +37,11 @@ def _check(
     direction: Any,
     **solver: Any,
 ) -> None:
-    weight = problems.number("unit_weight", unit_weight, above=0, at_most=LARGEST)
+    weight = problems.number("unit_weight", unit_weight, **POSITIVE)
     # any shear and force, to check the other arguments as well
     shear = shear if problems.numbers("shear", shear, above=0) else 0.0
     force: Any = 1.0
-    if problems.numbers("structure_size", structure_size, above=0, at_most=LARGEST):
+    if problems.numbers("structure_size", structure_size, **POSITIVE):
         sizes = float_array(structure_size)
         ascending = bool((np.diff(sizes) > 0).all())
         problems.require(ascending, "structure_size", "ascending sizes, each once", structure_size)

@@ -26,12 +26,10 @@ from fractalcontact.joints._strength_envelope import OUTSIDE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SMALLEST_PEAK = (
-    1e-4  # displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
-)
-FEWEST_STEPS = (
-    200  # of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
-)
+# displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
+SMALLEST_PEAK = 1e-4
+# of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
+FEWEST_STEPS = 200
 SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
 
 

@@ -37,9 +37,19 @@ Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.joints.uplift"
 EDGES = {"W": ("x", 0.0), "E": ("x", 1.0), "S": ("y", 0.0), "N": ("y", 1.0)}  # axis, share of its extent
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
-SMALLEST_STRESS, LARGEST_PRESSURE = 1e-30, 1e12  # Pa
-SOFTEST = 1e3  # Pa/m
-BALANCE = 1e-10  # relative change of the pressures that ends the iteration with the opening
+LARGEST = 1e12  # Pa or m: far beyond water and dams; products do not overflow
+PRESSURE = {"at_least": 0, "at_most": LARGEST}
+BOUNDS: dict[str, dict[str, Any]] = {
+    "upstream_pressure": {"above": 0, "at_most": LARGEST},
+    "downstream_pressure": PRESSURE,
+    "drain_pressure": PRESSURE | {"optional": True},
+    "drain_diameter": {"at_least": 0},
+    "drain_share": {"at_least": 0, "at_most": 1},
+    "normal_stiffness": {"at_least": 1e3, "optional": True},  # Pa/m: softer joints open by metres
+    "total_stress": {"at_least": 1e-30, "at_most": LARGEST, "optional": True},
+}
+# change of the pressures that ends the iteration with the opening: it leaves an error of 5e-12
+BALANCE = 1e-10
 MAX_ITERATIONS = 500
 RELAXATION = 0.7  # of the opening, halved where the pressures oscillate: one that closes a bottleneck, say
 SMALLEST_RELAXATION = 0.02
@@ -47,8 +57,8 @@ FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "
 ON_PATH = ("effective_stress", "balance_error")
 RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "residual", *FORCES, *ON_PATH,
            "iterations", "converged", "run_time")  # fmt: skip
-HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones
-PLACE_ERROR = 1e-9  # of the search between two steps of the path
+HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones; 1e8 changes 2e-8
+PLACE_ERROR = 1e-9  # of the search between two steps of the path; 1e-7 and 1e-11 found the same place
 STRESS_BALANCE = 1e-4  # of the total stress: a single cell that opens takes up more than the solver's error
 NO_UPLIFT = "NaN where no water presses on the joint"
 OFF_THE_PATH = (
@@ -58,35 +68,14 @@ OFF_THE_PATH = (
 
 
 def _check(
-    problems: Problems,
-    *,
-    gap: Any,
-    upstream_pressure: Any,
-    downstream_pressure: Any,
-    upstream: Any,
-    downstream: Any,
-    drains: Any,
-    drain_pressure: Any,
-    drain_diameter: Any,
-    drain_share: Any,
-    normal_stiffness: Any,
-    total_stress: Any,
+    problems: Problems, *, gap: Any, upstream: Any, downstream: Any, drains: Any, **numbers: Any
 ) -> None:
-    high = problems.number("upstream_pressure", upstream_pressure, above=0, at_most=LARGEST_PRESSURE)
-    low = problems.number("downstream_pressure", downstream_pressure, at_least=0, at_most=LARGEST_PRESSURE)
-    if high and low:
-        expected = "less than upstream_pressure"
-        problems.require(
-            downstream_pressure < upstream_pressure, "downstream_pressure", expected, downstream_pressure
-        )
-    problems.number("drain_pressure", drain_pressure, at_least=0, at_most=LARGEST_PRESSURE, optional=True)
-    problems.number("drain_diameter", drain_diameter, at_least=0)
-    problems.number("drain_share", drain_share, at_least=0, at_most=1)
-    problems.number("normal_stiffness", normal_stiffness, at_least=SOFTEST, optional=True)
-    problems.number(
-        "total_stress", total_stress, at_least=SMALLEST_STRESS, at_most=LARGEST_PRESSURE, optional=True
-    )
-    both = normal_stiffness is not None and total_stress is not None
+    valid = {name: problems.number(name, value, **BOUNDS[name]) for name, value in numbers.items()}
+    high, low = numbers["upstream_pressure"], numbers["downstream_pressure"]
+    if valid["upstream_pressure"] and valid["downstream_pressure"]:
+        problems.require(low < high, "downstream_pressure", "less than upstream_pressure", low)
+    total_stress = numbers["total_stress"]
+    both = numbers["normal_stiffness"] is not None and total_stress is not None
     problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
     has_gap = check_gap(problems, gap, RESULTS)
     plane = gap if has_gap else None
@@ -112,7 +101,7 @@ def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray | N
     is_pair = isinstance(value, (tuple, list)) and len(value) == 2 and value[0] in ("x", "y")
     if not problems.require(is_pair, name, expected, value):
         return False
-    if not problems.number(name, value[1], at_least=-LARGEST_PRESSURE, at_most=LARGEST_PRESSURE):
+    if not problems.number(name, value[1], at_least=-LARGEST, at_most=LARGEST):
         return False
     if gap is None:
         return True

@@ -16,11 +16,13 @@ from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.direct_shear"
-LOAD_ERROR = 1e-3  # relative error of the load on the contacts, and of the normal force
-MAX_SOLUTIONS = (
-    40  # for one such load: the bracket of .5 is then below 1e-6, and 1 - mu d at the solver's error
-)
-SMALLEST_FORCE = 1e-6  # of the normal force at the start: a spring may unload the block entirely
+# relative error of the load on the contacts, and of the normal force; 1e-4 takes half more time and changes
+# the stresses by 5e-6
+LOAD_ERROR = 1e-3
+# for one such load: the bracket of .5 is then below 1e-6, and 1 - mu d at the solver's error
+MAX_SOLUTIONS = 40
+# of the normal force at the start: a spring may unload the block entirely; 1e-8 and 1e-4 gave the same
+SMALLEST_FORCE = 1e-6
 CAPACITY = 1.0 - 1e-9  # largest load over hardness times area
 BRACKET, LOWEST = 0.5, 40.0  # steps of the logarithm of the load, and its range below that of the step before
 CRUSHED = "NaN from where the contacts would bear more than the hardness over the whole block"
