@@ -210,8 +210,8 @@ class TangentSystem:
         direction, operator = self.direction, self.operator
         # K + C is symmetric and positive, but a step has two constraints: no change along the traction of a
         # slipping node, and none of the sum. Projection P of every vector keeps both exactly, so that CG runs
-        # on P (K + C) P and the bounds of (1) are left by the slipping nodes to second order only. A constant c, less its part along the
-        # slipping directions, sums to `gram` c; that gives the c which takes a sum away.
+        # on P (K + C) P. A constant c, less its part along the slipping directions, sums to `gram` c; that
+        # gives the c which takes a sum away.
         gram = np.eye(2) * direction.shape[1] - _products(direction, direction)
         inverse = fixed @ np.linalg.pinv(fixed.T @ gram @ fixed) @ fixed.T
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
@@ -76,7 +77,7 @@ def _are_panels(value: Any) -> bool:
 
 def _is_number(value: Any) -> bool:
     # a labelled number would carry its dims into the figure
-    return is_real(value) and bool(np.isfinite(value))
+    return is_real(value) and bool(abs(value) <= sys.float_info.max)  # an integer may be beyond any double
 
 
 def _are_numbers(value: Any) -> bool:
