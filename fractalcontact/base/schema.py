@@ -425,7 +425,12 @@ QUANTITIES: dict[str, Quantity] = {
     **_with_ends("spot_size", "m", "4 coverage over perimeter per area, the diameter of discs", "spot size"),
     **_with_ends("gap_size", "m", "square that meets the set at half of its positions", "gap size"),
     **_with_ends("gap_size_ratio", "1", "gap size over that of the state before"),
-    "pair_correlation_length": Quantity("m", "distance up to which the pair correlation exceeds 2"),
+    **_with_ends(
+        "pair_correlation_length",
+        "m",
+        "distance up to which the pair correlation exceeds 2",
+        "pair-correlation length",
+    ),
     **_with_ends("domain_dimension", "1", "box dimension of the domain over the window"),
     **_with_ends("domain_dimension_change", "1", "box dimension less that of the state before"),
     "local_dimension_min": Quantity("1", "least local box dimension in the window"),

@@ -13,6 +13,7 @@ from fractalcontact.base.grid import Grid
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.domains._gliding_box import BLOCKS
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
@@ -150,29 +151,78 @@ def pairs_and_observed(planes: Planes, plane: int, reaches: Sequence[int]) -> tu
     return pairs, np.multiply.outer(*along)
 
 
-def pair_correlation_length(planes: Planes, plane: int) -> float:
-    """Return the distance (m) up to which the pair correlation g(r) stays above 2; NaN if it never does.
+def pair_correlation_length(planes: Planes, plane: int) -> Array:
+    """Return the distance (m) up to which the pair correlation g(r) stays above 2, (1 + blocks,).
 
     g(r) is the share of pairs of observed cells at the distance r that are both in the set, over the square
-    of the coverage, averaged over all directions. It is searched up to a quarter of the extent.
+    of the coverage, averaged over all directions. It is searched up to a quarter of the extent; NaN if it is
+    never above 2. The further values leave out the pairs that begin in one of the blocks of positions.
     """
     grid = planes.grid
-    side = float(np.sqrt(grid.cell_area))
-    reaches = [int(min(grid.extent) / 4.0 / spacing) for spacing in grid.spacing]
-    pairs, observed = pairs_and_observed(planes, plane, reaches)
-    y, x = (
-        np.arange(-reach, reach + 1) * spacing for reach, spacing in zip(reaches, grid.spacing, strict=True)
-    )
-    ring = np.rint(np.hypot(y[:, None], x) / side).astype(np.int64).ravel()
-    ring_pairs, ring_observed = (np.bincount(ring, values.ravel()) for values in (pairs, observed))
-    longest = int(min(grid.extent) / 4.0 / side)
+    side, farthest = float(np.sqrt(grid.cell_area)), min(grid.extent) / 4.0
+    pairs, observed = pairs_and_observed(planes, plane, _reaches(grid, farthest))
+    counts = _in_rings(np.array([pairs, observed]), grid)[:, : int(farthest / side) + 1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        g = (ring_pairs / ring_observed)[: longest + 1] / planes.coverage[plane] ** 2
+        g = counts[0] / counts[1] / planes.coverage[plane] ** 2
     below = np.flatnonzero(g[1:] < 2.0) + 1
     if not below.size or not g[0] >= 2.0:
-        return float("nan")
+        return np.full(1 + BLOCKS * BLOCKS, np.nan)
     r = int(below[0])
-    return side * (r - 1 + float((g[r - 1] - 2.0) / (g[r - 1] - g[r])))
+    ends = [np.arange(BLOCKS + 1) * n // BLOCKS for n in grid.shape]
+    blocks = np.array(
+        [
+            _in_rings(_block_pairs(planes, plane, _reaches(grid, (r + 1) * side), (y, x)), grid)[
+                :, [0, r - 1, r]
+            ]
+            for y in map(slice, ends[0], ends[0][1:])
+            for x in map(slice, ends[1], ends[1][1:])
+        ]
+    )
+    total = blocks.sum(0)
+    left = np.concatenate([total[None], total - blocks])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = left[:, 0] / left[:, 1]
+        before, after = (share[:, ring] / share[:, 0] ** 2 for ring in (1, 2))
+        return np.asarray(side * (r - 1 + (before - 2.0) / (before - after)))
+
+
+def _reaches(grid: Grid, farthest: float) -> list[int]:
+    """Return the cells along y and x up to a distance."""
+    return [int(farthest / spacing) for spacing in grid.spacing]
+
+
+def _in_rings(pairs: Array, grid: Grid) -> Array:
+    """Add up counts over lags (kinds, y, x) by distance in sides of a cell, (kinds, rings)."""
+    lags = [np.arange(n) - n // 2 for n in pairs.shape[1:]]
+    y, x = (lag * spacing for lag, spacing in zip(lags, grid.spacing, strict=True))
+    ring = np.rint(np.hypot(y[:, None], x) / np.sqrt(grid.cell_area)).astype(np.int64).ravel()
+    return np.array([np.bincount(ring, kind.ravel()) for kind in pairs])
+
+
+def _block_pairs(planes: Planes, plane: int, reaches: Sequence[int], block: Sequence[slice]) -> Array:
+    """Count pairs of the set, and of observed cells, of which the first lies in a block; by their lag."""
+    axes = zip(block, reaches, planes.grid.shape, planes.grid.periodic, strict=True)
+    around, inside = [], []
+    for own, reach, n, wraps in axes:
+        places = np.arange(own.start - reach, own.stop + reach)
+        around.append(places % n)
+        inside.append(np.ones(places.size) if wraps else (places >= 0) & (places < n))
+    window, within = np.ix_(*around), np.multiply.outer(*inside)
+    shape = [fft.fast_length(n) for n in within.shape]
+    pairs = []
+    for cells in (planes.cells[plane], planes.valid_of(plane)):
+        if cells is None:
+            sides = (np.ones(part.stop - part.start) for part in block)
+            along = [np.convolve(part, side, "valid") for part, side in zip(inside, sides, strict=True)]
+            pairs.append(np.multiply.outer(*along))
+            continue
+        padded = np.zeros((2, *shape))
+        for target, values in zip(padded, (within * cells[window], cells[tuple(block)]), strict=True):
+            target[: values.shape[0], : values.shape[1]] = values
+        modes = fft.rfft2(padded)
+        both = fft.irfft2(modes[0] * modes[1].conj(), (shape[0], shape[1]), overwrite=True)
+        pairs.append(np.rint(both[: 2 * reaches[0] + 1, : 2 * reaches[1] + 1]))
+    return np.array(pairs)
 
 
 def count_pairs(plane: Array, grid: Grid, reaches: Sequence[int]) -> Array:

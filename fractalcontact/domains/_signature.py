@@ -49,9 +49,13 @@ FEWEST_CELLS = 10  # of the median island: below, clustering grows with the grid
 HALF = np.log(-np.log(0.5))  # P = 1/2 on the scale of ln(-ln(1 - P)), on which P(s) of random spots is smooth
 # the four smallest boxes (height, width): their P give coverage, widths of the spots, and their number
 SMALLEST = np.array([(1, 1), (1, 2), (2, 1), (2, 2)])
-INTERVALS = ("spot_size", "gap_size", "domain_dimension", "excess_dimension")
 AT_SCALES = ("clustering", "integral_range", "lacunarity_ratio")
-LOGARITHMIC = ("spot_size", "gap_size", *AT_SCALES)  # whose logarithm has the interval
+LOGARITHMIC = (
+    "spot_size",
+    "gap_size",
+    "pair_correlation_length",
+    *AT_SCALES,
+)  # whose logarithm has the interval
 CHANGES = {
     "gap_size": "gap_size_ratio",
     "domain_dimension": "domain_dimension_change",
@@ -175,7 +179,11 @@ def analyse(
         planes, gap[:, 0], islands, median, np.fmax(low, start), has_window=bool(np.isfinite(low))
     )
     in_window = _window_quantities(planes, spots, np.array([low, high]), scales)
-    quantities = {"spot_size": spot, "gap_size": gap, **in_window.replicates}
+    pairs = parallel_map(
+        lambda plane: pair_correlation_length(planes, plane), range(planes.count), planes.plane_size
+    )
+    quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
+    quantities |= in_window.replicates
     _withhold(quantities, in_window, flags)
 
     variables: dict[str, Any] = {
@@ -184,11 +192,6 @@ def analyse(
         "median_cells": planes.variable(median),
         "signature_flag": planes.variable(flags),
         "reason": planes.variable(reasons),
-        "pair_correlation_length": planes.variable(
-            parallel_map(
-                lambda plane: pair_correlation_length(planes, plane), range(planes.count), planes.plane_size
-            )
-        ),
         "hit_fraction": planes.variable(hit[:, 0], "side"),
         "spots_fraction": planes.variable(spots.hit(steps)[:, 0], "side"),
         "local_slope": planes.variable(2.0 - local_slope(sides, hit[:, 0]), "side"),

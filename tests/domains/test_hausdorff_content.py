@@ -198,6 +198,17 @@ def test_stiffness_of_solved_contacts_is_below_the_content():
     assert (ratio > 0.2).all()
 
 
+def test_load_and_set_bracket_the_dimension():
+    """D2 of the pressure <= D2 of the set <= D0 between a box and the extent; a load raises all of them."""
+    pressed = contact(64, 64, "periodic", [1e6, 1e7], ("state", "pressure"), rolloff=0.06)
+    brackets = []
+    for name, order in (("pressure", 2), ("state", 2), ("state", 0)):
+        result = fc.domains.generalised_dimensions(pressed[name], order, box_sizes=[2, 64])
+        brackets.append(result.generalised_dimension.values.squeeze())
+    assert (np.diff(brackets, axis=0) > 0.02).all()
+    assert (np.diff(brackets, axis=1) > 0.1).all()
+
+
 @pytest.mark.slow
 def test_content_of_an_unresolved_surface_does_not_depend_on_the_grid():
     """The area falls by a fifth or more from 64 to 256 cells, the content at s0 does not."""

@@ -197,10 +197,11 @@ def test_a_state_alone_sets_no_saturated_window():
 
 
 @pytest.mark.parametrize("coverage", [0.03, 0.06])
-def test_refinement_changes_no_number_of_a_resolved_surface(coverage):
+@pytest.mark.parametrize("seed", [1, 2])
+def test_refinement_changes_no_number_of_a_resolved_surface(coverage, seed):
     """One band-limited surface at three grids: D within .02, gap 1 %, clustering 2 %, A2 3 %."""
     n = 1024
-    cells = rolled_off(n, coverage, np.random.default_rng(1), longest=8.0, shortest=32.0)
+    cells = rolled_off(n, coverage, np.random.default_rng(seed), longest=8.0, shortest=32.0)
     results = [signature(cells[::k, ::k], (k / n, k / n), window=(1 / 48, 1 / 12)) for k in (4, 2, 1)]
     finest = results[-1]
     for other in results[:-1]:
@@ -208,7 +209,8 @@ def test_refinement_changes_no_number_of_a_resolved_surface(coverage):
         assert float(other.domain_dimension) == pytest.approx(float(finest.domain_dimension), abs=0.02)
         assert float(other.gap_size) == pytest.approx(float(finest.gap_size), rel=0.01)
         np.testing.assert_allclose(other.clustering, finest.clustering, rtol=0.02)
-    np.testing.assert_allclose(results[1].integral_range, finest.integral_range, rtol=0.03)
+        np.testing.assert_allclose(other.integral_range, finest.integral_range, rtol=0.03)
+        np.testing.assert_allclose(other.pair_correlation_length, finest.pair_correlation_length, rtol=0.02)
 
 
 def test_cells_need_not_be_square():
@@ -282,11 +284,51 @@ def test_window_is_checked():
     assert (float(result.window_low), float(result.window_high)) == (4e-3, 16e-3)
 
 
+@pytest.mark.parametrize("wraps", [False, True])
+@pytest.mark.parametrize("has_gaps", [False, True])
+def test_pair_correlation_length_matches_a_count_of_all_pairs(wraps, has_gaps):
+    rng = np.random.default_rng(2)
+    cells, n = random_spots(48, 12, (3.0, 3.0), rng), 48
+    valid = np.ones(cells.shape, bool)
+    if has_gaps:
+        valid[20:26, 5:40] = False
+    mask = as_mask(cells, (1.0, 1.0), (wraps, wraps))
+    result = fc.domains.signature(mask, valid=xr.DataArray(valid, dims=("y", "x"), coords=mask.coords))
+    block = np.add.outer(np.arange(n) * 4 // n * 4, np.arange(n) * 4 // n)
+
+    def rings(plane):  # of each block that a pair begins in, the pairs by distance
+        places = np.argwhere(plane)
+        lag = places[:, None] - places
+        lag = (lag + n // 2) % n - n // 2 if wraps else lag
+        ring = np.rint(np.hypot(*np.moveaxis(lag, -1, 0))).astype(int)
+        starts = block[plane]
+        return np.array([np.bincount(ring[starts == b].ravel(), minlength=80)[:13] for b in range(16)])
+
+    pairs, observed = rings(cells & valid), rings(valid)
+
+    def length(used):
+        share = pairs[used].sum(0) / observed[used].sum(0)
+        g = share / share[0] ** 2
+        after = first if first else np.flatnonzero(g < 2)[0]
+        return after, after - 1 + (g[after - 1] - 2) / (g[after - 1] - g[after])
+
+    first = 0
+    first, expected = length(np.arange(16))
+    assert float(result.pair_correlation_length) == pytest.approx(expected, rel=1e-12)
+    logs = np.log([length(np.arange(16) != b)[1] for b in range(16)])
+    error = np.sqrt(15 / 16 * np.sum((logs - logs.mean()) ** 2))
+    ratio = np.log(float(result.pair_correlation_length_high) / expected)
+    assert ratio == pytest.approx(
+        2.1314495455597742 * error, rel=1e-9
+    )  # Student's t of 15 degrees of freedom
+
+
 def covered(seeds, make, window):
     """Return the shares of realisations whose intervals hold the mean of all, by quantity."""
     result = signature(np.array([make(np.random.default_rng(seed)) for seed in seeds]), window=window)
     shares = {}
-    for name in ("domain_dimension", "excess_dimension", "gap_size", "clustering", "integral_range"):
+    names = ("domain_dimension", "excess_dimension", "gap_size", "clustering", "integral_range")
+    for name in (*names, "pair_correlation_length"):
         values = result[name].isel(scale=slice(0, 2)) if "scale" in result[name].dims else result[name]
         truth = values.mean("step")
         inside = (result[f"{name}_low"] <= truth) & (truth <= result[f"{name}_high"])
@@ -295,8 +337,8 @@ def covered(seeds, make, window):
 
 
 def test_intervals_hold_the_mean_of_realisations():
-    shares = covered(range(10), lambda rng: random_spots(256, 80, (3.0, 3.0), rng), (8, 32))
-    assert min(shares.values()) >= 0.8, shares
+    shares = covered(range(20), lambda rng: random_spots(256, 80, (3.0, 3.0), rng), (8, 32))
+    assert min(shares.values()) >= 0.85, shares
 
 
 @pytest.mark.slow
@@ -310,6 +352,7 @@ def test_intervals_hold_the_mean_of_realisations():
     ],
     ids=["discs", "groups", "level set", "cascade"],
 )
-def test_coverage_of_the_intervals_over_twenty_realisations(make, window):
-    shares = covered(range(20), make, window)
-    assert min(shares.values()) >= 0.8, shares
+def test_coverage_of_the_intervals_over_eighty_realisations(make, window):
+    """Of 80 intervals that hold at 95 %, fewer than 68 hold once in 2000 times."""
+    shares = covered(range(80), make, window)
+    assert min(shares.values()) >= 0.85, shares
