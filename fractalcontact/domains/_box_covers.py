@@ -16,6 +16,9 @@ from fractalcontact.base.jit import kernel
 from fractalcontact.domains._mask_input import Array, Planes, parallel_map
 
 COVERS = ("minimum", "mean", "aligned")
+ROW = np.array(
+    [[0, 1, 0, 1, 0]]
+)  # the band of rows of a profile, see `_bands`: cut, and continued by nothing
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,6 @@ def cover_curve(planes: Planes, sizes: Array, cover: str) -> Curve:
     """
     by_name: dict[str, Callable[[Planes, Array], Curve]]
     by_name = {"minimum": _minimum_cover, "mean": _mean_cover, "aligned": _aligned_cover}
-    if planes.rank == 1 and cover != "aligned":
-        by_name[cover] = _fewest_in_row if cover == "minimum" else _mean_in_row
     curve = by_name[cover](planes, sizes)
     if planes.valid is None:
         return curve
@@ -52,57 +53,12 @@ def cover_curve(planes: Planes, sizes: Array, cover: str) -> Curve:
     )
 
 
-def _fewest_in_row(planes: Planes, sizes: Array) -> Curve:
-    """Fewest boxes over all offsets, of profiles."""
-    (wraps,) = planes.periodic
-    pairs = [[_row_by_offset(row, size, wraps=wraps) for size in sizes.tolist()] for (row,) in planes.cells]
-    count, length = (
-        np.array([[pair[k].min() for pair in row] for row in pairs], np.int64).reshape(-1, sizes.size)
-        for k in (0, 1)
-    )
-    return Curve(sizes, count, length * sizes.astype(float))
-
-
-def _row_by_offset(row: Array, size: int, *, wraps: bool) -> tuple[Array, Array]:
-    """Return the boxes that meet the set in a row of cells, and their length in cells, for every offset."""
-    start, stop, before, after, offset = _bands(row.size, size, wraps).T
-    ahead = np.pad(row, (0, 2 * size if wraps else 0), mode="wrap")
-    total = np.insert(np.cumsum(ahead, dtype=np.int64), 0, 0)
-    here = total[stop] - total[start]
-    goes_on = total[after] - total[before] > here  # in the next box; only a cut band has neighbours
-    length = np.where(goes_on, stop - start, size)
-    is_met = here > 0
-    count, lengths = (np.bincount(offset, each, size) for each in (is_met, is_met * length))
-    return count.astype(np.int64), lengths.astype(np.int64)
-
-
-def _mean_in_row(planes: Planes, sizes: Array) -> Curve:
-    """Number of boxes averaged over all offsets, of profiles; see `_positions_that_meet`.
-
-    A box of s cells misses the set at g - s + 1 positions within a gap of g cells.
-    """
-    n, (wraps,) = planes.grid.shape[1], planes.periodic
-    every, folded = np.zeros((2, planes.count, sizes.size))
-    for k, (row,) in enumerate(planes.cells):
-        places = np.flatnonzero(row)
-        if places.size == 0:
-            continue
-        low, high = places[0], n - 1 - places[-1]
-        ends = [low + high] if wraps else [low, high]
-        gaps = np.bincount(np.append(np.diff(places) - 1, ends), minlength=int(sizes.max()) + 1)
-        missed = gaps[::-1].cumsum().cumsum()[::-1]
-        met = (n if wraps else n - sizes + 1) - missed[sizes]
-        hanging = [
-            0 * sizes if wraps else np.maximum(sizes - 1 - gap, 0) for gap in (low, high, min(low, high))
-        ]
-        every[k], folded[k] = met + hanging[0] + hanging[1], met + hanging[2]
-    return Curve(sizes, every / sizes, folded * sizes)
-
-
 def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
-    """Fewest boxes over all offsets of the grid."""
+    """Fewest boxes over all offsets of the grid; boxes of a profile have one offset across it."""
     axes = tuple(zip(planes.grid.shape, planes.grid.periodic, strict=True))
-    bands = {size: tuple(_bands(n, size, wraps) for n, wraps in axes) for size in map(int, sizes)}
+    bands = {size: [_bands(n, size, wraps) for n, wraps in axes] for size in map(int, sizes)}
+    if planes.rank == 1:
+        bands = {size: [ROW, columns] for size, (_, columns) in bands.items()}
 
     def fewest(task: tuple[Array, int]) -> tuple[int, int]:
         cells, size = task
@@ -123,15 +79,15 @@ def _counts_by_offset(
 
     The bands are those of `_bands` for the rows and for the columns.
     """
-    nx = cells.shape[1]
+    nx, offsets = cells.shape[1], int(row_bands[:, 4].max()) + 1
     # ascending, so that the column sums of a band follow from those of the band before it
     row_bands = row_bands[np.lexsort((row_bands[:, 1], row_bands[:, 0]))]
     is_full = column_bands[:, 1] - column_bands[:, 0] == size
-    count, area = np.zeros((2, size, size), np.int64)
+    count, area = np.zeros((2, offsets, size), np.int64)
     summed_rows = np.zeros((2, 2), np.int64)
     columns = np.zeros((3, nx), np.int32)
     prefix = np.zeros((2, nx + 1 + (2 * size if wrap_x else 0)), np.int32)
-    met, lost = np.zeros((2, size, int(is_full.sum())), np.int32)
+    met, lost = np.zeros((2, offsets, int(is_full.sum())), np.int32)
     count_boxes_in_bands(
         cells, size, row_bands, column_bands[~is_full], summed_rows, columns, prefix, met, lost, count, area
     )
@@ -144,9 +100,9 @@ def _counts_by_offset(
 def _sum_by_offset(values: Array, size: int) -> Array:
     """Add up the positions of boxes that belong to the same offset in x."""
     positions = values.shape[1]
-    padded = np.zeros((size, positions + -positions % size), values.dtype)
+    padded = np.zeros((len(values), positions + -positions % size), values.dtype)
     padded[:, :positions] = values
-    return np.asarray(padded.reshape(size, -1, size).sum(1, dtype=np.int64))
+    return np.asarray(padded.reshape(len(values), -1, size).sum(1, dtype=np.int64))
 
 
 def _bands(n: int, size: int, wraps: bool) -> Array:
@@ -175,16 +131,19 @@ def _bands(n: int, size: int, wraps: bool) -> Array:
 def _mean_cover(planes: Planes, sizes: Array) -> Curve:
     """Number of boxes averaged over all offsets of the grid.
 
-    The mean has a measure of its own: boxes that hang over opposite edges by the same cut count once.
+    The mean has a measure of its own: boxes that hang over opposite edges by the same cut count once. A box
+    on a profile stands at one place across it, as if the profile had a period of one cell there.
     """
     largest = int(sizes.max())
+    periodic = planes.grid.periodic if planes.rank == 2 else (True, *planes.periodic)
     positions = parallel_map(
-        lambda cells: _positions_that_meet(cells, largest, planes.grid.periodic),
+        lambda cells: _positions_that_meet(cells, largest, periodic),
         planes.cells,
         planes.plane_size,
     )
     every, folded = (np.array([pair[k][sizes] for pair in positions], float) for k in (0, 1))
-    return Curve(sizes, every / sizes.astype(float) ** 2, folded)
+    length = sizes.astype(float)
+    return Curve(sizes, every / length**planes.rank, folded * length ** (2 - planes.rank))
 
 
 def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -> tuple[Array, Array]:
@@ -195,7 +154,7 @@ def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -
     count once. No free axis is shorter than `largest`.
     """
     ny, nx = cells.shape
-    ahead = [(0, largest if wraps else 0) for wraps in periodic]
+    ahead = [(0, largest if wraps and n > 1 else 0) for n, wraps in zip(cells.shape, periodic, strict=True)]
     distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
     histogram = np.zeros(largest + 2, np.int64)
     nearest_ahead(np.pad(cells, ahead, mode="wrap"), ny, nx, distance, histogram)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
 from fractalcontact.base.grid import Grid
@@ -235,25 +236,11 @@ def _directed_distance(start: Array, goal: Array, grid: Grid) -> float:
         n * spacing if wraps else 0.0
         for n, spacing, wraps in zip(grid.shape, grid.spacing, grid.periodic, strict=True)
     ]
-    tree = cKDTree(_positions(_rim(goal, grid.periodic), grid), boxsize=box)
+    rim = (goal > 0) & ~binary_erosion(goal > 0)  # the nearest cell is among those beside an open one
+    tree = cKDTree(_positions(rim, grid), boxsize=box)
     distance, _ = tree.query(_positions(outside, grid), workers=thread_count())
     return float(distance.max())
 
 
 def _positions(cells: Array, grid: Grid) -> Array:
     return np.asarray(np.argwhere(cells) * np.array(grid.spacing))
-
-
-def _rim(cells: Array, periodic: Sequence[bool]) -> Array:
-    """Cells of the set with an open neighbour or on a free edge: the nearest one is among them."""
-    inner = cells > 0
-    rim = np.zeros_like(inner)
-    for axis, wraps in enumerate(periodic):
-        for step in (1, -1):
-            neighbour = np.roll(inner, step, axis)
-            if not wraps:
-                edge = [slice(None), slice(None)]
-                edge[axis] = slice(0, 1) if step == 1 else slice(-1, None)
-                neighbour[tuple(edge)] = False
-            rim |= inner & ~neighbour
-    return rim
