@@ -98,6 +98,6 @@ def _draw_dimension(
         panel.key(described, ls="", marker="o", mfc=_style.tone(0.0))
     if "null_dimension" in path:
         panel.curves(
-            "random null", x.values, table(path, "null_dimension", dims), key=CELLS_NULL, **_style.NULL_LINE
+            "random null", x.values, table(path, "null_dimension", dims), key=CELLS_NULL, **_style.DASHED
         )
     return panel

@@ -19,7 +19,7 @@ from fractalcontact.plotting._units import Units
 
 LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
-LAWS: dict[str, Any] = {"exponential": (0, (4, 2)), "hyperbolic": (0, (1, 1.5))}  # line where not preferred
+LAWS = {"exponential": _style.LINES[1], "hyperbolic": _style.LINES[2]}  # line where not preferred
 PREFERRED, OTHER = 1.8, 0.9  # points, width of the line of a law
 TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
 

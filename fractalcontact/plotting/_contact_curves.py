@@ -27,10 +27,6 @@ from fractalcontact.plotting._paths import (
 from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
 from fractalcontact.plotting._units import PER_CENT, Quantity, Units, name_of, scale_of
 
-RAW_LINE: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
-PROPORTIONAL: dict[str, Any] = {"ls": ":", "lw": 1.0}
-THEORY: dict[str, Any] = {"ls": "-.", "lw": 1.0}
-LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.5)), "-.")  # of the first, second ... variable
 MOST_STEPS = 6  # of the distributions in one figure
 MARKED = 30  # most points of a curve that are marked beside theories
 OF_THEORY = {"contact_stiffness": "interface_stiffness", "stiffness": "interface_stiffness"}
@@ -85,7 +81,7 @@ def contact_area(
         fraction = table(data, "corrected_contact_fraction", PATH)
         name = "corrected for the perimeter"
         panel.curves(name, loads.values, fraction, key=name)
-        panel.curves("cell count", loads.values, cells.values, key="cell count", **RAW_LINE)
+        panel.curves("cell count", loads.values, cells.values, key="cell count", **_style.DASHED)
     else:
         panel.curves("cell count", loads.values, cells.values)
     if theory is not None:
@@ -102,7 +98,7 @@ def _draw_proportional(panel: LinePanel, x: Any, y: Any) -> None:
         slope = np.exp(np.median(np.log(y[used] / x[used])))
         ends = np.array([x[used].min(), min(x[used].max(), y[used].max() / slope)])  # within the curves
         name = "proportional to the load"
-        panel.line(name, ends, ends * slope, key=name, marker="", color=_style.grey(), **PROPORTIONAL)
+        panel.line(name, ends, ends * slope, key=name, marker="", color=_style.grey(), **_style.DOTTED)
 
 
 def _draw_theories(panel: LinePanel, theory: Any, where: str, name: str, against: str) -> None:
@@ -114,7 +110,7 @@ def _draw_theories(panel: LinePanel, theory: Any, where: str, name: str, against
         if np.isfinite(values[i]).any():
             authors = ", ".join(part.capitalize() for part in word.split("_"))
             colour = colours[(i + 1) % len(colours)]
-            panel.line(authors, loads, values[i], key=authors, marker="", color=colour, **THEORY)
+            panel.line(authors, loads, values[i], key=authors, marker="", color=colour, **_style.DASH_DOTTED)
 
 
 @figure
@@ -167,7 +163,7 @@ def path(
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
     panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=MARKED)
-    for name, rows, line in zip(names, values, cycle(LINES), strict=False):
+    for name, rows, line in zip(names, values, cycle(_style.LINES), strict=False):
         title = name_of(data[name])
         panel.curves(title, x.values, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
         if len(rows) == 1 and {f"{name}_low", f"{name}_high"} <= data.variables.keys():
@@ -233,11 +229,10 @@ def pressure_distribution(
         panel.line(family.curve("this surface", i), pressure, density, drawstyle="steps-mid", lw=1.0, **own)
         if spread:
             beside = np.linspace(0.0, float(pressure[-1]), 400)
-            panel.line(
-                family.curve("Persson", i), beside, _persson(beside, nominal[i], spread), **own, **THEORY
-            )
+            theirs = _persson(beside, nominal[i], spread)
+            panel.line(family.curve("Persson", i), beside, theirs, **own, **_style.DASH_DOTTED)
     if spread:
-        panel.key("Persson", **THEORY)
+        panel.key("Persson", **_style.DASH_DOTTED)
     return panel.finish(zero="xy", title="theory" if spread else "")
 
 
@@ -245,9 +240,6 @@ def _persson(pressure: Any, nominal: float, spread: float) -> Any:
     """Return the density of the pressure after Persson: zero without pressure, for there is no tension."""
     first, image = (np.exp(-0.5 * ((pressure + sign * nominal) / spread) ** 2) for sign in (-1, 1))
     return (first - image) / (spread * np.sqrt(2 * np.pi))
-
-
-CORRECTED: dict[str, Any] = {"ls": (0, (4, 2)), "marker": "s", "ms": 3.5}
 
 
 @figure
@@ -286,7 +278,7 @@ def area_dimension(
     panel.curves("cells", spacing.values, cells.values, key="cells", marker="o")
     corrected = table(data, "corrected_contact_fraction", dims)
     name = "corrected for the perimeter"
-    panel.curves(name, spacing.values, corrected, key=name, **CORRECTED)
+    panel.curves(name, spacing.values, corrected, key=name, marker="s", ms=3.5, **_style.DASHED)
     panel.ax.set_title(shear_text(data))
     panel.finish(log="xy")
     panel.ax.set_xticks(spacing.shown, [f"{value:g}" for value in spacing.shown])

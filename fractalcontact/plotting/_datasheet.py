@@ -14,7 +14,6 @@ from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure as checked
-from fractalcontact.plotting._flow import FLOW_LINES
 from fractalcontact.plotting._inputs import group, quantity, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
@@ -300,7 +299,7 @@ def _draw_flow(ax: Axes, data: xr.Dataset, pressure: Quantity, values: Quantity,
     panel = LinePanel(ax, pressure, values, by_shear(data), points=_style.MAX_MARKED_POINTS)
     names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
     for i, rows in enumerate(kinds):
-        name, line = (names[i], FLOW_LINES[i % 2]) if names else (values.name, "-")
+        name, line = (names[i], _style.LINES[i % 2]) if names else (values.name, "-")
         panel.curves(name, pressure.values, rows, key=name if names else "", ls=line, ms=3.0)
     panel.finish(log="xy", legend=False)
     ax.set_title(values.scale.label(values.name))

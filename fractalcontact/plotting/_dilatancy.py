@@ -17,7 +17,6 @@ from fractalcontact.plotting._paths import by_load
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
-MEAN_SLOPE_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
 RIGID_LINE = 1.0  # points, width
 
 
@@ -76,7 +75,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     if "mean_slope" in data:
         ends = np.array([0.0, np.nanmax(shear.values)])
         rise = table(data, "mean_slope", ("direction",))[:, None] * ends
-        panel.curves("mean slope", ends, rise, key="mean slope", **MEAN_SLOPE_LINE)
+        panel.curves("mean slope", ends, rise, key="mean slope", **_style.DOTTED)
     return panel.finish()
 
 
@@ -102,7 +101,6 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
 
 
 LENGTHS = ("decorrelation_length_low", "decorrelation_length", "decorrelation_length_high")
-LENGTH_LINE: dict[str, Any] = {"lw": 0.7, "ls": ":"}
 DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
 
 
@@ -139,11 +137,11 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     ends = [table(data.isel(shear=0), name, ("direction",)) for name in LENGTHS]
     for own, low, length, high in zip(panel.family.styles, *ends, strict=True):
         if np.isfinite(length):
-            panel.place(length, color=own["color"], **LENGTH_LINE)
+            panel.place(length, color=own["color"], **_style.DOTTED)
         if np.isfinite(low) and np.isfinite(high):
             panel.ax.axvspan(*shear.scale([low, high]), color=own["color"], alpha=0.12, lw=0)
     panel.level(0.0, color=_style.grey(), lw=0.6)
-    panel.key("decorrelation length", **LENGTH_LINE)
+    panel.key("decorrelation length", **_style.DOTTED)
     return panel.finish()
 
 

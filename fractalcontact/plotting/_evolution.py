@@ -15,9 +15,6 @@ from fractalcontact.plotting._paths import PATH, at_shear, load_of, path_axis, s
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, name_of
 
-LOST_LINE: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 1.0}
-COALESCENCE_LINE: dict[str, Any] = {"ls": ":", "lw": 0.9}
-
 
 @figure
 def first_contact(
@@ -106,12 +103,12 @@ def lineage(
                    for ax, y in zip(shown, (counts, births), strict=True))  # fmt: skip
     left.curves("islands", x.values, counts.values)
     right.curves("births", x.values, births.values, key="births")
-    right.curves(lost, x.values, losses, key=lost, **LOST_LINE)
+    right.curves(lost, x.values, losses, key=lost, **_style.DASHED)
     coalesces = losses > births.values
     for i in np.flatnonzero(coalesces.any(axis=1)).tolist():
-        right.place(x.values[i, np.argmax(coalesces[i])], color=family.styles[i]["color"], **COALESCENCE_LINE)
+        right.place(x.values[i, np.argmax(coalesces[i])], color=family.styles[i]["color"], **_style.DOTTED)
     if coalesces.any():
-        right.key("coalescence", **COALESCENCE_LINE)
+        right.key("coalescence", **_style.DOTTED)
     log = "x" if _style.needs_log_axis(x.values) else ""
     left.finish(log=log, zero="y", legend=False)
     right.finish(log=log, zero="y")

@@ -16,7 +16,6 @@ from fractalcontact.plotting._paths import PATH, path_axis
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, scale_of
 
-FLOW_LINES = ("-", (0, (4, 2)))
 # broad and pale, so that it is seen where the hydraulic aperture lies on it
 MEAN_LINE: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
 
@@ -51,7 +50,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     axes = words(data["axis"]) if "axis" in data.coords else []
     for i, values in enumerate(aperture.values):
         name = f"along {axes[i]}" if axes else "flow"
-        panel.curves(name, x.values, values, key=name if axes else "", ls=FLOW_LINES[i % 2])
+        panel.curves(name, x.values, values, key=name if axes else "", ls=_style.LINES[i % 2])
     if "aperture" in data:
         panel.curves(
             "mean gap", x.values, table(data, "aperture", dims), key="mean gap", marker="", **MEAN_LINE

@@ -236,7 +236,7 @@ def _size_curves(
         panel = LinePanel(ax, sizes_of(path, over), values, family)
         panel.curves("contact domain", panel.x.values, values.values)
         if f"null_{name}" in path:
-            style = _style.NULL_LINE | {"marker": ""}
+            style = _style.DASHED | {"marker": ""}
             key = null if ax is list(shown.values())[-1] else ""
             beside = table(path, f"null_{name}", (dim, over))
             panel.curves("random null", panel.x.values, beside, key=key, **style)

@@ -17,7 +17,6 @@ from fractalcontact.plotting._paths import by_load, by_shear
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, number_texts, scale_of
 
-OUTSIDE_LINE: dict[str, Any] = {"lw": 1.0, "ls": ":"}  # where a criterion is out of its range
 TESTS = {"peak_shear_strength": "o", "residual_shear_strength": "x"}
 
 
@@ -62,10 +61,10 @@ def strength_envelope(
         " and ".join(part.capitalize() for part in name.split("_")) for name in words(data["criterion"])
     ]
     panel = LinePanel(_style.axes_or_new(ax), pressure, strength, distinct(authors), points=0)
-    panel.curves("", pressure.values, strength.values, **OUTSIDE_LINE)
+    panel.curves("", pressure.values, strength.values, **_style.DOTTED)
     panel.curves("in range", pressure.values, np.where(in_range, strength.values, np.nan))
     if not in_range.all():
-        panel.key("out of range", **OUTSIDE_LINE)
+        panel.key("out of range", **_style.DOTTED)
     if tests is not None:
         found = result_of(tests, "strength_envelope", (*TESTS, dims[1]), dims[1:], argument="tests")
         for name, marker in TESTS.items():
@@ -78,7 +77,6 @@ def strength_envelope(
 
 SHOWN = ("shear_stress", "dilatancy")
 DIMS = ("nominal_pressure", "shear_displacement")
-BESIDE: dict[str, Any] = {"lw": 1.0, "ls": "--"}  # curves to compare with
 
 
 @figure
@@ -119,7 +117,7 @@ def shear_curve(
         x, y = (quantity(data[0], each, data[0][each].dims, shown=every[each])
                 for each in ("shear_displacement", name))  # fmt: skip
         panel = LinePanel(ax, x, y, family, points=0)
-        for each, own, style in zip(data, of_each, ({}, BESIDE), strict=False):
+        for each, own, style in zip(data, of_each, ({}, _style.DASHED), strict=False):
             title = str(each.attrs.get("title", name))
             for i, place in enumerate(own):
                 along = each["shear_displacement"].broadcast_like(each[name]).values[i]
@@ -140,7 +138,6 @@ def _read(result: Any, units: Units | None) -> xr.Dataset:
 
 
 LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
-BASIC_LINE: dict[str, Any] = {"lw": 0.8, "ls": ":"}
 
 
 @figure
@@ -193,9 +190,9 @@ def friction(
         is_wide = name == "shear_strength" and _style.needs_log_axis(values.values)
         if name == "friction_angle" and "basic_friction_angle" in data:
             basic_angle = float(np.ravel(data["basic_friction_angle"].values)[0])
-            panel.level(basic_angle, color=_style.ink(), **BASIC_LINE)
+            panel.level(basic_angle, color=_style.ink(), **_style.DOTTED)
         if name == names[-1] and "basic_friction_angle" in data:
-            panel.key("basic angle", color=_style.ink(), **BASIC_LINE)
+            panel.key("basic angle", color=_style.ink(), **_style.DOTTED)
         panel.finish(log="y" if is_wide else "", legend=name == names[-1])
     remarks = []
     if by_force and "direction" in data.coords:
@@ -215,10 +212,6 @@ def _slope_lengths(data: xr.Dataset) -> str:
     lengths = lengths[np.isfinite(lengths)]
     ends = [quantity_text(end, "m") for end in (lengths.min(), lengths.max())] if lengths.size else []
     return "slopes over " + " to ".join(dict.fromkeys(ends)) if ends else ""
-
-
-SHEAR_LINES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1.2)))
-CONSTANT: dict[str, Any] = {"color": "0.6", "lw": 0.8, "ls": "-."}
 
 
 @figure
@@ -251,10 +244,11 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     strength, shears = quantity(data, "shear_strength", dims), by_shear(data)
     panel = LinePanel(_style.axes_or_new(ax), size, strength, by_direction(data), points=1)
     for i, values in enumerate(strength.values):
-        line = SHEAR_LINES[i % len(SHEAR_LINES)]
+        line = _style.LINES[i % 3]
         key = shears.labels[i] if shears.labels else ""
         panel.curves(shears.curve("shear strength", i), size.values, values, key=key, ls=line)
     angle = np.radians(table(data, "basic_friction_angle", ()))
     basic = table(data, "nominal_pressure", ("structure_size",)) * np.tan(angle)
-    panel.line("basic angle alone", size.values, basic, key="basic angle alone", **CONSTANT)
+    name = "basic angle alone"
+    panel.line(name, size.values, basic, key=name, color="0.6", **_style.DASH_DOTTED)
     return panel.finish(log="xy", title=shears.title)

@@ -49,7 +49,10 @@ HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
 MAX_LEGEND_ENTRIES = 8
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
-NULL_LINE: dict[str, Any] = {"ls": (0, (4, 2)), "lw": 0.9}  # the random null beside a measured curve
+# lines of the first, second ... of several kinds of curves; long dashes stay apart where curves are steep
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")
+# what stands beside the curves of a figure is narrower than they are: nulls, references, theories
+DASHED, DOTTED, DASH_DOTTED = ({"ls": line, "lw": 0.9} for line in LINES[1:])
 LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
 NARROW_DECADES = 120.0  # up to two decades, with margins, have room for 1, 2 and 5 of each on a panel
 
