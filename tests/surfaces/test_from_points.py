@@ -251,14 +251,14 @@ def test_directions_use_resolved_lags():
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
 def test_interval_of_a_gridded_profile(hurst):
     held = []
-    for seed in range(4):
-        profile = fc.surfaces.fbm(8192, 1e-5, hurst=hurst, rms_increment=3e-6, rng=seed)
-        chosen = np.sort(np.random.default_rng(seed).choice(8192, 2048, replace=False))
+    for seed in range(100, 108):
+        profile = fc.surfaces.fbm(4096, 1e-5, hurst=hurst, rms_increment=3e-6, rng=seed)
+        chosen = np.sort(np.random.default_rng(seed).choice(4096, 1024, replace=False))
         points = np.c_[profile.x.values[chosen], profile.values[chosen]]
         gridded = fc.surfaces.from_points(points, plane="xy")
         result = fc.dimensions.estimate(gridded).isel(method=0)
         held.append(float(result.ci_low) <= hurst <= float(result.ci_high))
-    assert sum(held) >= 2  # too narrow at H = .7: held in 2 of 4, see the page of accuracy
+    assert sum(held) >= 7  # of intervals of 95 %
 
 
 def test_scales_asked_for_below_the_resolved_ones_widen_the_interval():
