@@ -71,11 +71,11 @@ def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array
 def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     """Return the modes of single waves: boxes whose mean power is improbable for Gaussian heights."""
     from scipy.ndimage import maximum_filter, uniform_filter
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     size = (1, 3) if lattice.axes == 1 else (3, 3)
     degrees = lattice.degrees * math.prod(size)
-    limit = float(chi2.isf(_FALSE_ALARM / ratio.size, degrees)) / degrees
+    limit = float(chdtri(degrees, _FALSE_ALARM / ratio.size)) / degrees
     marked = np.zeros(ratio.shape, dtype=bool)
     for _ in range(3):  # what is left out no longer lifts its neighbours
         level = np.where(keep & ~marked, ratio, 1.0)

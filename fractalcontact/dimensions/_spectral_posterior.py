@@ -295,11 +295,17 @@ def _whitening(kind: Discrepancy, bins: Bins) -> tuple[Array, float]:
 
 @lru_cache
 def _starting_points() -> Array:
-    """Return points that fill the prior evenly: those of Sobol, up to 2 standard deviations."""
-    from scipy.special import ndtri
-    from scipy.stats import qmc
+    """Return points that fill the prior evenly, up to 2 standard deviations.
 
-    return np.asarray(ndtri(np.clip(qmc.Sobol(6, scramble=False).random(_STARTS), 0.02, 0.98)))
+    They are the multiples of g^-1 ... g^-6 modulo one, g^7 = g + 1 (Roberts 2018, quasirandom sequences).
+    """
+    from scipy.special import ndtri
+
+    root = 1.0
+    for _ in range(40):
+        root = (1.0 + root) ** (1.0 / 7.0)
+    steps = root ** -np.arange(1.0, 7.0)
+    return np.asarray(ndtri(np.clip((0.5 + np.outer(np.arange(_STARTS), steps)) % 1.0, 0.02, 0.98)))
 
 
 # numba caches a kernel by its own file, so those that call each other stand in one

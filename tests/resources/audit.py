@@ -104,7 +104,7 @@ class Requirement:
 
 _SOLVER = Requirement((FFT, "scipy.special"), ("contact solver",))
 _SUMS = Requirement((FFT,), ("increment sums",))
-_EXACT = Requirement((FFT, "scipy.ndimage", "scipy.stats"), ("posterior",))
+_EXACT = Requirement((FFT, "scipy.ndimage", "scipy.special"), ("posterior",))
 _LABELS = ("scipy.ndimage", "scipy.special")
 _SPECIAL = ("scipy.special",)
 
