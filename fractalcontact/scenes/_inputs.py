@@ -18,11 +18,20 @@ from fractalcontact.base.references import joined_references
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._functions import parameters_of, public_function
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
-from fractalcontact.scenes._stage_type import StageType, stage_options
+from fractalcontact.scenes._stage_type import StageType, loads_of, stage_options
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# arguments that the material gives, and from what
+FROM_MATERIAL = {
+    "contact_modulus": ("young", "poisson"),
+    "poisson": ("poisson",),
+    "friction_coefficient": ("basic_friction_angle",),
+    "residual_friction_angle": ("basic_friction_angle",),
+    "basic_friction_angle": ("basic_friction_angle",),
+    "hardness": ("hardness",),
+}
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 
 
@@ -181,10 +190,8 @@ def contact_options(scene: Scene, row: StageType | None = None) -> dict[str, Any
 
 def slip_options(scene: Scene, row: StageType) -> dict[str, Any]:
     """Return the arguments of `partial_slip`: its own, those of `[contact]`, then those of the material."""
-    options, material = stage_options(scene, row), scene.material
-    own = scene.table("contact").get(row.name, {})
-    if any(key in own for key in LOADS):  # a load of its own replaces that of the load path
-        options = {key: value for key, value in options.items() if key not in LOADS or key in own}
+    options, material, loads = stage_options(scene, row), scene.material, loads_of(scene, row)
+    options = {key: value for key, value in options.items() if key not in LOADS or key in loads}
     pressed = contact_options(scene)
     if "contact_modulus" in pressed:
         options.setdefault("contact_modulus", pressed["contact_modulus"])
@@ -220,9 +227,9 @@ def joint_options(scene: Scene, row: StageType) -> dict[str, Any]:
         for key, value in stage_options(scene, row).items()
         if key != "block" and (key not in row.own or key in own)
     }
-    loads = scene.joint.loads(row.word, [key for key in LOADS if key in row.arguments()])
-    if row.one_load and loads:
-        options = {key: value for key, value in options.items() if key not in LOADS or key == loads[0]}
+    if row.one_load:
+        loads = loads_of(scene, row)[:1]
+        options = {key: value for key, value in options.items() if key not in LOADS or key in loads}
     angle, hardness = scene.material.basic_friction_angle, scene.material.hardness
     if row.friction_angle and angle is not None:
         options.setdefault(row.friction_angle, angle)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import NONE, Problems, Words
+from fractalcontact.scenes._inputs import FROM_MATERIAL
 from fractalcontact.scenes._memory import stage_memory
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stage_type import StageType, stage_options
+from fractalcontact.scenes._stage_type import StageType, loads_of, stage_options
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
     CURVES,
@@ -184,22 +185,27 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     return tuple(maps)
 
 
-def check_loads(scene: Scene, problems: Problems) -> None:
-    """Note what is missing or ambiguous in the shear, load and direction of the stages of the joint."""
+def check_needs(scene: Scene, problems: Problems) -> None:
+    """Note what a stage needs and the scene does not give, and loads and directions that are ambiguous."""
+    material = set(scene.table("material"))
     for stage in stages_of(scene):
-        if stage.row.group != "joints" or stage.row.takes == "file":
+        row, name, reason = stage.row, stage.row.word or stage.name, stage.reason
+        if not row.table or row.takes == "file":
             continue
-        row, name = stage.row, stage.row.word
-        options = row.options(scene, row) | stage_options(scene, row)
-        for key in row.needed():
+        options = stage_options(scene, row)
+        for key in (*row.needed(), *filter(None, [row.friction_angle])):
+            sources = FROM_MATERIAL.get(key, ())
+            if key in options or (sources and material >= set(sources)):
+                continue
             place = "joint" if key in (*LOADS, "shear", "block") else row.table
-            problems.require(key in options, f"{place}.{key}", f"a value for {name} ({stage.reason})", NONE)
-        if row.friction_angle and row.friction_angle not in options:
-            problems.add("material.basic_friction_angle", f"a value for {name} ({stage.reason})", NONE)
+            if key == row.friction_angle:
+                place, key, sources = "material", "basic_friction_angle", ()
+            elsewhere = f", or {' and '.join(sources)} in [material]" if sources else ""
+            problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
         direction = options.get("direction", "E")
         if row.one_direction and isinstance(direction, list):
             problems.add("joint.direction", f"one direction for {name}", direction)
-        allowed = [key for key in LOADS if key in row.arguments()]
-        if row.one_load and len(loads := scene.joint.loads(name, allowed)) != 1:
-            expected = f"one of a {', '.join(allowed[:-1])} or {allowed[-1]} ({stage.reason})"
-            problems.add(f"joint.{name}", expected, Words(", ".join(loads)) or NONE)
+        if row.one_load and len(loads := loads_of(scene, row)) != 1:
+            *others, last = (key for key in LOADS if key in row.arguments())
+            expected = f"exactly one of {', '.join(others)} or {last} for {name} ({reason})"
+            problems.add(row.table, expected, Words(", ".join(loads)) or NONE)

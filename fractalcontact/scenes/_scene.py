@@ -94,11 +94,6 @@ class JointTable:
     options: Table = field(default_factory=dict)
     stages: Mapping[str, Table] = field(default_factory=dict)
 
-    def loads(self, stage: str, allowed: Sequence[str] = LOADS) -> list[str]:
-        """Return the loads of a stage: those of its own table, else those of `[joint]`."""
-        own = [key for key in allowed if key in self.stages.get(stage, {})]
-        return own or [key for key in allowed if key in self.options]
-
 
 @dataclass(frozen=True)
 class WantTable:

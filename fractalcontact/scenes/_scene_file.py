@@ -18,7 +18,7 @@ from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
 from fractalcontact.scenes._functions import arguments_of
-from fractalcontact.scenes._plan import check_loads, stages_of
+from fractalcontact.scenes._plan import check_needs, stages_of
 from fractalcontact.scenes._scene import (
     LOADS,
     MATERIAL_KEYS,
@@ -28,7 +28,6 @@ from fractalcontact.scenes._scene import (
     Scene,
     Table,
 )
-from fractalcontact.scenes._stage_type import stage_options
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,
     JOINT_STAGES,
@@ -168,7 +167,7 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
     scene = replace(scene, tables=tables)
     _check(scene, problems)
     if not any(argument.startswith("want") for argument in problems.arguments):
-        check_loads(scene, problems)
+        check_needs(scene, problems)
     problems.messages.sort(
         key=lambda message: "an unknown key" not in message
     )  # other problems follow from it
@@ -361,44 +360,17 @@ def _check_want(scene: Scene, problems: Problems) -> None:
 
 def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
-    _check_partial_slip(scene, problems)
-    contact, material = scene.table("contact"), scene.table("material")
+    material = scene.table("material")
     # the block falls on rigid faces where the material has no elastic constants
     rigid = set() if {"young", "poisson"} & set(material) else {"joints/self_weight"}
     planned = [stage.row for stage in stages_of(scene) if stage.name not in rigid]
     if any(row.presses and row.takes == "crack" for row in planned):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
-    if scene.wanted("contact"):
-        expected = "a value, or young and poisson in [material]"
-        has_modulus = "contact_modulus" in contact or {"young", "poisson"} <= set(material)
-        problems.require(has_modulus, "contact.contact_modulus", expected, NONE)
-        expected = "exactly one of closure, normal_force, nominal_pressure"
-        if scene.is_pressed:
-            one_load = sum(key in contact for key in LOADS) == 1
-            problems.require(one_load, "contact", expected, sorted(contact) or NONE)
-
-
-def _check_partial_slip(scene: Scene, problems: Problems) -> None:
-    """Check that partial slip, where it is wanted, has a force, one load, friction, and elastic bodies."""
-    material, row = scene.table("material"), STAGES[PARTIAL_SLIP]
-    wanted = [PARTIAL_SLIP in scene.wanted(subpackage) for subpackage in ("contact", "joints")]
-    if any(wanted):
+    slips = PARTIAL_SLIP in (*scene.wanted("contact"), *scene.wanted("joints"))
+    if slips:
         expected = "no hardness: partial slip is that of elastic bodies"
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
-    if not wanted[0]:
-        return
-    options, own = stage_options(scene, row), scene.table("contact").get(PARTIAL_SLIP, {})
-    for key, source in (
-        ("tangential_force", ""),
-        ("poisson", "poisson"),
-        ("friction_coefficient", "basic_friction_angle"),
-    ):
-        expected = f"a value, or {source} in [material]" if source else "a value"
-        problems.require(key in options or source in material, f"{row.table}.{key}", expected, NONE)
-    loads = [key for key in LOADS if key in own] or [key for key in LOADS if key in options]
-    expected = "exactly one of closure, normal_force, nominal_pressure"
-    problems.require(len(loads) == 1, row.table, expected, loads or NONE)
 
 
 def _check_numbers(table: Table, name: str, problems: Problems) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from fractalcontact.scenes._functions import arguments_of, parameters_of
 from fractalcontact.scenes._result_tables import Rows
-from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._scene import LOADS, Scene
 
 
 def stage_options(scene: Scene, row: StageType, keys: Iterable[str] | None = None) -> dict[str, Any]:
@@ -25,6 +25,16 @@ def stage_options(scene: Scene, row: StageType, keys: Iterable[str] | None = Non
     options |= own if isinstance(own, dict) else {}
     allowed = () if not options else row.arguments() if keys is None else tuple(keys)
     return {key: options[key] for key in allowed if key in options}
+
+
+def loads_of(scene: Scene, row: StageType) -> list[str]:
+    """Return the loads of a stage: those of its own table, else those of the whole table."""
+    name, _, word = row.table.partition(".")
+    table = scene.table(name)
+    own = table.get(word)
+    allowed = [key for key in LOADS if key in row.arguments()]
+    first = [key for key in allowed if isinstance(own, dict) and key in own]
+    return first or [key for key in allowed if key in table and not isinstance(table[key], dict)]
 
 
 @dataclass(frozen=True)

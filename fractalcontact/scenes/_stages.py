@@ -85,6 +85,7 @@ _ROWS = (
         keeps=CONTACT_MAPS,
         splits=("step",),
         presses=True,
+        one_load=True,
         rows=_rows.contact,
     ),
     # not below contact: its steps are others than those of the load path
@@ -96,6 +97,7 @@ _ROWS = (
         options=_inputs.slip_options,
         keeps=SLIP_MAPS,
         presses=True,
+        one_load=True,
         rows=_rows.partial_slip,
     ),
     StageType("joints/faces", _SURFACE, "joints.register", "upper", takes="file", rows=_rows.faces),

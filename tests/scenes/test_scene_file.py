@@ -261,7 +261,11 @@ def test_press_takes_its_modulus_from_the_material(write):
         ("self_weight", "[joint.self_weight]\nstructure_size = 0.0\nunit_weight = 1.0", "structure_size"),
         ("area_dimension", "[joint.area_dimension]\nclosure = 1e-6", "joint.area_dimension.closure"),
         ("area_dimension", '[joint.area_dimension]\ndirection = ["E", "W"]', "one direction for area_dim"),
-        ("area_dimension", "[joint.area_dimension]\nnominal_pressure = 1e6\nnormal_force = 1.0", "one of a"),
+        (
+            "area_dimension",
+            "[joint.area_dimension]\nnominal_pressure = 1e6\nnormal_force = 1.0",
+            "exactly one of",
+        ),
     ],
 )
 def test_problems_of_the_stages_of_the_paper_are_named(write, word, tables, named):
