@@ -12,9 +12,10 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._sheared_contact import (
     PRESSING_BYTES,

@@ -67,7 +67,7 @@ def closure(
     shear : float or sequence of float
         Shear displacements v >= 0, m, each once.
     direction : str, float, or a sequence of them
-        Direction of sliding: compass word or azimuth in degrees (E = 0, anticlockwise). A sequence gives the
+        Direction of sliding: compass word, or degrees anticlockwise from E. A sequence gives the
         result a first dim `direction`.
     closure, normal_force, nominal_pressure : float or sequence of float
         Exactly one of them: approach from first touch (m), force on the block (N), or force over its area

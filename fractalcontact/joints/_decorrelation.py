@@ -76,7 +76,7 @@ def decorrelation_length(
     ----------
     crack : Crack
     direction : str, float, or a sequence of them
-        Directions in which the block slides: compass words, or azimuths in degrees (E = 0, anticlockwise).
+        Directions in which the block slides: compass words, or degrees anticlockwise from E.
     shear : sequence of float, optional
         Shears (m), ascending from 0. None: whole cells up to the greatest travel (half the face where it
         wraps); all of them up to 128, otherwise 128 in geometric steps.

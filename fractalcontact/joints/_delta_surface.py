@@ -56,7 +56,7 @@ def delta_surface(
         Shear displacement v >= 0, m, each once. Within 1e-6 of whole cells the shift is a copy, and exact.
         Otherwise it is band-limited where the face wraps, and a quintic spline on a free axis.
     direction : str, float, or a sequence of them
-        E, NE, N, NW, W, SW, S, SE (E is +x, N is +y), or the azimuth in degrees from E, anticlockwise.
+        E, NE, N, NW, W, SW, S, SE (E is +x, N is +y), or degrees anticlockwise from E.
 
     Returns
     -------

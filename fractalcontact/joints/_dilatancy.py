@@ -95,7 +95,7 @@ def dilatancy(
     shear : float or sequence of float
         Shear displacements v >= 0, m, each once.
     direction : str, float, or a sequence of them
-        Directions of sliding: compass words, or azimuths in degrees (E = 0, anticlockwise).
+        Directions of sliding: compass words, or degrees anticlockwise from E.
     normal_force : float or sequence of float, optional
         Normal forces on the block, N; a sequence is a path of load, repeated at every shear. None: only the
         rigid dilatancy, and no contact is solved.

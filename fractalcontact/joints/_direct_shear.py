@@ -14,10 +14,11 @@ import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
@@ -119,7 +120,7 @@ def direct_shear(
         Greatest pressure that a contact bears, Pa: between the compressive strength and an indentation
         hardness.
     direction : str or float
-        Compass word or azimuth (degree) along which whole cells lie.
+        Compass word, or degrees anticlockwise from E, along which whole cells lie.
     normal_stiffness : float, optional
         Stiffness of a spring on the block per area, Pa/m. Default: constant normal stress.
     shear_stiffness : float, optional

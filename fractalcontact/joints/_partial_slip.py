@@ -11,11 +11,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
-from fractalcontact.base.validation import Problems, float_array, word_tuple
+from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
 
@@ -117,7 +118,7 @@ def partial_slip(
     tangential_force : float or sequence of float
         Shear force on the block (N) at each step, positive towards the direction.
     direction : str or float
-        Direction of sliding, and of the force: compass word or azimuth in degrees (E = 0, anticlockwise).
+        Direction of sliding, and of the force: compass word, or degrees anticlockwise from E.
     closure, normal_force, nominal_pressure : float
         Exactly one of them: the constant normal load, as for `closure`.
     friction_coefficient : float, optional

@@ -64,7 +64,7 @@ def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, turn_up
         problems.require(bool(np.isfinite(values).any()), argument, "heights", NONE)
     ratio = grid.spacing[0] / grid.spacing[1]
     # a rotation in cells is one in the plane only where the cells are square
-    square = not (problems.boolean("rotation", rotation) and rotation) or abs(ratio - 1.0) <= UNIFORM
+    square = rotation is not True or abs(ratio - 1.0) <= UNIFORM
     problems.require(square, "rotation", "False where spacings differ", f"a ratio of {ratio:g}")
 
 
@@ -149,7 +149,7 @@ def register(
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
     moved = resample(up, source_places(pose, low.shape, offset))
     moved += _tilted_plane(pose, np.isfinite(moved - low))
-    _warn(pose)
+    _warn_uncertain(pose)
     result = _dataset(lower, low, moved, pose, grid)
     if turn_upper is None:
         _refuse_swapped_faces(result)
@@ -185,19 +185,15 @@ def _refuse_swapped_faces(result: xr.Dataset) -> None:
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got a mean aperture of {mean:.3g} m"])
 
 
-def _warn(pose: Pose) -> None:
-    if not pose.converged:
-        warnings.warn(
-            f"{WHERE}: not converged after {pose.iterations} steps", ConvergenceWarning, stacklevel=4
-        )
+def _warn_uncertain(pose: Pose) -> None:
+    """Warn of a position that is not determined to a point."""
     error = max(pose.errors[:2])
     if error > UNCERTAIN:
-        warnings.warn(
-            f"{WHERE}: position not determined, only to {error:.2g} points: do the faces belong together, "
-            "turned by a few degrees at most?",
-            ConvergenceWarning,
-            stacklevel=4,
+        message = (
+            f"position not determined, only to {error:.2g} points: do the faces belong together, turned by"
         )
+        message = f"{WHERE}: {message} a few degrees at most?"
+        warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
 
 def _tilted_plane(pose: Pose, common: Array) -> Array:

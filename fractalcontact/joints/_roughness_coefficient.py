@@ -104,8 +104,8 @@ def roughness_coefficient(
     surface : DataArray, shape (y, x) or (x,)
         Heights, m; missing ones (NaN) are left out.
     direction : str, float, or a sequence of them
-        Directions of the profiles: compass words, or azimuths in degrees. Opposite ones give the same.
-        Default: E and N; E for a profile.
+        Directions of the profiles: compass words, or degrees anticlockwise from E. Opposite ones give the
+        same. Default: E and N; E for a profile.
     regression : {"tse_cruden", "yu_vayssade", "tatone_grasselli"}
         Regression of JRC over Z2, with the sampling intervals to which it was fitted: 0.508 mm; 0.25, 0.5
         and 1 mm; 0.5 and 1 mm. The one whose interval is nearest to the lag in use is taken.

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import COMPASS
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._dilatancy import dilatancy
@@ -81,7 +82,7 @@ def self_weight(
     shear : float or sequence of float
         Shears v > 0 from mated position (m) over which the dilatancy angle is the mean; see Notes.
     direction : str, float, or a sequence of them
-        Directions of sliding: compass words, or azimuths in degrees (E = 0, anticlockwise).
+        Directions of sliding: compass words, or degrees anticlockwise from E.
     influence, hardness, tolerance
         As for `fractalcontact.contact.press`.
 

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._criteria import (
     FITTED_STRESS,
