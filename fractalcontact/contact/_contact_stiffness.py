@@ -37,8 +37,6 @@ def press_punch(step: Step, guess: Array | None, *, tolerance: float = STIFFNESS
         hardness=np.inf,
         tolerance=max(step.path.tolerance, tolerance),
     )
-    if path.method == "elimination":  # starts from the whole plane
-        return next(solve_path(path))
     return next(solve_path(path, lambda _: guess))
 
 

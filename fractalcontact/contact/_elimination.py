@@ -38,8 +38,8 @@ class Elimination:
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self.problem, self.tolerance, self.matrix = problem, tolerance, InfluenceMatrix(problem)
 
-    def solve(self, control: Control) -> Solution:
-        """Solve one step of a path."""
+    def solve(self, control: Control, guess: Array | None = None) -> Solution:  # noqa: ARG002
+        """Solve one step of a path; it always starts from all nodes that may touch."""
         matrix = self.matrix
         if control.force is not None:
             balance = solve_force(matrix, control.force)

@@ -187,10 +187,7 @@ def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None =
         solution = closed_form(problem, control)
         if solution is None:
             solver = solver or make_solver(problem, path)
-            if guess is None:
-                solution = solver.solve(control)
-            else:  # the fast method
-                solution = cast("WindowSolver", solver).solve(control, guess(value))
+            solution = solver.solve(control, None if guess is None else guess(value))
         force = solution.force * path.units.force
         if path.control == "closure":
             closure, imposed = value, force

@@ -29,10 +29,6 @@ WHERE = "fractalcontact.joints.partial_slip"
 LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 BLOCK_ROUNDING = 1e-3  # above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same
-COLUMNS = (
-    "tangential_displacement", "tangential_stiffness", "stick_area", "slip_area", "dissipated_energy",
-    "iterations", "transforms", "residual", "converged", "run_time",
-)  # fmt: skip
 
 
 def _check(
@@ -208,19 +204,22 @@ def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> di
     interface_stiffness = _without_block(normal_stiffness, pressing.block_stiffness) / area
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = shear_stiffness / interface_stiffness
-    columns = {name: sheared.columns[name] for name in COLUMNS} | sheared.maps
-    return columns | {
-        "shear_stiffness": shear_stiffness,
-        "stiffness_ratio": ratio,
-        "interface_stiffness": interface_stiffness,
-        "sliding_force": path.friction * normal,
-        "contact_area": sheared.contact_area,
-        "slip_method": np.int8(METHODS.index(sheared.method)),
-        "superposition_error": sheared.superposition_error,
-        "closure": sheared.closure,
-        "normal_force": normal,
-        "nominal_pressure": normal / pressing.grid.nominal_area,
-    }
+    return (
+        sheared.columns
+        | sheared.maps
+        | {
+            "shear_stiffness": shear_stiffness,
+            "stiffness_ratio": ratio,
+            "interface_stiffness": interface_stiffness,
+            "sliding_force": path.friction * normal,
+            "contact_area": sheared.contact_area,
+            "slip_method": np.int8(METHODS.index(sheared.method)),
+            "superposition_error": sheared.superposition_error,
+            "closure": sheared.closure,
+            "normal_force": normal,
+            "nominal_pressure": normal / pressing.grid.nominal_area,
+        }
+    )
 
 
 def _block_stiffness(pressing: Pressing, path: ShearPath) -> float:

@@ -51,10 +51,6 @@ BULK = {
     ),
 }
 LOADS = ("closure", "normal_force", "nominal_pressure")
-SCALARS = (
-    *LOADS, "contact_area", "contact_fraction", "corrected_contact_fraction", "mean_gap", "elastic_energy",
-    "iterations", "residual", "converged", "stop_reason", "run_time",
-)  # fmt: skip
 # bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
 PRESSING_BYTES = 228.0
 FORCE_ERROR = 1e-7  # relative error of the force that balances a spring; 1e-5 takes a tenth less time
@@ -178,8 +174,7 @@ class ShearedContact:
             pressed = solver.solve(
                 self.heights, pressing.grid, pressing.modulus, pressing.options, load, keep=keep
             )
-        scalars = [name for name in (*SCALARS, "plastic_work") if name in pressed.columns]
-        columns = {name: pressed.columns[name] for name in scalars} | pressed.maps
+        columns = pressed.columns | pressed.maps
         columns["rms_slope"] = np.array(self.rms_slope)
         # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
         has_bulk = np.isfinite(pressing.block_stiffness)
@@ -335,8 +330,8 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     if "plastic_work" in at_shear and not np.array_equal(held[: len(steps)], load.values):
         return None  # what yielded depends on the path
     at_load = at_shear.isel(step=[int(found[0]) for found in steps])
-    columns = {name: at_load[name].values for name in (*SCALARS, "bulk_closure", "interface_closure")}
-    columns |= {"plastic_work": at_load["plastic_work"].values} if "plastic_work" in at_load else {}
+    of_steps = [str(name) for name, variable in at_load.variables.items() if variable.dims == ("step",)]
+    columns = {name: at_load[name].values for name in of_steps if name != "step"}
     return columns | {"rms_slope": at_load["rms_slope"].values}
 
 
