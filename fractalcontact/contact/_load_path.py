@@ -54,6 +54,11 @@ class ScaledPath:
     tolerance: float
     method: str
 
+    @property
+    def disc_radius(self) -> float | None:
+        """Radius of the circular plates in m; None for other influence coefficients."""
+        return self.body.radius * self.units.length if self.body.influence == "disc" else None
+
 
 @dataclass(frozen=True)
 class PlasticHistory:

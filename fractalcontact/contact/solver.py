@@ -124,12 +124,11 @@ def solve(
         for name, planes in maps.items():
             planes.append(np.asarray(MAPS[name](step, heights)))
         before = step
-    body = path.body
-    return Pressed(
-        {name: np.array([row[name] for row in rows]) for name in rows[0]},
-        {name: planes[0][None] if len(planes) == 1 else np.stack(planes) for name, planes in maps.items()},
-        body.radius * path.units.length if body.influence == "disc" else None,
-    )
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    stacks = {
+        name: planes[0][None] if len(planes) == 1 else np.stack(planes) for name, planes in maps.items()
+    }
+    return Pressed(columns, stacks, path.disc_radius)
 
 
 def rms_slope(heights: Array, grid: Grid) -> float:
@@ -298,17 +297,8 @@ def solve_shear(
         maps = _solve_fully(superposition, columns, keep)
     else:
         maps = {name: superposition.map(name) for name in keep}
-    body = path.body
-    return Sheared(
-        first.closure,
-        first.force,
-        np.count_nonzero(first.contact) * grid.cell_area,
-        method,
-        error,
-        columns,
-        maps,
-        body.radius * path.units.length if body.influence == "disc" else None,
-    )
+    area = np.count_nonzero(first.contact) * grid.cell_area
+    return Sheared(first.closure, first.force, area, method, error, columns, maps, path.disc_radius)
 
 
 def _solve_fully(

@@ -62,12 +62,9 @@ PREFERENCE = (
 
 def _check(problems: Problems, *, closure: Any, seating_pressure: Any) -> None:
     problems.number("seating_pressure", seating_pressure, above=0, at_most=1e100, optional=True)
-    expected = "the Dataset of fractalcontact.joints.closure"
-    if not isinstance(closure, xr.Dataset):
-        problems.add("closure", expected, f"an object of type {type(closure).__name__}")
-        return
     if not problems.result("closure", closure):
         return
+    expected = "the Dataset of fractalcontact.joints.closure"
     names = ("interface_closure", "nominal_pressure")
     absent = [name for name in names if name not in closure.variables or "step" not in closure[name].dims]
     problems.require(not absent, "closure", expected, f"no {', '.join(absent)} over step")

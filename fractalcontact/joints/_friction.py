@@ -59,12 +59,9 @@ def _check(
     bounded = problems.number("distance", distance, above=0, optional=True)
     problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
     problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
-    expected = "the Dataset of fractalcontact.joints.dilatancy"
-    if not isinstance(dilatancy, xr.Dataset):
-        problems.add("dilatancy", expected, f"an object of type {type(dilatancy).__name__}")
-        return
     if not problems.result("dilatancy", dilatancy):
         return
+    expected = "the Dataset of fractalcontact.joints.dilatancy"
     name = _dilatancy_name(dilatancy)
     needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
     if is_form and form == "energy":

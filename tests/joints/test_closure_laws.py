@@ -264,7 +264,7 @@ def test_elastic_faces_prefer_the_exponential_law_of_persson():
 
 def test_invalid_arguments_are_refused():
     with pytest.raises(
-        ValueError, match=r"Dataset of fractalcontact.joints.closure, got an object of type int"
+        ValueError, match=r"closure: expected a Dataset, the result of a public function, got"
     ):
         fc.joints.closure_laws(3)
     with pytest.raises(ValueError, match="no interface_closure"):

@@ -233,7 +233,7 @@ def test_peak_strength_against_a_spring_takes_the_mean_pressure():
 
 
 def test_invalid_arguments_are_refused():
-    with pytest.raises(ValueError, match="Dataset of fractalcontact.joints.dilatancy"):
+    with pytest.raises(ValueError, match="dilatancy: expected a Dataset, the result of a public function"):
         fc.joints.friction(3)
     with pytest.raises(ValueError, match="at least two shears"):
         fc.joints.friction(curve([1.0], [1.0]))
