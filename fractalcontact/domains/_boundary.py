@@ -34,7 +34,7 @@ FEWEST_SIDES = 200  # of cells on the boundary, below which no interval is given
 # a set with an interior holds whole blocks of cells: the edge of a block, and the least share of its cells
 # that lie in one; dimensions outside ROUGH are compared with the small block only
 SMALL_BLOCK, LARGE_BLOCK = (3, 0.1), (9, 0.06)
-ROUGH = 1.3, 1.85
+ROUGH = 1.3, 1.85  # smoother islands may be that small, and rougher ones hold no large block
 SMOOTH, SMOOTH_FACTOR = 1.3, 2.0  # below this dimension blocks are not independent: the error grows
 
 

@@ -20,7 +20,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import Array, Planes, check_mask, parallel_map
 
 STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
-BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept
+BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept: 16 MB of labels
 MANY_ISLANDS = 2**22  # of a plane, above which only their cells are measured by default
 INT64_MAX = np.iinfo(np.int64).max
 

@@ -29,7 +29,7 @@ from fractalcontact.domains._scaling_fit import (
     window_notes,
 )
 
-ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)
+ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)  # support, entropy, pairs, and two that the largest boxes rule
 LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
 SOURCE = (
     "Hentschel and Procaccia, Physica D 8:435 (1983); Halsey et al., Phys. Rev. A 33:1141 (1986); "

@@ -21,7 +21,7 @@ LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of th
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
 LAWS = {"exponential": _style.LINES[1], "hyperbolic": _style.LINES[2]}  # line where not preferred
 PREFERRED, OTHER = 1.8, 0.9  # points, width of the line of a law
-TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}
+TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}  # weaker than the curve of the interface
 
 
 @figure

@@ -25,7 +25,7 @@ A4 = (8.27, 11.69)  # inches
 ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
 SHEAR_ROW, EMPTY = 2, 0.05  # a page without a shear test leaves no room for one
 COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
-FLOW = Scale(1.0, "m³")
+FLOW = Scale(1.0, "m³")  # transmissivities span decades: no prefix suits them all
 # what a consultant has to answer for, with its symbol and its unit
 INPUTS = {
     "young": ("E", "Pa"),

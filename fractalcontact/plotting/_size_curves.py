@@ -31,7 +31,7 @@ from fractalcontact.plotting._units import Quantity, Units
 
 SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
 IN_CELLS = ("box_size", "radius")
-CELLS = Scale(1.0, "cells")
+CELLS = Scale(1.0, "cells")  # where a mask has no lengths
 MOST = 6  # curves in a panel; more cross those of their random nulls illegibly
 TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
 STEEP = 1.5  # ratio of values above which the lacunarity is drawn on a logarithmic axis

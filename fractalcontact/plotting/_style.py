@@ -47,7 +47,7 @@ SLIP_COLOURS = (STATE_COLOURS[0], STATE_COLOURS[1], ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 # the lightest colours of the map cannot be read on white, the darkest not on black
 SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
-MAX_LEGEND_ENTRIES = 8
+MAX_LEGEND_ENTRIES = 8  # more do not fit beside a panel of usual height
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
 # lines of the first, second ... of several kinds of curves; long dashes stay apart where curves are steep
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")

@@ -55,8 +55,8 @@ OWN_NAME = frozenset(
 )  # fmt: skip
 LONGEST_LABEL = 44  # characters of a line, which fits beside a panel of usual height
 PLAIN = Scale(1.0, "")  # of a number without a unit
-PER_CENT = Scale(0.01, "%")
-PER_LENGTH = Scale(1e9, "MPa/mm")
+PER_CENT = Scale(0.01, "%")  # of a share
+PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
 # the unit of practice, whatever the values
 USUAL = {
     **dict.fromkeys(
