@@ -102,11 +102,3 @@ class Note:
     def __str__(self) -> str:
         first, rest = " " * self.indent, " " * (self.indent + 2)
         return textwrap.fill(self.words, screen_width(), initial_indent=first, subsequent_indent=rest)
-
-
-Part = Table | Note | str  # of a summary; a word stands on a line of its own
-
-
-def text_of(parts: Sequence[Part]) -> str:
-    """Return the parts of a section as text."""
-    return "\n".join(str(part) for part in parts)

@@ -82,8 +82,6 @@ class JointTable:
         Bring two measured faces into mated position first.
     turn_upper : str, optional
         The axis about which an upper body that was scanned face up is turned over.
-    options : mapping
-        Arguments common to all stages.
     stages : mapping
         `[joint.closure]` and so on: arguments of one stage, which replace the common ones.
     """
@@ -91,7 +89,6 @@ class JointTable:
     block: Any = None
     register: bool = False
     turn_upper: str | None = None
-    options: Table = field(default_factory=dict)
     stages: Mapping[str, Table] = field(default_factory=dict)
 
 
@@ -179,9 +176,8 @@ class Scene:
         """The joint and its stages."""
         table = self.table("joint")
         stages = {key: value for key, value in table.items() if isinstance(value, dict)}
-        options = {key: value for key, value in table.items() if key not in stages}
-        block, turn_upper = (options.pop(key, None) for key in ("block", "turn_upper"))
-        return JointTable(block, bool(options.pop("register", False)), turn_upper, options, stages)
+        register = bool(table.get("register", False))
+        return JointTable(table.get("block"), register, table.get("turn_upper"), stages)
 
     @cached_property
     def want(self) -> WantTable:

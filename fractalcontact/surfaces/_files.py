@@ -7,8 +7,8 @@ import io
 import math
 import re
 import zipfile
-import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.memory import require_unpacked, unpacked_limit
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -42,15 +42,25 @@ def open_bytes(path: Path) -> IO[bytes]:
         return path.open("rb")
     limit = unpacked_limit(path.stat().st_size, RATIO)
     content = io.BytesIO()
-    try:
-        with gzip.open(path) as file:
-            while content.tell() <= limit and (block := file.read(_BLOCK)):
-                content.write(block)
-    except (OSError, EOFError, zlib.error) as error:
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
+    with corrupt_named(path.name), gzip.open(path) as file:
+        while content.tell() <= limit and (block := file.read(_BLOCK)):
+            content.write(block)
     require_unpacked(WHERE, path.name, content.tell(), limit)
     content.seek(0)
     return content
+
+
+@contextmanager
+def corrupt_named(name: str, where: str = WHERE) -> Iterator[None]:
+    """Raise `UnreadableFile` for whatever a library raises in the block, but for errors of the system."""
+    try:
+        yield
+    except Exception as error:
+        of_system = isinstance(error, OSError) and error.errno is not None
+        if of_system or isinstance(error, (FractalContactError, MemoryError)):
+            raise
+        reason = str(error)[:300] or type(error).__name__
+        raise UnreadableFile(where, [f"path: {name!r} is corrupt ({reason})"]) from error
 
 
 def check_unpacked(name: str, file: IO[bytes]) -> None:
@@ -58,7 +68,7 @@ def check_unpacked(name: str, file: IO[bytes]) -> None:
     head = file.read(10)
     limit, unpacked = unpacked_limit(file.seek(0, io.SEEK_END), RATIO), 0
     file.seek(0)
-    try:
+    with corrupt_named(name):
         if head.startswith(b"PK"):
             with zipfile.ZipFile(file) as archive:
                 unpacked = sum(entry.file_size for entry in archive.infolist())
@@ -68,8 +78,6 @@ def check_unpacked(name: str, file: IO[bytes]) -> None:
             from scipy.io import whosmat
 
             unpacked = sum(8 * math.prod(shape) for _, shape, _ in whosmat(file))
-    except Exception as error:
-        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
     file.seek(0)
     require_unpacked(WHERE, name, unpacked, limit)
 
@@ -263,7 +271,7 @@ def _number(cell: str, line: int, column: int) -> float:
 
 
 def read_npy(path: Path) -> Array:
-    """Return the array of an npy file; raise ValueError if it is damaged, of another format or has objects.
+    """Return the array of an npy file; raise an error if it is damaged, of another format or has objects.
 
     Its header is compared with the length of the file before memory for the array is taken.
     """
@@ -290,12 +298,9 @@ def _require_format(file: IO[bytes], name: str) -> None:
 
 
 def read_npz(path: Path) -> dict[str, Array]:
-    """Return the arrays of an npz file by name; raise ValueError if it is damaged or has no numbers."""
+    """Return the arrays of an npz file by name; raise an error if it is damaged or has no numbers."""
     with open_bytes(path) as file:
         _require_format(file, "npz")
         check_unpacked(path.name, file)
-        try:
-            with np.load(file, allow_pickle=False) as archive:
-                return {name: np.asarray(archive[name]) for name in archive.files}
-        except (OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-            raise ValueError(str(error) or "it ends too early") from error
+        with np.load(file, allow_pickle=False) as archive:
+            return {name: np.asarray(archive[name]) for name in archive.files}

@@ -154,10 +154,10 @@ def from_points(
     frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
     cells = _cells_of(plane) if spacing is None else None
     step = spacing if cells is None else cells[-1].spacing
-    if values.shape[1] == 2:
-        gridded = _profile(values, step, largest_gap, cells)
-    elif (lattice := _lattice(values, step, cells)) is not None:
+    if (lattice := _lattice(values, step, cells)) is not None:
         gridded = lattice
+    elif values.shape[1] == 2:
+        gridded = _profile(values, step, largest_gap, cells)
     else:
         given = None if triangles is None else _finite_triangles(point_array(points), triangles)
         gridded = _triangulated(values, step, given, largest_gap, cells)
@@ -214,10 +214,11 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
     axes = _regular_axes(points, spacing)
     if axes is None:
         return None
+    columns = _columns(points)
     if cells is not None:
         # of the points, those of the cells
         inside = np.ones(len(points), dtype=bool)
-        for axis, column in zip(cells, (1, 0), strict=True):
+        for axis, column in zip(cells, columns, strict=True):
             place = (points[:, column] - axis.first) / axis.spacing
             if float(np.abs(place - np.rint(place)).max()) > OFF_NODE:
                 return None
@@ -225,11 +226,11 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
         axes, points = cells, points[inside]
     shape = tuple(axis.count for axis in axes)
     index = np.ravel_multi_index(
-        tuple(axis.index(points[:, column]) for axis, column in zip(axes, (1, 0), strict=True)), shape
+        tuple(axis.index(points[:, column]) for axis, column in zip(axes, columns, strict=True)), shape
     )
     # heights at one node are averaged
     count = np.bincount(index, minlength=math.prod(shape))
-    total = np.bincount(index, weights=points[:, 2], minlength=math.prod(shape))
+    total = np.bincount(index, weights=points[:, -1], minlength=math.prod(shape))
     with np.errstate(invalid="ignore"):
         heights = (total / np.where(count > 0, count, np.nan)).reshape(shape)
     repeated = int(np.count_nonzero(count > 1))
@@ -256,7 +257,7 @@ class _Axis:
 
 def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | None:
     """Return the axes (y, x), or (x,), of a uniform grid on which the points are; None if there is none."""
-    columns = (0,) if points.shape[1] == 2 else (1, 0)
+    columns = _columns(points)
     found = [_regular_axis(points[:, column], len(points)) for column in columns]
     axes = tuple(axis for axis in found if axis is not None)
     if len(axes) < len(columns):
@@ -265,6 +266,11 @@ def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | N
         return None
     matches = spacing is None or all(abs(axis.spacing - spacing) <= 1e-3 * spacing for axis in axes)
     return axes if matches else None
+
+
+def _columns(points: Array) -> tuple[int, ...]:
+    """Return the columns of the positions (y, x), or (x,) of a profile."""
+    return (0,) if points.shape[1] == 2 else (1, 0)
 
 
 def _regular_axis(positions: Array, most: int) -> _Axis | None:
@@ -290,16 +296,8 @@ def _regular_axis(positions: Array, most: int) -> _Axis | None:
 def _profile(
     points: Array, spacing: float | None, largest_gap: float | None, cells: tuple[_Axis, ...] | None
 ) -> Gridded:
-    """Return heights of a profile: as measured if the points are uniform, else interpolated linearly."""
-    axes = _regular_axes(points, spacing) if cells is None else None
+    """Return heights of a profile whose points are not uniform, interpolated linearly."""
     x, inverse, repeats = np.unique(points[:, 0], return_inverse=True, return_counts=True)
-    if axes is not None:
-        index, (axis,) = axes[0].index(points[:, 0]), axes
-        count = np.bincount(index, minlength=axis.count)
-        total = np.bincount(index, weights=points[:, 1], minlength=axis.count)
-        with np.errstate(invalid="ignore"):
-            heights = total / np.where(count > 0, count, np.nan)
-        return Gridded(heights, (axis.centres,), None, "none: the points are uniform", {})
     z = np.bincount(inverse, weights=points[:, 1]) / repeats
     if x.size < 3:
         raise InvalidInput(WHERE, ["points: expected at least 3 positions along the profile"])

@@ -17,7 +17,14 @@ from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._files import FileContent, Request, check_unpacked, file_suffix, open_bytes
+from fractalcontact.surfaces._files import (
+    FileContent,
+    Request,
+    check_unpacked,
+    corrupt_named,
+    file_suffix,
+    open_bytes,
+)
 from fractalcontact.surfaces._grid_input import surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -114,12 +121,10 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
     """Return a channel by name or number; None stands for the default of the format."""
-    try:
+    with corrupt_named(name):
         channels = list(reader.channels)
         if channel is None:
             return reader.default_channel
-    except Exception as error:
-        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
     names = [str(entry.name) for entry in channels]
     if isinstance(channel, str) and channel in names:
         return channels[names.index(channel)]
@@ -173,11 +178,9 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
     options: dict[str, Any] = {"channel_index": chosen.index}
     if size is None:
         options["physical_sizes"] = tuple(float(n) for n in np.atleast_1d(chosen.nb_grid_pts))
-    try:
+    with corrupt_named(name):
         topography = reader.topography(**options)
         values = topography.heights()
-    except Exception as error:
-        raise UnreadableFile(WHERE, [f"path: {name!r} is corrupt ({str(error)[:300]})"]) from error
     if np.iscomplexobj(values) or values.ndim not in (1, 2):
         raise UnreadableFile(
             WHERE, [f"channel {chosen.name!r}: expected real heights, got shape {values.shape}"]
@@ -214,22 +217,19 @@ def read_raster(request: Request) -> FileContent:
     if importlib.util.find_spec("rasterio") is None:
         raise MissingExtra(f"reading {path.name!r}", "rasterio", "geo")
     import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+    from rasterio.errors import NotGeoreferencedWarning
 
     band = 1 if channel is None else int(channel) + 1 if isinstance(channel, (int, np.integer)) else 0
-    try:
-        with warnings.catch_warnings(), open_bytes(path) as stream:
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            content = stream.read()
-            with (
-                rasterio.MemoryFile(content, filename=path.name.removesuffix(".gz")) as file,
-                file.open() as raster,
-            ):
-                _check_raster(raster, band, channel, spacing)
-                heights = np.ma.filled(raster.read(band, masked=True).astype(np.float64), np.nan)
-                transform, system, stated = raster.transform, raster.crs, raster.units[band - 1]
-    except RasterioError as error:
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({str(error)[:200]})"]) from error
+    with corrupt_named(path.name), warnings.catch_warnings(), open_bytes(path) as stream:
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        content = stream.read()
+        with (
+            rasterio.MemoryFile(content, filename=path.name.removesuffix(".gz")) as file,
+            file.open() as raster,
+        ):
+            _check_raster(raster, band, channel, spacing)
+            heights = np.ma.filled(raster.read(band, masked=True).astype(np.float64), np.nan)
+            transform, system, stated = raster.transform, raster.crs, raster.units[band - 1]
     # without a reference system lengths are in the unit given, or metres
     factor = float(system.linear_units_factor[1]) if system else in_metres(1.0, units or "m")
     vertical = units or stated

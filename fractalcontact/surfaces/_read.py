@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,6 +28,7 @@ from fractalcontact.surfaces._files import (
     FileContent,
     NotATable,
     Request,
+    corrupt_named,
     file_suffix,
     open_bytes,
     read_npy,
@@ -211,7 +211,9 @@ def file_content(request: Request) -> FileContent:
     if suffix in (*MESHES, *CLOUDS):
         return _gridded_points(point_content(path, request.columns), request)
     if suffix == ".npy":
-        return _array_content(_loaded(read_npy, path), request)
+        with corrupt_named(path.name):
+            values = read_npy(path)
+        return _array_content(values, request)
     if suffix == ".npz":
         return _archive_content(request)
     with open_bytes(path) as file:
@@ -296,23 +298,14 @@ def _gridded_points(points: Points, request: Request) -> FileContent:
     return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
 
 
-def _loaded(function: Callable[[Path], T], path: Path) -> T:
-    """Return what a function reads from a file; a damaged one is an `UnreadableFile`."""
-    try:
-        return function(path)
-    except UnreadableFile:
-        raise
-    except (ValueError, SyntaxError, TokenError) as error:  # two of them for a header
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({error})"]) from error
-
-
 def _archive_content(request: Request) -> FileContent:
     """Return an array of an npz file: the only one of heights, or that called `channel`.
 
     One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
     """
     path, channel, spacing = request.path, request.channel, request.spacing
-    arrays = _loaded(read_npz, path)
+    with corrupt_named(path.name):
+        arrays = read_npz(path)
     names = [name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)]
     default = names[0] if len(names) == 1 else "height"
     name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default

@@ -21,7 +21,15 @@ from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, reading
-from fractalcontact.surfaces._files import RATIO, NotATable, Table, file_suffix, open_bytes, read_table
+from fractalcontact.surfaces._files import (
+    RATIO,
+    NotATable,
+    Table,
+    corrupt_named,
+    file_suffix,
+    open_bytes,
+    read_table,
+)
 from fractalcontact.surfaces._instruments import PROJECT
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -240,18 +248,13 @@ def _mesh(path: Path, suffix: str) -> Points:
         raise MissingExtra(f"reading {path.name!r}", "trimesh", "mesh")
     import trimesh
 
-    try:
+    with corrupt_named(path.name, WHERE):
         with open_bytes(path) as file:
             mesh = trimesh.load(file, file_type=suffix.lstrip("."), process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh() if mesh.geometry else trimesh.Trimesh()
         position = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64).reshape(-1, 3)
-    except UnreadableFile:
-        raise
-    except Exception as error:  # the library raises exceptions of many kinds
-        reason = f"{type(error).__name__}: {str(error)[:200]}"
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({reason})"]) from error
     if len(position) == 0:
         raise UnreadableFile(WHERE, [f"path: expected points in {path.name!r}, got none"])
     entries = {"format": suffix.lstrip("."), "reader": f"trimesh {trimesh.__version__}"}
@@ -264,18 +267,12 @@ def _las(path: Path) -> Points:
         raise MissingExtra(f"reading {path.name!r}", "laspy", "mesh")
     import laspy
 
-    try:
-        with open_bytes(path) as file:
-            _check_las_size(file, path)
-            cloud = laspy.read(file)
+    if file_suffix(path) == ".laz" and not laspy.LazBackend.detect_available():
+        raise MissingExtra(f"reading {path.name!r}", "lazrs", "mesh")
+    with corrupt_named(path.name, WHERE), open_bytes(path) as file:
+        _check_las_size(file, path)
+        cloud = laspy.read(file)
         position = np.array(cloud.xyz, dtype=np.float64)
-    except UnreadableFile:
-        raise
-    except Exception as error:  # the library raises exceptions of many kinds
-        if "backend" in str(error).lower():
-            raise MissingExtra(f"reading {path.name!r}", "lazrs", "mesh") from error
-        reason = f"{type(error).__name__}: {str(error)[:200]}"
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt ({reason})"]) from error
     system = _reference_system(cloud.header.vlrs)
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"projected coordinates; {PROJECT}"
