@@ -258,6 +258,13 @@ def _answer(options: argparse.Namespace) -> int:
         message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
+    if options.question == "roughness" and not options.scene:
+        from fractalcontact import surfaces
+
+        reading = {name: arguments[name] for name in ("spacing", "units") if arguments[name] is not None}
+        heights = surfaces.read(scan, **reading)
+        if heights.dims == ("x",):
+            return _profile_roughness(heights, Path(folder), scan.name, options)
     upper = getattr(options, "upper", None)
     text = scenes.template(options.question, scan, upper, folder=place, **arguments)
     if options.scene:
@@ -276,6 +283,34 @@ def _answer(options: argparse.Namespace) -> int:
     finally:
         if Path(folder).is_dir():  # also after a stop, and not after a refusal
             target.write_text(f"{_mark(text)}\n{text}", encoding="utf-8")
+
+
+def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.Namespace) -> int:
+    """Print and save dimension, roughness coefficient and statistics of a profile, which need no scene."""
+    import xarray as xr
+
+    from fractalcontact import dimensions, joints, save, scenes, surfaces
+    from fractalcontact import open as open_result
+    from fractalcontact.base.output_folder import RESULT
+
+    title, target = f"Roughness of the profile {name}", folder / RESULT
+    if target.exists() and not options.force and open_result(target).attrs.get("title") != title:
+        expected = "a folder without results of another study (another folder, or --force)"
+        raise InvalidInput("fractalcontact roughness", [f"-o: expected {expected}, got {folder.name!r}"])
+    profile = surfaces.despike(heights) if options.despike else heights
+    level = 1 if options.level is None else options.level
+    levelled = surfaces.level(profile, level) if level else profile
+    groups = {
+        "/surfaces": levelled.to_dataset(name="height"),
+        "/dimensions": dimensions.estimate(profile),
+        "/joints/roughness_coefficient": joints.roughness_coefficient(profile),
+    }
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs["title"] = title
+    save(tree, target)
+    if not options.quiet:
+        print(f"{scenes.summary(tree, verbose=options.verbose)}\n\nwritten: {target}")
+    return 0
 
 
 def _mark(text: str) -> str:

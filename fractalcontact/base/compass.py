@@ -14,6 +14,7 @@ from fractalcontact.base.validation import Problems
 
 AZIMUTHS = {"E": 0.0, "NE": 45.0, "N": 90.0, "NW": 135.0, "W": 180.0, "SW": 225.0, "S": 270.0, "SE": 315.0}
 COMPASS = ("E", "N", "W", "S")
+WORDS = {"east": "E", "north": "N", "west": "W", "south": "S"}
 EXPECTED = f"one of {', '.join(AZIMUTHS)}, or an azimuth in degrees"
 LARGEST_AZIMUTH = 1e9  # degree; beyond it a double has no digits left below 360
 # along an axis the other component is exactly zero, so that shifts by whole cells stay whole
@@ -32,7 +33,7 @@ class Direction:
 def check_direction(problems: Problems, value: Any) -> bool:
     """Check for one compass word or azimuth in degrees."""
     if isinstance(value, str):
-        valid = value in AZIMUTHS
+        valid = WORDS.get(value, value) in AZIMUTHS
     else:
         valid = is_real(value) and bool(abs(value) < LARGEST_AZIMUTH)  # False for NaN
     return problems.require(valid, "direction", EXPECTED, value)
@@ -68,7 +69,7 @@ def read_directions(value: Any) -> tuple[Direction, ...]:
 
 def read_direction(value: str | float) -> Direction:
     """Return a direction that passed `check_direction`."""
-    azimuth = AZIMUTHS[value] if isinstance(value, str) else float(value) % 360.0
+    azimuth = AZIMUTHS[WORDS.get(value, value)] if isinstance(value, str) else float(value) % 360.0
     names = {angle: name for name, angle in AZIMUTHS.items()}
     angle = math.radians(azimuth)
     unit = _AXES.get(azimuth, (math.sin(angle), math.cos(angle)))

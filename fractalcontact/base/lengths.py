@@ -6,7 +6,7 @@ from typing import Any
 
 # units per metre, or metres per unit: whichever is an integer, so that the conversion rounds only once
 PER_METRE = {"dm": 1e1, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "angstrom": 1e10, "pm": 1e12}
-METRES = {"m": 1.0, "km": 1e3}
+METRES = {"m": 1.0, "km": 1e3, "inch": 0.0254}
 SPELLINGS = {
     "\u00b5m": "um",  # the micro sign
     "\u03bcm": "um",  # the Greek letter
@@ -24,6 +24,8 @@ SPELLINGS = {
     "\u00c5": "angstrom",  # the letter
     "Angstrom": "angstrom",
     "A": "angstrom",
+    "in": "inch",
+    "inches": "inch",
 }
 UNITS = (*METRES, *PER_METRE, *SPELLINGS)
 

@@ -100,15 +100,15 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     return target
 
 
-def replace_attribute(path: Path, name: str, value: str) -> None:
-    """Replace a global attribute of a file, in a copy that takes its place when it is complete."""
+def replace_attributes(path: Path, attributes: Mapping[str, str]) -> None:
+    """Replace global attributes of a file, in a copy that takes its place when it is complete."""
     import netCDF4
 
     try:
         with written_whole(path) as copy:
             shutil.copyfile(path, copy)
             with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
-                file.setncattr(name, value)
+                file.setncatts(dict(attributes))
             append_checksum(copy)
     except (OSError, RuntimeError) as error:
         reason = _failure_reason(path.parent, error)

@@ -18,7 +18,7 @@ from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._line_fit import fit
-from fractalcontact.dimensions._methods import DEFAULT, METHODS
+from fractalcontact.dimensions._methods import DEFAULT, METHODS, SYNONYMS
 from fractalcontact.dimensions._records import Estimate
 from fractalcontact.dimensions._surface_input import (
     Surface,
@@ -55,7 +55,7 @@ IN_BLOCKS = ("increments", "spectrum", "variogram")  # methods that read dask ar
 
 def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, noise: Any, psf: Any) -> None:
     names = [DEFAULT]
-    if methods is not None and problems.choices("methods", methods, ("default", *METHODS)):
+    if methods is not None and problems.choices("methods", methods, (*SYNONYMS, *METHODS)):
         names = [_row(name) for name in word_tuple(methods)]
         problems.require(bool(names), "methods", "at least one name", methods)
     problems.number("noise", noise, at_least=0.0, optional=True)
@@ -95,7 +95,8 @@ def estimate(
     surface : DataArray
         Heights in m, dims (..., y, x), or (..., x) for a profile; NaN where missing (not for "spectrum").
     methods : str or sequence of str, optional
-        Names of `fractalcontact.dimensions.methods()`, or "default" ("likelihood"), which is the default.
+        Names of `fractalcontact.dimensions.methods()`, "default" ("likelihood"), which is the default, or
+        "psd" ("spectrum").
     scales : (low, high), optional
         Lengths in m between which to fit: wavelengths, lags, or edges of windows or cubes. Default: the
         window of the method.
@@ -141,7 +142,7 @@ def estimate(
     """
     surfaces, window = read_surfaces(surface), read_scales(scales)
     names = ("default",) if methods is None else word_tuple(methods)
-    if set(names) - set(IN_BLOCKS):
+    if set(map(_row, names)) - set(IN_BLOCKS):
         announce_loading("fractalcontact.dimensions.estimate", {"surface": surface})
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):
@@ -153,7 +154,7 @@ def estimate(
             elif name == "increments":
                 record = increments(single, window, noise)
             else:
-                record = fit(METHODS[name], single, window, noise)
+                record = fit(METHODS[_row(name)], single, window, noise)
             if single.finest_scale:
                 record = record.gridded(single.finest_scale)
             estimates.append(record.limited())
@@ -162,7 +163,7 @@ def estimate(
 
 
 def _row(name: str) -> str:
-    return DEFAULT if name == "default" else name
+    return SYNONYMS.get(name, name)
 
 
 def _dataset(

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 DEFAULT = "likelihood"
+SYNONYMS = {"default": DEFAULT, "psd": "spectrum"}
 _CLARKE = "Clarke, Computers and Geosciences 12 (1986) 713-722"
 
 

@@ -147,6 +147,7 @@ roughness_coefficient = Rows(
     "joint roughness coefficient (JRC)", ("direction",),
     (
         Column("JRC", _jrc, 1),
+        Column("slope Z2", "profile_slope", 3),
         Column("scatter of the profiles", ("roughness_coefficient_low", "roughness_coefficient_high"), 1),
     ),
     _outside_scale,

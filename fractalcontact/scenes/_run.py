@@ -27,7 +27,7 @@ from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
-from fractalcontact.scenes._result_tables import of_member
+from fractalcontact.scenes._result_tables import MEMBER, of_member
 from fractalcontact.scenes._results_folder import (
     DATASHEET,
     REPORT,
@@ -44,6 +44,16 @@ from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validate
 
 OWN_REFERENCES = "see the references of each group"
+# what the root of a result states of its groups, for a reader that opens no group
+MAIN = {
+    "dimensions": ("fractal_dimension", "fractal_dimension_low", "fractal_dimension_high"),
+    "joints/roughness_coefficient": ("roughness_coefficient",),
+    "contact": ("contact_fraction",),
+    "joints/closure": ("contact_fraction", "interface_closure"),
+    "joints/rigid_dilatancy": ("rigid_dilatancy",),
+    "joints/friction": ("peak_shear_strength",),
+    "joints/direct_shear": ("peak_shear_strength",),
+}
 
 
 def run(
@@ -156,8 +166,10 @@ def _run(
                 figures = _draw(tree, folder, progress)
                 _note_run_time(tree, start)
                 remove_old_figures(folder, figures)
-                netcdf.replace_attribute(folder / RESULT, "provenance", tree.attrs["provenance"])
             whole = summary_of(tree)
+            tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
+            changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
+            netcdf.replace_attributes(folder / RESULT, changed)
             write_report(tree, folder / REPORT, figures, whole)
             if scene.want.datasheet:
                 tables(tree, folder / TABLES)
@@ -190,7 +202,7 @@ def _assemble(
     missing: list[str],
 ) -> xr.DataTree:
     """Return the finished results as a tree that states what is missing."""
-    groups = {"/": xr.Dataset()} | {f"/{name}": result for name, result in results.items()}
+    groups = {"/": _main_results(results)} | {f"/{name}": result for name, result in results.items()}
     description = groups.pop("/surfaces/description", None)
     if description is not None:
         heights = groups.get("/surfaces", xr.Dataset())
@@ -214,10 +226,29 @@ def _assemble(
             for name, second in seconds.items()
         },
     )
-    tree.attrs = root.attrs
+    named = ", ".join(node.path.strip("/") for node in tree.subtree if node is not tree and node.has_data)
+    tree.attrs = root.attrs | {"comment": f"{root.attrs['comment']}; results by group: {named}"}
     if missing:
         tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
     return tree
+
+
+def _main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return numbers that stand for a study: dimensions of the first method, else the largest values.
+
+    Of an ensemble they are means over the members.
+    """
+    main: dict[str, xr.DataArray] = {}
+    for group, names in MAIN.items():
+        result = results.get(group, xr.Dataset())
+        for name in (name for name in names if name in result):
+            values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
+            others = [dim for dim in values.dims if dim != MEMBER]
+            number = values.max(others).mean() if others else values.mean()
+            over = f": the largest over {', '.join(map(str, others))}" if others else ""
+            label = f"{values.attrs.get('long_name', name)}{over}, of the group {group}"
+            main[name] = number.drop_vars(number.coords).assign_attrs(values.attrs, long_name=label)
+    return xr.Dataset(main)
 
 
 def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,3 +22,11 @@ def test_import_loads_no_heavy_library():
     )
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert process.stdout.strip() == "[]"
+
+
+def test_psd_is_the_spectrum():
+    surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    both = fc.dimensions.estimate(surface, ["spectrum", "psd"])
+    assert both.method.values.tolist() == ["spectrum", "psd"]
+    for name in ("hurst", "ci_low", "ci_high"):
+        assert float(both[name][0]) == float(both[name][1])

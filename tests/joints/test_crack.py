@@ -177,3 +177,12 @@ def test_one_rigid_face(make_face, rough):
             fc.joints.Crack(face, young=young, poisson=0.2, block=3.2e-3)
     with pytest.raises(ValueError, match="young"):
         fc.joints.Crack(face, young=(-np.inf, 1e9), poisson=0.2, block=3.2e-3)
+
+
+def test_directions_in_full_words():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    crack = fc.joints.Crack(face, block=1.6e-3)
+    for word, letter in (("west", "W"), ("north", "N")):
+        one, other = (fc.joints.dilatancy(crack, shear=[0.0, 2e-4], direction=d) for d in (word, letter))
+        assert one.direction.values.tolist() == [letter]
+        np.testing.assert_array_equal(one.rigid_dilatancy, other.rigid_dilatancy)

@@ -1,5 +1,6 @@
 """A result file holds the wanted results and nothing else."""
 
+import xarray as xr
 from study import SOUND
 
 import fractalcontact as fc
@@ -13,6 +14,7 @@ def scene(tmp_path, text):
 def test_file_has_the_wanted_results_and_no_map(tmp_path):
     tree = fc.scenes.run(scene(tmp_path, SOUND), out=tmp_path / "out", progress=False)
     assert {node.path for node in tree.subtree if node.has_data} == {
+        "/",
         "/joints/closure",
         "/joints/rigid_dilatancy",
     }
@@ -29,3 +31,20 @@ def test_island_map_is_stored_only_where_it_is_kept(tmp_path):
     assert not {"label", "y", "x"} & set(plain.variables)
     assert with_map["label"].dims == ("shear", "step", "y", "x")
     assert plain["area"].equals(with_map["area"])
+
+
+def test_root_of_a_file_states_the_main_results(tmp_path):
+    """Plain xarray, which opens the root alone, shows the main numbers and where the others are."""
+    more = 'dimensions = ["default", "spectrum"]\njoints = ["closure", "rigid_dilatancy"]'
+    text = SOUND.replace('joints = ["closure", "rigid_dilatancy"]', more)
+    tree = fc.scenes.run(scene(tmp_path, text), out=tmp_path / "out", progress=False)
+    with xr.open_dataset(tmp_path / "out" / "result.nc") as root:
+        assert not root.sizes
+        closure = tree["joints/closure"].to_dataset()
+        assert float(root.contact_fraction) == float(closure.contact_fraction.max())
+        assert root.interface_closure.units == "m"
+        assert "joints/closure" in root.interface_closure.long_name
+        assert float(root.fractal_dimension) == float(tree["dimensions"].fractal_dimension[0])
+        assert float(root.fractal_dimension_low) < float(root.fractal_dimension)
+        assert "results by group: dimensions, joints/rigid_dilatancy, joints/closure" in root.comment
+        assert "contacts are not resolved" in root.caveats

@@ -41,6 +41,25 @@ def test_roughness_of_a_list_of_points(scans):
     assert any(name.endswith("surface.png") for name in names)
 
 
+def test_roughness_of_a_profile(scans, capsys):
+    """JRC, Z2 and D of a line of heights are those of the functions; other results are not overwritten."""
+    profile = fc.surfaces.fbm(512, 2e-4, hurst=HURST, rms_increment=3e-5, rng=3)
+    np.savetxt("line.csv", np.stack([profile.x, profile.values], axis=-1), delimiter=",", header="x,z")
+    assert main(["roughness", "line.csv", "--units", "m"]) == 0
+    text = capsys.readouterr().out
+    result = fc.open(scans / "line_roughness" / "result.nc")
+    read = fc.surfaces.read("line.csv", units="m")
+    expected = fc.joints.roughness_coefficient(read)
+    assert result["joints/roughness_coefficient"].to_dataset().profile_slope.equals(expected.profile_slope)
+    dimension = fc.dimensions.estimate(read).fractal_dimension
+    for name, number in (("JRC", expected.roughness_coefficient), ("Z2", expected.profile_slope)):
+        assert name in text
+        assert f"{float(number[0]):.{1 if name == 'JRC' else 3}f}" in text
+    assert f"{float(dimension[0]):.3f}" in text
+    assert main(["roughness", "lower.nc", "--quiet", "-o", "other"]) == 0
+    assert main(["roughness", "line.csv", "--units", "m", "-o", "other"]) == 2
+
+
 def test_printed_scene_is_the_one_that_runs(scans, capsys):
     """`--scene` prints the scene and runs nothing; the scene beside the results has the same tables."""
     words = ["contact", "lower.nc", "--young", "3e10", "--spacing", "2e-4"]

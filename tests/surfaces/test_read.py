@@ -532,3 +532,24 @@ def test_damaged_npz(tmp_path):
     (tmp_path / "a.npz").write_bytes(b"PK" + bytes(100))
     with pytest.raises(UnreadableFile, match="corrupt"):
         fc.surfaces.read(tmp_path / "a.npz", spacing=1e-4)
+
+
+def test_inches_are_a_unit_of_length(tmp_path):
+    np.save(tmp_path / "scan.npy", 1e-3 * np.arange(16.0).reshape(4, 4))
+    for unit in ("inch", "in"):
+        read = fc.surfaces.read(tmp_path / "scan.npy", spacing=1e-3, units=unit)
+        np.testing.assert_allclose(read.values[1], 25.4e-6 * np.arange(4.0, 8.0), rtol=1e-14)
+
+
+@pytest.mark.parametrize("has_library", [True, False])
+def test_table_without_spacing_says_so_with_and_without_the_extra(tmp_path, monkeypatch, has_library):
+    if has_library:
+        pytest.importorskip("SurfaceTopography")
+    else:
+        monkeypatch.setattr("importlib.util.find_spec", lambda name, *_: None)
+    np.savetxt(tmp_path / "heights.csv", np.random.default_rng(1).random((6, 20)), delimiter=",")
+    with pytest.raises(UnreadableFile) as raised:
+        fc.surfaces.read(tmp_path / "heights.csv")
+    assert list(raised.value.problems) == [
+        "spacing: expected the spacing in metres, for 'heights.csv' as a table of heights, got None"
+    ]
