@@ -61,6 +61,7 @@ PAGES = (
     "index",
     "install",
     "first_scan",
+    "coming_from",
     "tutorials",
     "scene_reference",
     "command_line",

@@ -6,6 +6,36 @@ from pathlib import Path
 from docutils import nodes
 from docutils.parsers.rst import Directive
 
+# words that people look for, by the function that answers; a search of the site lists these functions first
+INDEX = {
+    "fractalcontact.joints.roughness_coefficient": ("JRC", "joint roughness coefficient", "Z2"),
+    "fractalcontact.joints.closure": (
+        "closure law",
+        "normal stiffness of a joint",
+        "real contact area of a joint",
+    ),
+    "fractalcontact.joints.closure_laws": ("Bandis closure law", "hyperbolic closure law"),
+    "fractalcontact.joints.strength_envelope": ("Barton shear strength", "JCS", "Patton"),
+    "fractalcontact.joints.dilatancy": ("dilation of a joint", "dilatancy"),
+    "fractalcontact.joints.transmissivity": ("cubic law", "leakage of a joint"),
+    "fractalcontact.contact.press": ("contact with a flat", "real contact area", "Polonsky and Keer"),
+    "fractalcontact.domains.hausdorff_content": (
+        "Hausdorff content",
+        "Hausdorff measure",
+        "Hausdorff dimension",
+    ),
+    "fractalcontact.domains.box_dimension": ("box counting", "fractal dimension of a set"),
+    "fractalcontact.domains.islands": ("cluster", "connected components", "contact spots", "grains"),
+    "fractalcontact.domains.lacunarity": ("gliding box",),
+    "fractalcontact.surfaces.describe": ("Sq", "Sa", "Sdq", "ISO 25178", "rms height"),
+    "fractalcontact.surfaces.read": ("my own scan", "file formats", "point cloud", "CSV"),
+    "fractalcontact.surfaces.level": ("tilt", "mean plane", "detrend"),
+    "fractalcontact.surfaces.despike": ("outliers", "spikes"),
+    "fractalcontact.dimensions.estimate": ("fractal dimension", "Hurst exponent"),
+    "fractalcontact.dimensions.spectrum": ("PSD", "power spectral density"),
+    "fractalcontact.dimensions.variogram": ("structure function", "height-height correlation", "HHCF"),
+}
+
 
 def setup(app):
     """Register the directives and hooks of this file."""
@@ -18,14 +48,26 @@ def setup(app):
 
 
 def prepare_docstring(app, what, name, obj, options, lines):  # noqa: ARG001
-    """Keep the first paragraph of a module docstring; escape the bars of `|a - b|`."""
+    """Keep the first paragraph of a module docstring; escape the bars of `|a - b|`; add index entries."""
     if what == "module" and "" in lines:
         del lines[lines.index("") :]
+    words = next((INDEX[key] for key in INDEX if name in (key, _defined_in(key))), ())
+    if words:
+        lines[:0] = [".. index::", *(f"   single: {word}" for word in words), ""]
     in_example = False
     for number, line in enumerate(lines):
         in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
         if not in_example:
             lines[number] = line.replace("|", r"\|")
+
+
+def _defined_in(key):
+    """Return the full name of the object behind a public name, with the module that defines it."""
+    from importlib import import_module
+
+    module, _, name = key.rpartition(".")
+    found = getattr(import_module(module), name)
+    return f"{found.__module__}.{found.__qualname__}"
 
 
 class Names(Directive):

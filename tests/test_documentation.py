@@ -2,6 +2,7 @@
 
 import doctest
 import importlib
+import importlib.util
 import re
 import textwrap
 from pathlib import Path
@@ -71,6 +72,43 @@ def test_readme_example_prints_what_is_shown(capsys):
     assert capsys.readouterr().out == shown
     assert {path.name for path in Path().iterdir()} == {"closure.nc", "closure.png"}
     assert len(text.splitlines()) < 150
+
+
+def test_words_of_the_index_name_public_functions():
+    spec = importlib.util.spec_from_file_location("site_parts", ROOT / "gallery" / "site_parts.py")
+    site_parts = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(site_parts)
+    assert {f"fractalcontact.{name}" for name in public_names()} >= set(site_parts.INDEX)
+    words = [word for names in site_parts.INDEX.values() for word in names]
+    assert {"JRC", "closure law", "Hausdorff content", "Sq", "my own scan", "cluster"} <= set(words)
+    assert len(words) == len(set(words))
+    name = "fractalcontact.joints.roughness_coefficient"
+    lines = ["Return the joint roughness coefficient."]
+    site_parts.prepare_docstring(None, "function", name, None, None, lines)
+    assert lines[:2] == [".. index::", "   single: JRC"]
+
+
+def test_names_of_other_tools_exist():
+    """Functions of this package and of the tools that are installed, as the page on other tools has them."""
+    text = (ROOT / "gallery" / "coming_from.rst").read_text(encoding="utf-8")
+    for path in re.findall(r"~fractalcontact\.([\w.]+)`", text):
+        assert callable(public_object(path)), path
+    topography = pytest.importorskip("SurfaceTopography")
+    part = text.split("SurfaceTopography\n-----")[1].split("ContactMechanics and Tamaas\n---")[0]
+    named = re.findall(r"\* - ``(\w+)", part)
+    assert len(named) > 8
+    flat = topography.Topography(np.zeros((4, 4)), (1.0, 1.0))
+    places = (topography, flat, importlib.import_module("SurfaceTopography.Generation"))
+    assert [name for name in named if not any(hasattr(place, name) for place in places)] == []
+    from skimage import measure
+
+    regions = measure.regionprops(np.pad(np.ones((2, 3), dtype=int), 1))
+    part = text.split("scikit-image\n------------")[1]
+    for name in re.findall(r"``measure\.(\w+)``", part):
+        assert hasattr(measure, name)
+    for name in ("orientation", "eccentricity", "solidity"):
+        assert name in part
+        assert hasattr(regions[0], name)
 
 
 def test_links_of_the_readme_exist():

@@ -29,13 +29,14 @@ def quantisation(heights: Array) -> tuple[float, float]:
 
     Notes
     -----
-    A few rows are inspected. Rounding to steps q adds a variance q^2 / 12, nearly independent from point to
-    point while neighbours differ by more than about a step, hence 6 q^2 / 12 to a second difference.
+    A few rows from all of the surface are inspected. Rounding to steps q adds a variance q^2 / 12, nearly
+    independent from point to point while neighbours differ by more than about a step, hence 6 q^2 / 12 to a
+    second difference.
     """
     every = max(1, heights.shape[0] // _ROWS)
     rows = heights[::every]
-    rows = rows[:, : _SAMPLE // min(len(rows), _ROWS)]
-    observed = rows[np.isfinite(rows)]
+    sample = rows[:, :: -(-rows.size // _SAMPLE)]
+    observed = sample[np.isfinite(sample)]
     levels = np.unique(observed)
     if observed.size < 8 or levels.size < 2 or levels.size > _LARGEST_SHARE * observed.size:
         return 0.0, 0.0

@@ -74,7 +74,7 @@ def _groups(result: xr.DataTree | xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     return [
         (node.path.strip("/").replace("/", "_") or "result", node.to_dataset(inherit=False))
         for node in result.subtree
-        if node.data_vars
+        if node.data_vars and (node is not result or not node.children)  # the root repeats its groups
     ]
 
 

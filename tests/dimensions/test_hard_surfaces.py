@@ -5,6 +5,7 @@ import pytest
 from scipy import ndimage
 
 import fractalcontact as fc
+from fractalcontact.dimensions._quantisation import quantisation
 
 x = np.arange(106.0)
 
@@ -79,3 +80,33 @@ def test_a_band_of_waves(seed):
     assert np.isnan(estimate.hurst) or 0 <= float(estimate.hurst) <= 1
     octaves = fc.dimensions.scaling(part)
     assert np.isfinite(octaves.hurst).any()
+
+
+def _interpolated(heights):
+    heights[:, 1:-1:2] = 0.5 * (heights[:, 0:-2:2] + heights[:, 2::2])
+    return heights
+
+
+def _partly_rounded(heights):
+    heights[:, :300] = 5e-7 * np.rint(heights[:, :300] / 5e-7)
+    return heights
+
+
+def _with_spikes(heights):
+    heights[10:90:7, 20:200:9] += 3e-5
+    return heights
+
+
+@pytest.mark.parametrize("damage", [np.asarray, _interpolated, _partly_rounded, _with_spikes])
+def test_what_is_said_of_a_map_does_not_depend_on_its_orientation(damage):
+    """Reasons, and the step of rounding, are those of the heights: flips and transposes change neither."""
+    heights = fc.surfaces.fbm((384, 384), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1).values.copy()
+    heights = damage(heights)
+    reasons, steps = set(), []
+    for plane in (heights, heights.T):
+        for turned in (plane, plane[::-1], plane[:, ::-1], plane[::-1, ::-1]):
+            surface = fc.surfaces.from_array(np.ascontiguousarray(turned), 1e-4)
+            reasons.add(str(fc.dimensions.estimate(surface).reason.values[0]))
+            steps.append(quantisation(surface.values)[0])
+    assert len(reasons) == 1, reasons
+    assert np.ptp(steps) <= 1e-9 * max(steps)

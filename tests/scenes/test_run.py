@@ -4,6 +4,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import Executor, Future
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,7 +64,7 @@ def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch, err
     calls = []
     watch_calls(monkeypatch, calls.append)
     # the report computes too: the friction by the other form
-    monkeypatch.setattr("fractalcontact.scenes._run.summary_of", lambda tree: None)
+    monkeypatch.setattr("fractalcontact.scenes._run.summary_of", lambda tree: SimpleNamespace(caveats=[]))
     monkeypatch.setattr("fractalcontact.scenes._run.write_report", lambda *a, **k: None)
     again = fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
     assert not [name for name in calls if name != "describe"]  # the parts of the first run are still there
