@@ -36,6 +36,7 @@ PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not sp
 # rows of X3P (ISO 25178-72) have the coordinate y = offset + row * increment
 FROM_BOTTOM = ("h5", "mat", "nc", "npy", "npz", "x3p", "xyz")
 POINTS = "xyz"
+UNKNOWN = "corrupt or of an unknown format"
 PROFILERS = (b"X;Y;valid", b"Scan Parameters")  # heads of lists by profilers, HFM and Dektak
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
@@ -116,7 +117,7 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
                 lines = str(error).splitlines() or [type(error).__name__]
                 reasons.append(f"{reader.__name__.removesuffix('Reader')} reader: {lines[0].strip()}")
     reason = "; ".join(reasons)[:300] or f"{tried} readers tried"
-    raise UnreadableFile(WHERE, [f"path: {path.name!r} is corrupt or of an unknown format ({reason})"])
+    raise UnreadableFile(WHERE, [f"path: {path.name!r} is {UNKNOWN} ({reason})"])
 
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:

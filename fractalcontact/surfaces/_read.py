@@ -38,7 +38,7 @@ from fractalcontact.surfaces._files import (
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
 from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing
-from fractalcontact.surfaces._instruments import from_bottom, read_instrument, read_raster
+from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
 from fractalcontact.surfaces._read_points import (
     ALWAYS_POINTS,
     CLOUDS,
@@ -257,18 +257,20 @@ def _text_content(request: Request) -> FileContent:
         is_tall = number < MOST_COLUMNS and rows > TALL * number
         problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if request.spacing is None:
-        return _instrument_or_table(request)
+        return _instrument_or_table(request, is_table=True)
     with Problems(WHERE, UnreadableFile) as problems:
         expected = "a grid of heights, one row to a line"
         problems.require(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
     return _heights_content(table.values, request)
 
 
-def _instrument_or_table(request: Request) -> FileContent:
+def _instrument_or_table(request: Request, *, is_table: bool = False) -> FileContent:
     """Read text that no spacing makes a table of heights as the file of an instrument."""
     try:
         return read_instrument(request)
-    except MissingExtra:
+    except (MissingExtra, UnreadableFile) as error:
+        if isinstance(error, UnreadableFile) and not (is_table and UNKNOWN in str(error)):
+            raise
         expected = f"the spacing in metres, for {request.path.name!r} as a table of heights"
         raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
 
