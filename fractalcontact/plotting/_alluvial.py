@@ -18,6 +18,8 @@ from fractalcontact.plotting._units import Units, name_of, number_texts, scale_o
 Array = np.ndarray[Any, np.dtype[Any]]
 LARGEST = 20  # islands of the last state with a colour of their own: more could not be told apart
 BAR = 0.08  # half the width of a bar, over the distance of two states
+THIN = 0.01  # of the axis: a bar that is lower has no edge, which would hide it
+MOST_LABELS = 8  # of loads below a figure of usual width
 BEND = np.linspace(0.0, 1.0, 24)  # along a ribbon: smooth at the size of a printed figure
 COLUMNS = ("island_before", "island_after", "common_cells", "cells_before", "cells_after", "link_step")
 
@@ -78,11 +80,12 @@ def alluvial(
     from matplotlib.collections import PolyCollection
 
     colours = np.array([*map(_rgb, _style.sequence_colours(LARGEST)[::-1]), _rgb(_style.tone(0.3))])
+    tallest = max((stack.cells.sum() for stack in stacks), default=0)
     for place, stack in enumerate(stacks):
         x = place + BAR * np.array([-1, 1, 1, -1])
         y = stack.low[:, None] + stack.cells[:, None] * np.array([0, 0, 1, 1])
         bars = PolyCollection(_shapes(x, y), facecolors=colours[stack.colour])
-        bars.set(edgecolor=_style.tone(0.0), linewidths=np.where(stack.colour < LARGEST, 0.4, 0.0))
+        bars.set(edgecolor=_style.tone(0.0), linewidths=np.where(stack.cells > THIN * tallest, 0.4, 0.0))
         ax.add_collection(bars)
     for place, (each, before, after) in enumerate(zip(links, stacks, stacks[1:], strict=False)):
         x = place + BAR + (1 - 2 * BAR) * np.concatenate([BEND, BEND[::-1]])
@@ -93,7 +96,8 @@ def alluvial(
         scale = scale_of(path[name])
         texts = number_texts(scale, table(path, name, ("step",)), 3)
     ax.set(xlabel=scale.label(name_of(path[name])) if name else "step", ylabel="cells in contact")
-    ax.set_xticks(range(len(stacks)), texts)
+    shown = _style.spread_indices(len(stacks), MOST_LABELS)
+    ax.set_xticks(shown, [texts[place] for place in shown])
     ax.set_title(shear_text(path, data))
     ax.autoscale_view()
     ax.set_ylim(bottom=0)
