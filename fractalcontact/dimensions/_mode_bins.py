@@ -92,6 +92,8 @@ def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
     factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1.
     """
+    from scipy.special import digamma, polygamma
+
     if lattice.axes == 1:
         return np.ones(ratio.shape)
     y, x = lattice.wavenumbers
@@ -99,12 +101,15 @@ def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     sector = np.minimum((np.arctan2(np.abs(y)[:, None], np.abs(x)) * scale).astype(np.int16), _SECTORS - 1)
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
     keep = keep & (lattice.q * max(lattice.spacing) < _ISOTROPIC)
-    count = np.maximum(np.bincount(sector[keep], minlength=_SECTORS), 1.0)
-    level = np.log(np.maximum(np.bincount(sector[keep], ratio[keep], minlength=_SECTORS) / count, 1e-12))
-    information = 0.5 * lattice.degrees * count
-    level -= information @ level / information.sum()
-    square = float(information @ np.square(level))
-    shrunk = max(0.0, 1.0 - (_SECTORS - 3) / square) if square > 0.0 else 0.0
+    count = np.bincount(sector[keep], minlength=_SECTORS)
+    known = count > 0
+    degrees = 0.5 * lattice.degrees * count[known]
+    level, information = np.zeros(_SECTORS), 1.0 / polygamma(1, degrees)
+    mean = np.bincount(sector[keep], ratio[keep], minlength=_SECTORS)[known] / count[known]
+    values = np.log(np.maximum(mean, 1e-12)) + np.log(degrees) - digamma(degrees)
+    level[known] = values - information @ values / information.sum() if known.any() else 0.0
+    square = float(information @ np.square(level[known]))
+    shrunk = max(0.0, 1.0 - (degrees.size - 3) / square) if square > 0.0 and degrees.size > 3 else 0.0
     return np.asarray(np.exp(shrunk * level)[sector])
 
 
