@@ -269,8 +269,11 @@ def _columns(lags: Array, metric: Array) -> tuple[Array, Array]:
 
 
 def _least_squares(design: Array, values: Array, scatter: Array) -> tuple[Array, Array]:
-    """Return the coefficients of generalised least squares and their covariance."""
-    weighted = np.linalg.solve(scatter, design)
+    """Return the coefficients of generalised least squares and their covariance.
+
+    Values that were interpolated from fewer lags have a singular scatter.
+    """
+    weighted = np.linalg.pinv(scatter, rcond=1e-12, hermitian=True) @ design
     errors = np.linalg.inv(design.T @ weighted)
     return errors @ (weighted.T @ values), errors
 

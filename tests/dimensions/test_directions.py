@@ -354,3 +354,14 @@ def test_no_interval_where_the_lags_are_bent():
     assert np.isnan(result.anisotropy_ratio)  # the blur makes it 1.35
     assert "give longer `scales`" in result.anisotropy_ratio.attrs["reason"]
     assert result.isotropy_p_value < 0.01
+
+
+@pytest.mark.parametrize("seed", range(20, 40))
+def test_directions_of_a_surface_of_which_little_was_observed(seed):
+    """Two lags that were observed are interpolated to three: their scatter is singular."""
+    stream = np.random.default_rng(seed)
+    points = int(stream.choice([24, 48, 80]))
+    heights = fc.surfaces.fbm((points, points), 1.0, hurst=0.6, rms_increment=1.0, rng=20).values
+    missing = stream.random(heights.shape) < stream.choice([0.9, 0.95, 0.97, 0.98])
+    result = fc.dimensions.directions(fc.surfaces.from_array(np.where(missing, np.nan, heights), 1.0))
+    assert np.isfinite(result.hurst).any() or result.hurst.attrs["reason"]
