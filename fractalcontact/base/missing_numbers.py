@@ -26,7 +26,8 @@ REASONS = {
     **dict.fromkeys(
         ("local_dimension_min", "local_dimension_max", "spots_dimension", "median_cells"), _STATE
     ),
-    **dict.fromkeys(("pair_correlation_length", "hit_fraction", "spots_fraction"), _STATE),
+    **dict.fromkeys((f"pair_correlation_length{end}" for end in ("", "_low", "_high")), _STATE),
+    **dict.fromkeys(("hit_fraction", "spots_fraction"), _STATE),
     **dict.fromkeys(("window_low", "window_high"), "NaN where no window of ratio 4 fits into the mask"),
     "stationary_exponent": "NaN where a mask is empty, or cells or ratios of spacings do not allow one",
     **dict.fromkeys(
