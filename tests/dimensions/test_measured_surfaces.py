@@ -114,6 +114,14 @@ def test_coverage(kind):
     assert known >= 14
 
 
+@pytest.mark.parametrize("hurst", [0.2, 0.5])
+def test_rounded_heights_have_no_seams(hurst):
+    """Squared steps of rounded heights are few numbers, whose medians jump from line to line."""
+    found = [estimated(0.5 * np.rint(2.0 * brownian(hurst, seed))) for seed in range(5)]
+    held = [float(result.ci_low) <= hurst <= float(result.ci_high) for result in found]
+    assert sum(held) >= 4
+
+
 def test_what_is_found_is_named():
     blurred = estimated(inner(gaussian_filter(brownian(0.6, 3, margin=MARGIN), 1.5)))
     assert float(blurred.blur_spread) == pytest.approx(1.5 * SPACING, rel=0.15)
