@@ -256,3 +256,15 @@ def test_small_whole_periodic_surfaces_without_waves_in_some_directions(points, 
         exponents.append(float(result.hurst))
     assert sum(held) >= 8  # of intervals of 95 %
     assert np.median(exponents) == pytest.approx(hurst, abs=0.1)
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize("shape", [(48, 16), (16, 64), (200, 10)])
+def test_elongated_surfaces(shape, hurst):
+    """No mode of few points runs along the short edge alone; H was .995 whatever it should be."""
+    held = []
+    for seed in range(6):
+        surface = fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=STEP, rng=seed)
+        result = fc.dimensions.estimate(surface).isel(method=0)
+        held.append(bool(float(result.ci_low) <= hurst <= float(result.ci_high)))
+    assert sum(held) >= 5
