@@ -278,10 +278,14 @@ def _answer(options: argparse.Namespace) -> int:
         raise InvalidInput(f"fractalcontact {options.question}", [f"-o: expected {expected}, got {got}"])
     scene = scenes.Scene(options.question, tomllib.loads(text), Path(folder).absolute())
     options.out, options.scene = folder, scene
+    is_refused = False
     try:
         return _run(options)
+    except InvalidInput:
+        is_refused = True
+        raise
     finally:
-        if Path(folder).is_dir():  # also after a stop, and not after a refusal
+        if Path(folder).is_dir() and not is_refused:  # also after a stop
             target.write_text(f"{_mark(text)}\n{text}", encoding="utf-8")
 
 

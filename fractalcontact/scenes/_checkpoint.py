@@ -10,10 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-import shutil
 import warnings
 import zipfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -68,9 +68,13 @@ class PartStore:
         return {name: part for name, part in parts.items() if part is not None}
 
     def clear(self) -> None:
-        """Remove all that is kept."""
-        if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+        """Remove all that is kept, and no file of others."""
+        if self.folder is None:
+            return
+        with suppress(OSError):  # a file that cannot be removed, or another one in the folder
+            for path in self.folder.glob("*.npz*"):
+                path.unlink()
+            self.folder.rmdir()
 
 
 class MemoryStore(PartStore):

@@ -122,6 +122,25 @@ def test_refused_commands_leave_no_folder(tmp_path, monkeypatch):
         assert {path.name for path in tmp_path.iterdir()} == before, words
 
 
+def test_refused_question_writes_no_scene_into_a_folder_of_others(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fc.save(fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=1e-5, rng=3), "good.nc")
+    folder = tmp_path / "theirs"
+    folder.mkdir()
+    (folder / "report.html").write_text("<html>mine</html>")
+    done = command_here("roughness", "good.nc", "-o", "theirs")
+    assert done.returncode == 2
+    assert [path.name for path in folder.iterdir()] == ["report.html"]
+
+
+def test_files_of_others_among_the_kept_parts_stay(scene, tmp_path):
+    kept = tmp_path / "out" / ".stages"
+    kept.mkdir(parents=True)
+    (kept / "notes.txt").write_text("mine")
+    fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert [path.name for path in kept.iterdir()] == ["notes.txt"]
+
+
 def test_edited_scene_of_a_question_is_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fc.save(fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=1e-5, rng=3), "scan.nc")
