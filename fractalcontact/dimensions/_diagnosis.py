@@ -23,6 +23,7 @@ _SPIKED = 0.1  # share of the squared second differences below which noise and m
 _SEAM = 6.0  # deviations of a line of increments; 5.3 was the most of 750 exact surfaces, H .1 to .9
 _BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
 _FEWEST_GAPS = 12
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples modulo one are even
 _NORMAL_QUARTILE = 0.6744897501960817
 _BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
 _PARTS = 4
@@ -44,7 +45,11 @@ def diagnose(surface: Surface) -> str:
             "repeated ones, or give "
             "`scales` from eight blocks on"
         )
-    return _seams(surface.heights) or _spikes(surface.heights) or _missing_extremes(surface.heights)
+    return (
+        _seams(surface.heights, rounding_step(surface))
+        or _spikes(surface.heights)
+        or _missing_extremes(surface.heights)
+    )
 
 
 def rounding_step(surface: Surface) -> float:
@@ -103,15 +108,17 @@ def _spikes(heights: Array) -> str:
     )
 
 
-def _seams(heights: Array) -> str:
-    """Look for lines along an axis across which heights differ more than across all others."""
+def _seams(heights: Array, step: float) -> str:
+    """Look for lines along an axis across which heights differ more than across all others.
+
+    Heights were rounded to `step`, which is spread evenly again.
+    """
     if min(heights.shape) < 16 or np.isnan(heights.min()):
         return ""
     for lines, name in ((heights, "rows"), (heights.T, "columns")):
-        # without the largest tenth, which may be spikes; a median would jump where heights were rounded
-        squares = np.diff(lines, axis=0) ** 2
-        most = int(0.9 * squares.shape[1])
-        squares = np.partition(squares, most, axis=1)[:, :most].mean(axis=1)
+        # spikes move no median; where heights were rounded, it would jump between a few numbers
+        even = (np.arange(lines.shape[1]) * _GOLDEN) % 1.0 - 0.5
+        squares = np.median((np.diff(lines, axis=0) + step * even) ** 2, axis=1)
         if not squares.min() > 0.0:
             continue
         low, middle, high = np.quantile(np.log(squares), (0.25, 0.5, 0.75))
