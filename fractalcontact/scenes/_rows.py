@@ -304,7 +304,7 @@ rigid_dilatancy = Rows(
     (
         Column("shear", _greatest_shear),
         Column("rigid dilatancy", "rigid_dilatancy"),
-        Column("mean slope", _mean_slope),
+        Column("slope of face", _mean_slope),
     ),
 )  # fmt: skip
 elastic_dilatancy = Rows(

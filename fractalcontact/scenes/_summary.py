@@ -56,7 +56,7 @@ def summary(tree: xr.DataTree, *, verbose: bool = False) -> str:
     >>> import fractalcontact as fc
     >>> result = fc.scenes.run("rigid_sliding", progress=False)
     >>> print("\n".join(fc.scenes.summary(result).splitlines()[2:4]))
-    toward    shear    rigid dilatancy    mean slope
+    toward    shear    rigid dilatancy    slope of face
     E         10 mm    1.15 mm            +0.0264
     """
     with Problems("fractalcontact.scenes.summary") as problems:
