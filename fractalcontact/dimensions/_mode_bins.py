@@ -29,7 +29,7 @@ _ALIASED = (
     0.25 * math.pi
 )  # radians per point from which on aliases differ by azimuth by more than a per mille
 _ISOTROPIC = math.pi / 3.0  # radians per point up to which they differ by less than 5 % for H above .1
-_FALSE_ALARM = 0.01  # chance that a surface without single waves loses a mode to them
+_FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 8  # of azimuth, on a quarter of the plane
 _OCTAVE = math.log(2.0)
 
@@ -90,9 +90,10 @@ def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     """Return the relative power of the azimuth of each mode, shrunk to one as far as chance explains it.
 
     An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
-    factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1.
+    factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1, but for the chi square of a chance
+    of `_FALSE_ALARM` in place of its mean: the levels of few long waves reach all short ones.
     """
-    from scipy.special import digamma, polygamma
+    from scipy.special import chdtri, digamma, polygamma
 
     if lattice.axes == 1:
         return np.ones(ratio.shape)
@@ -109,7 +110,8 @@ def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     values = np.log(np.maximum(mean, 1e-12)) + np.log(degrees) - digamma(degrees)
     level[known] = values - information @ values / information.sum() if known.any() else 0.0
     square = float(information @ np.square(level[known]))
-    shrunk = max(0.0, 1.0 - (degrees.size - 3) / square) if square > 0.0 and degrees.size > 3 else 0.0
+    by_chance = float(chdtri(degrees.size - 1, _FALSE_ALARM)) if degrees.size > 1 else math.inf
+    shrunk = 1.0 - by_chance / square if square > by_chance else 0.0
     return np.asarray(np.exp(shrunk * level)[sector])
 
 
