@@ -101,14 +101,8 @@ def _without_spikes(tree: xr.DataTree, scan: xr.DataArray, clean: xr.DataArray) 
         values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
         pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
         if max(abs(after - before) for _, after, before in pairs) > SPIKED_JRC:
-            text = ", ".join(
-                f"{_jrc(after)}, not {_jrc(before)}, toward {name}" for name, after, before in pairs
-            )
+            text = ", ".join(f"{after:.0f}, not {before:.0f}, toward {name}" for name, after, before in pairs)
             yield f"JRC is {text}"
-
-
-def _jrc(value: float) -> str:
-    return "below 0" if value < 0 else f"{value:.0f}"
 
 
 def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:
