@@ -165,7 +165,7 @@ def pair_correlation_length(planes: Planes, plane: int) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         g = counts[0] / counts[1] / planes.coverage[plane] ** 2
     below = np.flatnonzero(g[1:] < 2.0) + 1
-    if not below.size or not g[0] >= 2.0:
+    if not below.size or not g[0] >= 2.0 or min(grid.shape) < BLOCKS:
         return np.full(1 + BLOCKS * BLOCKS, np.nan)
     r = int(below[0])
     ends = [np.arange(BLOCKS + 1) * n // BLOCKS for n in grid.shape]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import result_of, table
@@ -70,10 +71,13 @@ def alluvial(
     """
     data = result_of(result, "alluvial", COLUMNS, ("shear",), units)
     path = at_shear(data, shear)
+    with Problems("fc.plotting.alluvial") as problems:
+        for name in COLUMNS:
+            problems.require(path[name].dims == ("link",), f"result.{name}", "the dim link", path[name].dims)
     if "shear" in path.coords and "link_shear" in path:
         path = path.isel(link=np.flatnonzero(path["link_shear"].values == path["shear"].values))
     of_link = path["link_step"].values
-    steps = path["step"].values[1:] if "step" in path.coords else np.unique(of_link)
+    steps = path["step"].values[1:] if "step" in path.dims else np.unique(of_link)
     links = [path.isel(link=np.flatnonzero(of_link == step)) for step in steps.tolist()]
     ax = _style.axes_or_new(ax, _style.PANEL)
     stacks = _stacks(links)
@@ -91,7 +95,8 @@ def alluvial(
         x = place + BAR + (1 - 2 * BAR) * np.concatenate([BEND, BEND[::-1]])
         edges, colour = _ribbons(each, before, after)
         ax.add_collection(PolyCollection(_shapes(x, edges), facecolors=colours[colour], alpha=0.45, lw=0))
-    texts, name = [str(place) for place in range(len(stacks))], load_of(path)
+    texts = [str(place) for place in range(len(stacks))]
+    name = load_of(path) if "step" in path.dims else ""
     if name:
         scale = scale_of(path[name])
         texts = number_texts(scale, table(path, name, ("step",)), 3)

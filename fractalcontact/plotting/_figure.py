@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-import sys
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
@@ -77,7 +77,10 @@ def _are_panels(value: Any) -> bool:
 
 def _is_number(value: Any) -> bool:
     # a labelled number would carry its dims into the figure
-    return is_real(value) and bool(abs(value) <= sys.float_info.max)  # an integer may be beyond any double
+    try:
+        return is_real(value) and math.isfinite(value)
+    except OverflowError:  # an integer beyond any double
+        return False
 
 
 def _are_numbers(value: Any) -> bool:

@@ -72,7 +72,7 @@ class PartStore:
         if self.folder is None:
             return
         with suppress(OSError):  # a file that cannot be removed, or another one in the folder
-            for path in self.folder.glob("*.npz*"):
+            for path in (*self.folder.glob("*.npz*"), *self.folder.glob("run-*")):  # parts, and marks of runs
                 path.unlink()
             self.folder.rmdir()
 
