@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._quantisation import quantisation
 from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -25,6 +24,9 @@ _BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
 _FEWEST_GAPS = 12
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples modulo one are even
 _NORMAL_QUARTILE = 0.6744897501960817
+_ROWS, _SAMPLE = 16, 4096  # rows and heights that are looked at for rounding
+_WHOLE = 0.02  # of a step: distance of rounded heights from whole steps, after a change of unit
+_DISTINCT = 0.5  # share of distinct heights beyond which they are not rounded
 _BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
 _PARTS = 4
 
@@ -53,8 +55,17 @@ def diagnose(surface: Surface) -> str:
 
 
 def rounding_step(surface: Surface) -> float:
-    """Return the step to which scaled heights were rounded; 0 where none is seen."""
-    return quantisation(surface.heights)[0]
+    """Return the step to which scaled heights were rounded; 0 where none is seen in some of the rows."""
+    rows = surface.heights[:: max(1, surface.shape[0] // _ROWS)]
+    sample = rows[:, :: -(-rows.size // _SAMPLE)]
+    observed = sample[np.isfinite(sample)]
+    levels = np.unique(observed)
+    if observed.size < 8 or not 2 <= levels.size <= _DISTINCT * observed.size:
+        return 0.0
+    gaps = np.diff(levels)
+    step = float(gaps[gaps > _WHOLE * np.median(gaps)].min())
+    multiples = (levels - levels[0]) / step
+    return step if np.abs(multiples - np.rint(multiples)).max() <= _WHOLE else 0.0
 
 
 def unevenness(heights: Array) -> float:

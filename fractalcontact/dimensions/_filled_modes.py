@@ -19,9 +19,7 @@ from fractalcontact.dimensions._gaussian_mixture import Lattice
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _SWEEPS = 12  # over missing points, after the pyramid: the fill of single points is then harmonic to 1 %
-_SIMULATED = (
-    1 << 18
-)  # modes that are simulated: the correction then scatters by a fifth of the standard error of H
+_SIMULATED = 1 << 18  # modes that are simulated: the correction scatters by a fifth of the error of H
 _MOST = 8  # surfaces
 _RINGS = 4  # per octave
 _AZIMUTHS = 4  # from an axis to the diagonal: single points are filled from their neighbours along the axes

@@ -26,14 +26,10 @@ from fractalcontact.base import fft
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-HIGHEST = (
-    12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, and the sum a geometric series
-)
+HIGHEST = 12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, the sum a geometric series
 ALIASED, FILTERED, UNALIASED = range(3)
 _LEAST_ALIASED = 0.05  # of a Gaussian: below, aliases are exp(-49) of its highest density
-_SUM_OF_WAVES = (
-    1.0  # spread from which on its sum over waves is the shorter one; the variance is then exact to 3e-7
-)
+_SUM_OF_WAVES = 1.0  # spread from which on the sum over waves is the shorter one, exact to 3e-7
 
 
 @dataclass(frozen=True)
@@ -45,8 +41,7 @@ class Form:
 
 
 # ALIASED: blurred, then sampled; FILTERED: sampled, then blurred by Gaussian weights of the neighbours;
-# UNALIASED:
-# without waves that are shorter than two points, as a part of a synthetic periodic surface
+# UNALIASED: without waves that are shorter than two points, as a part of a synthetic periodic surface
 FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.25, 0.2)}
 FIRST_SPREAD, SPREADS = 0.3, 26  # the spreads of a table are even in asinh(s / FIRST_SPREAD)
 

@@ -2,11 +2,9 @@
 
 1. A first fit to the modes of the tapered surface gives a pilot: the expected power of each cosine mode.
 2. Modes that the edges, a filter or single waves dominate are left out; the lay is divided out; gaps are
-filled and
-   their effect on the power is corrected.
+   filled, and their effect on the power is corrected.
 3. The bins of the modes that are left have one posterior (`_spectral_posterior`): its median is the
-estimate, its
-   2.5 and 97.5 % quantiles are the interval.
+   estimate, its 2.5 and 97.5 % quantiles are the interval.
 
 Whole periodic surfaces have Fourier modes; profiles are the case of one axis.
 """
@@ -61,9 +59,7 @@ _WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
 _DOUBLE = 2.0**-52  # relative step of the numbers themselves
 _NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
-_EMPTY = (
-    1e-14  # power over the pilot of modes that hold nothing but rounding, as beyond the band of a synthesis
-)
+_EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
 _GAP_ROUNDS = 2  # corrections for gaps: each starts from the exponent of the one before
 _LEAST_BINS = 3
 

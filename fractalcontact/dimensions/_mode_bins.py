@@ -25,9 +25,7 @@ _SAMPLE = 64  # modes of a bin over which an expectation is averaged: error belo
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _LEAK = 0.5  # share of the edges in the expected power from which on neighbouring modes are correlated
 _TAIL = 1e-3  # squared transfer function below which no form of a filter holds
-_ALIASED = (
-    0.25 * math.pi
-)  # radians per point from which on aliases differ by azimuth by more than a per mille
+_ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
 _ISOTROPIC = math.pi / 3.0  # radians per point up to which they differ by less than 5 % for H above .1
 _FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 8  # of azimuth, on a quarter of the plane

@@ -9,7 +9,6 @@ import numpy as np
 from fractalcontact.base.units import quantity_text
 
 SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
-ASKED = "asked for"  # the window of scales
 CONSTANT = "a constant height has no Hurst exponent"
 NORMAL = 1.959963984540054  # 97.5 % quantile of the normal distribution
 GRIDDING = 0.035  # largest error of H from the finest scale of a gridded surface on, as measured
