@@ -21,11 +21,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance
-from fractalcontact.base.errors import InvalidInput, SmallStrainWarning
+from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.results import provenance_of
-from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._inputs import crack_options, read_surface
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
@@ -37,6 +36,7 @@ from fractalcontact.scenes._stages import (
     only_describes_surface,
     section_length,
 )
+from fractalcontact.scenes._validation import validate_placed
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -242,18 +242,11 @@ def _heights(results: Results, stage: str) -> xr.DataArray:
 
 def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
     upper = read_surface(scene.upper or scene.surface, scene.folder, lower)
-    registers = scene.joint.register
-    if registers:
+    if scene.joint.register:
         faces = call("joints.register", lower, upper, turn_upper=scene.joint.turn_upper)
+        validate_placed(scene, lower, faces["height"])
     else:
         faces = as_dataset(upper.rename("height"))
-        mean = float((upper - lower).mean())
-        if mean < 0:
-            expected = (
-                "an upper face above the lower one: swap them ([surface] and [upper]), or register them"
-            )
-            got = f"a mean aperture of {quantity_text(mean, 'm')}"
-            raise InvalidInput("fractalcontact.scenes.run", [f"upper: expected {expected}, got {got}"])
     prepared = upper.attrs.get("preparation")
     return faces.assign_attrs(preparation=prepared) if prepared else faces
 

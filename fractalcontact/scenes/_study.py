@@ -67,8 +67,14 @@ class Study:
             self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped_maps(stage))
 
     def run(self, stop: signals.Stop) -> list[str]:
-        """Run the stages in order; return what is missing if a stop was requested."""
-        stages = [stage for stage in self.plan if stage.name != FIGURES]
+        """Run the stages in order; return what is missing if a stop was requested.
+
+        The surfaces come first, so that faces which do not fit are refused before a part is kept.
+        """
+        stages = sorted(
+            (stage for stage in self.plan if stage.name != FIGURES),
+            key=lambda stage: stage.row.takes != "file",
+        )
         for number, stage in enumerate(track(stages, self.progress, self.scene.name, unit="stage")):
             count = self._run_stage(stage, stop)
             total = len(self.works[stage.name].parts)
@@ -183,9 +189,5 @@ class Study:
 
 
 def _is_fast_to_repeat(stage: Stage, scene: Scene) -> bool:
-    """Whether a surface is generated, or read from its own file, as fast as from a kept part."""
-    if stage.name not in ("surfaces", "joints/faces"):
-        return False
-    table = scene.surface if stage.name == "surfaces" else scene.upper
-    registers = stage.name == "joints/faces" and scene.joint.register
-    return not (registers or (table is not None and (table.despike or table.fill)))
+    """Whether a surface is made again as fast as read from a kept part; validation makes it anyway."""
+    return stage.name == "surfaces" or (stage.name == "joints/faces" and not scene.joint.register)

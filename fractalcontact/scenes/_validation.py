@@ -21,7 +21,8 @@ from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.schema import label
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.units import quantity_text
+from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes._functions import arguments_of, parameters_of, public_function
 from fractalcontact.scenes._inputs import (
     block_shape,
@@ -96,6 +97,21 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     return scene
 
 
+def validate_placed(scene: Scene, lower: xr.DataArray, upper: xr.DataArray) -> None:
+    """Find all problems of the calls of a joint whose faces have been registered.
+
+    Raises
+    ------
+    InvalidInput
+        The faces overlap on less than the block, for example.
+    """
+    joint = {**scene.table("joint"), "register": False}
+    placed = replace(scene, tables={**scene.tables, "joint": joint})
+    surfaces = {"surface": lower, "upper": upper}
+    with Problems("fractalcontact.scenes.run") as problems:
+        _validate_calls(placed, surfaces, _valid_crack(placed, surfaces, problems), problems)
+
+
 @contextmanager
 def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
     """Collect the problems of a call, but for its inputs and for values that the tables were told of.
@@ -155,7 +171,16 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
                 # a generator may reach sizes that float64 does not hold
                 if problems.surface(name, made, finite=False, smallest=1, leading=True):
                     surfaces[name] = made
+    if set(surfaces) == {"surface", "upper"} and not scene.joint.register:
+        _require_above(surfaces["upper"], surfaces["surface"], problems)
     return surfaces
+
+
+def _require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) -> None:
+    """Require that the upper face lies above the lower one on average."""
+    mean = float((upper - lower).mean())
+    expected = "an upper face above the lower one: swap them ([surface] and [upper]), or register them"
+    problems.require(not mean < 0, "upper", expected, Words(f"a mean aperture of {quantity_text(mean, 'm')}"))
 
 
 def _generator(table: SurfaceTable) -> str | None:

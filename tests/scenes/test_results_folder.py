@@ -122,6 +122,34 @@ def test_refused_commands_leave_no_folder(tmp_path, monkeypatch):
         assert {path.name for path in tmp_path.iterdir()} == before, words
 
 
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("upper.nc", "lower.nc", "--as-scanned"), "swap"),
+        (("upper.nc", "lower.nc"), "swap"),
+        (("lower.nc", "plane.nc"), "nothing that fixes the position"),
+        (("lower.nc", "upper.nc", "--turn-upper", "x"), "nothing that fixes the position"),
+        (("lower.nc", "holes.nc"), "upper inside the block"),
+    ],
+)
+def test_refused_faces_leave_nothing(tmp_path, monkeypatch, words, reason):
+    """Both faces are placed and checked before a part of the study is kept, in a new folder or an old one."""
+    monkeypatch.chdir(tmp_path)
+    lower = fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=1e-5, rng=3)
+    holes = lower + 1e-3
+    holes[20:23, 20:23] = np.nan
+    for name, face in (("lower", lower), ("upper", lower + 1e-3), ("plane", 0 * lower), ("holes", holes)):
+        fc.save(face, f"{name}.nc")
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "notes.txt").write_text("mine")
+    for out in ("new", "old"):
+        done = command_here("joint", *words, "--young", "3e10", "-o", out)
+        assert done.returncode == 2, done.stdout
+        assert reason in done.stderr
+    assert not (tmp_path / "new").exists()
+    assert [path.name for path in (tmp_path / "old").iterdir()] == ["notes.txt"]
+
+
 def test_refused_question_writes_no_scene_into_a_folder_of_others(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fc.save(fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=1e-5, rng=3), "good.nc")
