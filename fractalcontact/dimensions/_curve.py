@@ -1,4 +1,17 @@
-"""A curve over scale, and the labelled Dataset of the curves of one or many surfaces."""
+"""Curves over scale, their labelled Dataset, and H from a straight line through one in log-log scale.
+
+With y the logarithm of the curve at scales s, m(H) that of the curve expected (a power law: a H ln s, a the
+slope for H = 1) and w weights that add up to one:
+
+1. H makes the slope of y - m(H) against x = ln s zero: l'(y - m(H)) = 0, l = w (x - w'x) / (w'(x - w'x)^2).
+2. C is the covariance of y at that H. The logarithm of a mean is too low by half its variance, diag(C) / 2,
+   which is added.
+3. The variance of H is l'Cl / (l'dm/dH)^2.
+4. Misfit: chi square of the best line under C, r'C^-1 r with as many degrees of freedom as points less two,
+   as a normal z (Wilson and Hilferty 1931).
+
+Where z says that one exponent does not fit, there is no interval.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +25,16 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._methods import Method, function
+from fractalcontact.dimensions._records import (
+    CONSTANT,
+    SIGNIFICANT,
+    Estimate,
+    normal_interval,
+    plane,
+    undefined,
+)
+from fractalcontact.dimensions._surface_input import Scales, Surface, between, check_surface, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -130,3 +152,135 @@ def curve_dataset(
 def window_slope(curve: Curve) -> Array:
     """Return the local slope; relative to the first value, a constant curve has slope 0 to the last bit."""
     return local_slope(curve.scale, curve.value / (curve.value[:1] if (curve.value > 0).all() else 1.0))
+
+
+Expected = Callable[[float], Array]
+
+_CORRELATED = "the points of the curve are correlated, so the scatter about a straight line gives no interval"
+_INCOMPLETE = (
+    "points are missing: the covariance, from which the interval follows, is known for complete heights only"
+)
+NO_NOISE = "noise is not in the model of this method"
+LOWEST, HIGHEST = 0.02, 0.98  # H of expected curves and covariances: at 0 and 1 they are singular
+STEP = 1e-3  # of H in differences
+_UNIT = "depends on the unit of height: see the curve's vertical_scale"
+
+
+def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -> Estimate:
+    """Estimate H of one surface by the curve of a method, over its own window or over `scales`."""
+    if surface.is_constant and not method.natural_scale:
+        return undefined(CONSTANT)
+    if method.ignores_plane and surface.is_plane:
+        return plane()
+    window, rule = _window(method, surface, scales)
+    # slopes do not depend on the unit of height, except for methods with a natural scale
+    overflows = not method.natural_scale and surface.squares_overflow
+    curve: Curve = function(method.curve)(surface.in_own_unit() if overflows else surface, window)
+    inside = between(curve.length, window) & (curve.value > 0)
+    if np.count_nonzero(inside) < 2:
+        return undefined(f"fewer than two points of the curve between {window[0]:g} m and {window[1]:g} m")
+    curve = curve.part(inside)
+    x = np.log(curve.scale / curve.scale[0])
+    y = np.log(curve.value / curve.value[0])  # a constant curve has slope 0 to the last bit
+    line = _slope_of(x, curve.weight)
+    a, b, c = method.slope
+
+    def expected(hurst: float) -> Array:
+        if not method.expected:
+            return np.asarray((a * hurst + b * surface.axes + c) * x)
+        return np.asarray(np.log(function(method.expected)(surface, curve, hurst)))
+
+    def exponent(y: Array) -> float:
+        if not method.expected:
+            return (float(line @ y) - b * surface.axes - c) / a
+        return _crossing(lambda hurst: float(line @ (y - expected(hurst))))
+
+    hurst = exponent(y)
+    estimate = Estimate(
+        hurst,
+        scale_min=float(curve.length.min()),
+        scale_max=float(curve.length.max()),
+        window=rule,
+        reason=_CORRELATED,
+        note=NO_NOISE if noise else _UNIT if method.natural_scale else "",
+    )
+    if not method.covariance:
+        return estimate
+    if noise or surface.finest_scale or not surface.is_complete:
+        return replace(estimate, reason=NO_NOISE if noise else _INCOMPLETE)
+    covariance = function(method.covariance)(surface, curve, float(np.clip(hurst, LOWEST, HIGHEST)))
+    if isinstance(covariance, str):
+        return replace(estimate, reason=covariance)
+    y = y + 0.5 * np.diag(covariance)
+    hurst = exponent(y)
+    middle = float(np.clip(hurst, LOWEST, HIGHEST))
+    error = float(np.sqrt(line @ covariance @ line)) / abs(_sensitivity(line, expected, middle))
+    low, high = normal_interval(hurst, error)
+    estimate = replace(estimate, hurst=hurst, standard_error=error, ci_low=low, ci_high=high, reason="")
+    estimate = replace(estimate, misfit=_misfit(x, y - expected(middle), covariance))
+    return (
+        estimate if not estimate.misfit > SIGNIFICANT else estimate.without_interval(misfit_reason(estimate))
+    )
+
+
+def misfit_reason(estimate: Estimate) -> str:
+    """Return why an estimate whose curve does not fit has no interval."""
+    return (
+        f"one exponent does not fit from {estimate.scale_min:.3g} m to {estimate.scale_max:.3g} m (goodness "
+        f"of fit: z = {estimate.misfit:.1f}): choose `scales`, or use the method `likelihood`"
+    )
+
+
+def _window(method: Method, surface: Surface, scales: Scales) -> tuple[tuple[float, float], str]:
+    """Return the lengths to fit, and the rule in words."""
+    if scales is not None:
+        return scales, "asked for"
+    spacing, extent = max(surface.grid.spacing), min(surface.grid.extent)
+    points = extent / spacing * (1 + 1e-9)
+    is_periodic = any(surface.grid.periodic)
+    window = next(row for row in method.windows if points >= row.points and is_periodic >= row.periodic)
+    low, high = window.shortest * spacing, max(window.share * extent, window.least * spacing)
+    finest = surface.finest_scale
+    if not finest:
+        return (low, high), window.rule
+    rule = f"{window.rule}; not below the shortest wavelength that the points resolve"
+    return (max(low, finest), max(high, 4.0 * finest)), rule
+
+
+def _slope_of(x: Array, weights: Array) -> Array:
+    """Return l of the module's first step: the slope of y is l'y."""
+    weights = weights / weights.sum()
+    centred = x - weights @ x
+    return np.asarray(weights * centred / (weights @ centred**2))
+
+
+def _crossing(slope: Callable[[float], float]) -> float:
+    """Return H at which a slope vanishes; beyond the range of expected curves that of its tangent does."""
+    from scipy.optimize import brentq
+
+    low, high = slope(LOWEST), slope(HIGHEST)
+    if low * high < 0.0:
+        return float(brentq(slope, LOWEST, HIGHEST, xtol=1e-6))
+    end, value = (LOWEST, low) if abs(low) < abs(high) else (HIGHEST, high)
+    return end - value * 2.0 * STEP / (slope(end + STEP) - slope(end - STEP))
+
+
+def _sensitivity(line: Array, expected: Expected, hurst: float) -> float:
+    """Return the change of the slope with H."""
+    return float(line @ (expected(hurst + STEP) - expected(hurst - STEP))) / (2.0 * STEP)
+
+
+def _misfit(x: Array, y: Array, covariance: Array) -> float:
+    """Return z of the residual of the line of least chi square; NaN for two points."""
+    if x.size < 3:
+        return float("nan")
+    design = np.stack([np.ones(x.size), x], axis=1)
+    inverse = np.linalg.inv(covariance)
+    residual = y - design @ np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ y)
+    return chi_square_z(float(residual @ inverse @ residual) / (x.size - 2), x.size - 2)
+
+
+def chi_square_z(ratio: float, freedom: float) -> float:
+    """Return chi square, given over its degrees of freedom, as a normal z (Wilson and Hilferty 1931)."""
+    variance = 2.0 / (9.0 * freedom)
+    return float((ratio ** (1.0 / 3.0) - 1.0 + variance) / np.sqrt(variance))

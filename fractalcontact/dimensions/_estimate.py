@@ -15,9 +15,9 @@ from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.dimensions._curve import fit
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
-from fractalcontact.dimensions._line_fit import fit
 from fractalcontact.dimensions._methods import DEFAULT, METHODS, SYNONYMS
 from fractalcontact.dimensions._records import Estimate
 from fractalcontact.dimensions._surface_input import (

@@ -158,26 +158,26 @@ METHODS = {
     "higuchi": Method(
         "growth of the mean absolute increment of profiles by Higuchi's lengths; interval for profiles",
         "Higuchi, Physica D 31 (1988) 277-283",
-        curve="_higuchi.higuchi_curve",
+        curve="_profile_lengths.higuchi_curve",
         slope=(1.0, 0.0, -2.0),
         windows=(Window(1, 1 / 16, 4),),
-        covariance="_higuchi.higuchi_covariance",
+        covariance="_profile_lengths.higuchi_covariance",
     ),
     "detrended_fluctuation": Method(
         "growth of the rms height of profiles about lines in windows (detrended fluctuation analysis), "
         "corrected for small windows; interval for profiles",
         "Peng, Buldyrev, Havlin, Simons, Stanley and Goldberger, Physical Review E 49 (1994) 1685-1689",
-        curve="_detrended_fluctuation.detrended_fluctuation_curve",
+        curve="_roughness_length.detrended_fluctuation_curve",
         windows=(Window(8, 1 / 8, points=128), Window(4, 1 / 4)),
         expected="_roughness_length.expected_roughness",
-        covariance="_detrended_fluctuation.fluctuation_covariance",
+        covariance="_roughness_length.fluctuation_covariance",
         ignores_plane=True,
     ),
     "divider": Method(
         "slope of the length of profiles walked with dividers in natural scale (compass); gives a dimension "
         "of 1 for flat profiles and 1 / H for steep ones; no interval",
         "Mandelbrot, Science 156 (1967) 636-638; Brown, Geophysical Research Letters 14 (1987) 1095-1098",
-        curve="_divider.divider_curve",
+        curve="_profile_lengths.divider_curve",
         slope=(1.0, 0.0, -1.0),
         windows=(Window(1, 1 / 8, 2),),
         natural_scale=True,
@@ -195,7 +195,7 @@ METHODS = {
         "slope of the triangulated area in natural scale; gives a dimension of 2 for flat surfaces, and that "
         "of the surface only where slopes are far above 1; no interval",
         _CLARKE,
-        curve="_covering_area.covering_curve",
+        curve="_cube_counts.covering_curve",
         slope=(1.0, 0.0, -1.0),
         windows=_CUBES,
         natural_scale=True,
