@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -119,77 +119,6 @@ def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
     if library() == "ducc0":
         return _axis_by_axis(_ducc0().dst, array, axes, type=transform_type)
     return _scipy().dstn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
-
-
-def filtered(
-    plane: Array,
-    padded: tuple[int, int],
-    multiply: Callable[..., None],
-    arguments: tuple[Any, ...],
-    modes: Array | None = None,
-    out: Array | None = None,
-) -> tuple[Array, Array]:
-    """Transform a plane, multiply its modes, and transform back.
-
-    Columns are transformed, multiplied and transformed back while they are in the cache.
-
-    Parameters
-    ----------
-    plane : (ny, nx) array
-    padded : tuple of int
-        Shape (my, mx) to which the plane is padded with zeros; the result is cropped to (ny, nx).
-    multiply : callable
-        ``multiply(start, stop, parts, *arguments)`` changes the columns from `start` to `stop` of the modes,
-        which are given as `real_parts` (my, mx//2 + 1, 2).
-    arguments : tuple
-    modes, out : array, optional
-        Where the modes and the result are written, if the library `writes_in_place`; `out` may be the plane.
-
-    Returns
-    -------
-    result, modes : array
-        The modes are those that `multiply` left, or of no use: an array for the next call.
-    """
-    shape, is_padded = (plane.shape[0], plane.shape[1]), padded != plane.shape
-    if library() != "ducc0":
-        modes = rfft2_padded(plane, padded) if is_padded else rfft2(plane)
-        multiply(0, modes.shape[1], real_parts(modes), *arguments)
-        result = irfft2_cropped(modes, padded, shape) if is_padded else irfft2(modes, shape, overwrite=True)
-        return result, modes
-    if plane.size <= SMALL and not is_padded:
-        transform = PlaneTransform(shape)
-        modes = transform.forward(plane, modes)
-        multiply(0, modes.shape[1], real_parts(modes), *arguments)
-        return transform.backward(modes, out), modes
-    modes = _empty_modes(plane, padded) if modes is None else modes
-    out = np.empty_like(plane) if out is None else out
-    rows, columns = _groups(shape[0]), _groups(modes.shape[1])
-    in_bands(_transform_rows, rows, modes.size // 2, plane, padded[1], modes)
-    in_bands(_filter_columns, columns, modes.size, modes, shape[0], multiply, arguments, True)
-    in_bands(_undo_rows, rows, modes.size // 2, modes, padded[1], out)
-    return out, modes
-
-
-def filtered_modes(
-    plane: Array,
-    padded: tuple[int, int],
-    multiply: Callable[..., None],
-    arguments: tuple[Any, ...],
-    modes: Array | None = None,
-) -> Array:
-    """Return the modes of `filtered`, for the case that the plane may turn out not to be needed.
-
-    `irfft2_cropped` makes the plane of them.
-    """
-    if library() != "ducc0":
-        modes = rfft2_padded(plane, padded)
-        multiply(0, modes.shape[1], real_parts(modes), *arguments)
-        return modes
-    modes = _empty_modes(plane, padded) if modes is None else modes
-    in_bands(_transform_rows, _groups(len(plane)), modes.size // 2, plane, padded[1], modes)
-    columns = _groups(modes.shape[1])
-    in_bands(_filter_columns, columns, modes.size, modes, len(plane), multiply, arguments, False)
-    return modes
 
 
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
@@ -327,26 +256,6 @@ def _transform_rows(start: int, stop: int, plane: Array, width: int, modes: Arra
             buffer = np.zeros((count, width), dtype=plane.dtype)
         buffer[:count, :nx] = plane[part]
         call(buffer[:count], axes=(1,), out=modes[part], nthreads=1)
-
-
-def _filter_columns(
-    start: int,
-    stop: int,
-    modes: Array,
-    filled: int,
-    multiply: Callable[..., None],
-    arguments: tuple[Any, ...],
-    undo: bool,
-) -> None:
-    """Transform groups of columns, whose first rows are filled, multiply them and `undo` the transform."""
-    call, parts = _ducc0().c2c, real_parts(modes)
-    for part in _chunks(start, stop, modes.shape[1], modes.shape[0] * modes.itemsize):
-        columns = modes[:, part]
-        columns[filled:] = 0
-        call(columns, axes=(0,), out=columns, nthreads=1)
-        multiply(part.start, part.stop, parts, *arguments)
-        if undo:
-            call(columns, axes=(0,), out=columns, forward=False, inorm=2, nthreads=1)
 
 
 def _undo_rows(start: int, stop: int, modes: Array, width: int, out: Array) -> None:

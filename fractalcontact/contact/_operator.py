@@ -94,12 +94,8 @@ class FreeOperator:
         self.transforms += 1
         if self.is_small:
             return self.apply_at_once(pressure, out)
-        from fractalcontact.contact._kernels import multiply_modes
-
-        weights = (self.symbol, NO_WORK)
-        displacement, modes = fft.filtered(pressure, self.padded, multiply_modes, weights, self.modes)
-        self.modes = modes if fft.writes_in_place() else None
-        return displacement
+        self.filter_modes(pressure, NO_WORK)
+        return self.plane()
 
     def apply_at_once(self, pressure: Array, out: Array | None) -> Array:
         """Return the displacement, from transforms of the whole padded plane: a call each."""
@@ -119,24 +115,32 @@ class FreeOperator:
 
     def work(self, pressure: Array) -> float:
         """Return the sum of pressure times displacement."""
-        from fractalcontact.contact._kernels import multiply_modes
-
         if self.is_small:
             self.latest = self.apply(pressure)
             return product_sum(pressure, self.latest)
         self.transforms += 0.5
         work = np.empty(self.symbol.shape[1])
-        weights = (self.symbol, work)
-        self.modes = fft.filtered_modes(pressure, self.padded, multiply_modes, weights, self.modes)
+        self.filter_modes(pressure, work)
         return sum_of_modes(work, self.padded)
+
+    def filter_modes(self, pressure: Array, work: Array) -> None:
+        """Set the modes of the displacement, and `work` to the sums over their columns."""
+        from fractalcontact.contact._kernels import multiply_modes
+
+        self.modes = modes = fft.rfft2_padded(pressure, self.padded, self.modes)
+        in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, work)
+
+    def plane(self, out: Array | None = None) -> Array:
+        """Return the displacement with the present modes, which are used up."""
+        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        return fft.irfft2_cropped(modes, self.padded, self.shape, out)
 
     def displacement(self, out: Array | None = None) -> Array:
         """Return the displacement under the pressure of the last call, which was of `work`."""
         if self.latest is not None:
             return self.latest
         self.transforms += 0.5
-        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
-        return fft.irfft2_cropped(modes, self.padded, self.shape, out)
+        return self.plane(out)
 
 
 class PairSum:
@@ -197,12 +201,8 @@ class WavenumberMultiplier:
         """
         if self.is_small:
             return self.apply_at_once(plane, factor, invert, mean, out)
-        from fractalcontact.contact._kernels import scale_modes
-
-        weights = (*self.weights(plane.dtype.type, factor, invert, mean), NO_WORK)
-        result, modes = fft.filtered(plane, self.shape, scale_modes, weights, self.modes, out)
-        self.modes = modes if self.transform.in_place else None
-        return result
+        self.filter_modes(plane, factor, invert, mean, NO_WORK)
+        return self.plane(out)
 
     def apply_at_once(
         self, plane: Array, factor: float, invert: bool, mean: float, out: Array | None
@@ -219,22 +219,24 @@ class WavenumberMultiplier:
 
     def work(self, plane: Array, factor: float, *, invert: bool, mean: float) -> float:
         """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
-        from fractalcontact.contact._kernels import scale_modes
-
         work = np.empty(self.shape[1] // 2 + 1)
-        weights = (*self.weights(plane.dtype.type, factor, invert, mean), work)
-        self.modes = fft.filtered_modes(plane, self.shape, scale_modes, weights, self.modes)
+        self.filter_modes(plane, factor, invert, mean, work)
         return sum_of_modes(work, self.shape)
 
-    def plane(self, out: Array | None = None) -> Array:
-        """Return the plane with the modes of the last call, which was of `work`."""
-        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
-        return fft.irfft2_cropped(modes, self.shape, self.shape, out)
+    def filter_modes(self, plane: Array, factor: float, invert: bool, mean: float, work: Array) -> None:
+        """Set the modes of the filtered plane, and `work` to the sums over their columns."""
+        from fractalcontact.contact._kernels import scale_modes
 
-    def weights(self, dtype: Any, factor: float, invert: bool, mean: float) -> tuple[Any, ...]:
-        """Return the arguments of `scale_modes` in one precision."""
-        qy2, qx2 = squared_wavenumbers(self.shape, self.spacing)
-        return qy2.astype(dtype), qx2.astype(dtype), dtype(factor), invert, dtype(mean)
+        dtype = plane.dtype.type
+        qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(self.shape, self.spacing))
+        self.modes = modes = self.transform.forward(plane, self.modes)
+        weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
+        in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
+
+    def plane(self, out: Array | None = None) -> Array:
+        """Return the plane with the present modes, which are used up."""
+        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        return self.transform.backward(modes, out)
 
 
 def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
