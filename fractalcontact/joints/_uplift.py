@@ -16,10 +16,13 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._flow_network import (
     Held,
+    Network,
     check_gap,
     conducting,
+    dissipation,
     edge_conductance,
     held_cells,
+    least_flow,
     line_of,
     link_network,
     nothing_held,
@@ -327,9 +330,19 @@ class HeldFlow:
         wet = held_cells(network, held)
         if not wet.any():
             return dry
-        pressure, error = pressures(network, wet, self.order, held)
+        pressure, error = pressures(network, wet, self.order, held, self.sides[0].axis)
+        error = max(error, self._missed_flow(network, wet, held, pressure, cells))
         is_known = wet.reshape(gap.shape) & (error <= ERROR)
         return np.where(is_known, pressure, np.nan), error
+
+    def _missed_flow(self, network: Network, wet: Array, held: Held, pressure: Array, cells: Array) -> float:
+        """Return by how much the flow from edge to edge falls short of that of the lines of cells alone."""
+        axis = self.sides[0].axis
+        if axis != self.sides[1].axis or not all(side.is_edge for side in self.sides):
+            return 0.0
+        ends = [edge_conductance(cells, self.ratio, axis, place) for place in (0, -1)]
+        least = least_flow(network, axis, wet, ends)
+        return 1.0 - dissipation(network, pressure, wet, held) / least if least > 0 else 0.0
 
     def _held(self, cells: Array) -> Held:
         held = nothing_held(cells.shape)

@@ -29,11 +29,23 @@ def terraces(seed):
     return np.maximum(heights - np.quantile(heights, rng.uniform(0, 0.7)), 0) * 1e-6
 
 
+def decades(seed):
+    """Openings over several decades side by side: terraces, or of a log-normal distribution."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(8, 60))
+    if seed % 3 == 0:
+        heights = rng.integers(0, 3, (n, n)) + 10.0 ** -rng.integers(1, 6) * rng.standard_normal((n, n))
+    else:
+        heights = 10 ** (rng.uniform(0.1, 1.2) * rng.standard_normal((n, n)))
+    return np.maximum(heights - np.quantile(heights, rng.uniform(0, 0.7)), 0) * 1e-6
+
+
 GAPS = [
     (rounded_scans, 296),
     (rounded_scans, 339),
     (terraces, 135),
     *((terraces, seed) for seed in range(40)),
+    *((decades, seed) for seed in (8, 74, 87, 104)),  # beyond the ends by 1e-8 to 3e-6 by one elimination
 ]
 
 
@@ -44,8 +56,9 @@ def test_flow_within_parallel_plates_and_pressure_within_its_ends(make_face, gap
     most = float((gap.clip(0) ** 3).mean()) / 12
     assert ((flow.transmissivity >= 0) & (flow.transmissivity <= most)).all()
     water = fc.joints.uplift(gap, upstream_pressure=UPSTREAM)
-    assert float(water.fluid_pressure.min()) >= -1e-6 * UPSTREAM
-    assert float(water.fluid_pressure.max()) <= UPSTREAM * (1 + 1e-6)
+    assert float(water.fluid_pressure.min()) >= 0
+    assert float(water.fluid_pressure.max()) <= UPSTREAM
+    assert float(water.residual) < 1e-14  # the balance, and what a pressure missed its range by
     assert ((water.mean_uplift >= 0) & (water.mean_uplift <= UPSTREAM)).all()
 
 
@@ -64,7 +77,7 @@ def test_openings_down_to_the_stated_share(make_face):
     """A row of cells down to 0.001 of the mean opening is solved; below, it is closed and stated."""
     gap = np.array([1.0, 2.0, 0.01, 3.0, 1.0, 0.0015, 2.0, 1.0]) * 1e-5
     solved = fc.joints.uplift(make_face(np.tile(gap, (3, 1))), upstream_pressure=1.0)
-    np.testing.assert_allclose(solved.fluid_pressure[1], exact_pressure(gap), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(solved.fluid_pressure[1], exact_pressure(gap), rtol=1e-12, atol=1e-14)
     gap[5] = 0.001e-5
     flow = fc.joints.transmissivity(make_face(np.tile(gap, (3, 1))), axis="x")
     assert flow.transmissivity.item() == 0
