@@ -34,6 +34,11 @@ def kernel(function: F) -> F:
     return _compile(function)
 
 
+def inner_kernel(function: F) -> F:
+    """Compile a serial loop that other kernels call, and Python does not: it compiles faster."""
+    return _compile(function, no_cpython_wrapper=True)
+
+
 def sum_kernel(function: F) -> F:
     """Compile a serial loop whose sums over a row may be vectorised, which is several times as fast.
 

@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.jit import kernel
+from fractalcontact.base.jit import inner_kernel, kernel
 from fractalcontact.dimensions._gaussian_mixture import FILTERED, FORMS, UNALIASED, Bins
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -389,7 +389,7 @@ def bin_power(
         out[b] = math.log(power + theta[2] * theta[2] * white[b])
 
 
-@kernel
+@inner_kernel
 def _parameters(u: Array, fixed: Array, prior: Array, theta: Array) -> None:
     """Fill theta from unit normal numbers, where it is not fixed."""
     low, high = prior[0], prior[1]
@@ -405,7 +405,7 @@ def _parameters(u: Array, fixed: Array, prior: Array, theta: Array) -> None:
         theta[3] = min(theta[3], 0.5 / theta[1])
 
 
-@kernel
+@inner_kernel
 def _whitened(whitening: Array, level: Array, model: Array, out: Array) -> float:
     """Fill the white residuals of the bins; return the sum of their squares."""
     total = 0.0
@@ -418,7 +418,7 @@ def _whitened(whitening: Array, level: Array, model: Array, out: Array) -> float
     return total
 
 
-@kernel
+@inner_kernel
 def _factorise(matrix: Array, lower: Array) -> float:
     """Fill the Cholesky factor; return its log determinant, half of that of the matrix."""
     logarithm = 0.0
@@ -432,7 +432,7 @@ def _factorise(matrix: Array, lower: Array) -> float:
     return logarithm
 
 
-@kernel
+@inner_kernel
 def _solve(lower: Array, right: Array, out: Array) -> None:
     """Solve with a Cholesky factor."""
     size = right.size
@@ -448,6 +448,48 @@ def _solve(lower: Array, right: Array, out: Array) -> None:
         out[i] = value / lower[i, i]
 
 
+@inner_kernel
+def _product(a: Array, b: Array) -> float:
+    """Return the scalar product."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@inner_kernel
+def _copy(source: Array, target: Array) -> None:
+    """Copy the elements."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@inner_kernel
+def _misfit(
+    u: Array,
+    fixed: Array,
+    prior: Array,
+    form: int,
+    axes: int,
+    table: Array,
+    nodes: Array,
+    t: Array,
+    white: Array,
+    lnq: Array,
+    level: Array,
+    whitening: Array,
+    theta: Array,
+    model: Array,
+    residual: Array,
+) -> float:
+    """Fill theta, the logarithms of the bins and their white residuals; return the sum of squares with u."""
+    _parameters(u, fixed, prior, theta)
+    bin_power(theta, form, axes, table, nodes, t, white, lnq, model)
+    return _whitened(whitening, level, model, residual) + _product(u, u)
+
+
+# Loops over elements in place of assignments, sums and extremes of arrays: with those Numba compiles the texts
+# of their error messages too, and the first estimate took twice the processor time.
 @kernel
 def _maxima(
     starts: Array,
@@ -477,71 +519,132 @@ def _maxima(
     gradient, move, u, trial = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
     before, after, totals = np.zeros(p), np.zeros(p), np.empty(starts.shape[0])
     for m in range(fixed.shape[0]):
-        table, form, free = tables[forms[m]], forms[m], 0
+        held, table, form, free = fixed[m], tables[forms[m]], forms[m], 0
         for i in range(p):
-            free += math.isnan(fixed[m, i])
+            free += math.isnan(held[i])
         number = starts.shape[0] if free > 1 else starts.shape[0] // 4
         for d in range(number):
-            _parameters(starts[d], fixed[m], prior, values)
+            _parameters(starts[d], held, prior, values)
             bin_power(values, form, axes, table, nodes, t, white, lnq, models[d])
         for k in range(whitening.shape[0]):
-            totals[:] = np.inf
+            white_k = whitening[k]
             for d in range(number):
+                totals[d] = math.inf
                 if k == 0 or d % 4 == 0:
-                    totals[d] = _whitened(whitening[k], level, models[d], residual)
-            best = np.inf
+                    totals[d] = _whitened(white_k, level, models[d], residual)
+            best = math.inf
             # the first kind has several maxima; those of the others lie near that of the kind before
             for _ in range(_ATTEMPTS if k == 0 and free > 2 else 1):
-                d = int(np.argmin(totals))
-                u[:] = starts[d]
-                totals[d] = np.inf
+                start = 0
+                for d in range(number):
+                    if totals[d] < totals[start]:
+                        start = d
+                totals[start] = math.inf
                 for i in range(p):
-                    if not math.isnan(fixed[m, i]):
-                        u[i] = 0.0
-                if k > 0:
-                    _parameters(u, fixed[m], prior, values)
-                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
-                    total = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
-                    _parameters(before, fixed[m], prior, values)
-                    bin_power(values, form, axes, table, nodes, t, white, lnq, model)
-                    if _whitened(whitening[k], level, model, residual) + np.sum(before * before) < total:
-                        u[:] = before
+                    u[i] = starts[start, i] if math.isnan(held[i]) else 0.0
+                if k > 0 and _misfit(
+                    before,
+                    fixed[m],
+                    prior,
+                    form,
+                    axes,
+                    table,
+                    nodes,
+                    t,
+                    white,
+                    lnq,
+                    level,
+                    white_k,
+                    values,
+                    model,
+                    residual,
+                ) < _misfit(
+                    u,
+                    fixed[m],
+                    prior,
+                    form,
+                    axes,
+                    table,
+                    nodes,
+                    t,
+                    white,
+                    lnq,
+                    level,
+                    white_k,
+                    values,
+                    model,
+                    residual,
+                ):
+                    _copy(before, u)
                 damping = 0.0
-                _parameters(u, fixed[m], prior, values)
-                bin_power(values, form, axes, table, nodes, t, white, lnq, model)
-                objective = _whitened(whitening[k], level, model, residual) + np.sum(u * u)
+                objective = _misfit(
+                    u,
+                    fixed[m],
+                    prior,
+                    form,
+                    axes,
+                    table,
+                    nodes,
+                    t,
+                    white,
+                    lnq,
+                    level,
+                    white_k,
+                    values,
+                    model,
+                    residual,
+                )
                 for _step in range(_STEPS):
                     for i in range(p):
-                        jacobian[i] = 0.0
-                        if math.isnan(fixed[m, i]):
-                            trial[:] = u
+                        for b in range(bins):
+                            jacobian[i, b] = 0.0
+                        if math.isnan(held[i]):
+                            _copy(u, trial)
                             trial[i] += 1e-4
-                            _parameters(trial, fixed[m], prior, values)
+                            _parameters(trial, held, prior, values)
                             bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
-                            _whitened(whitening[k], shifted, model, jacobian[i])
-                            jacobian[i] *= 1e4
+                            _whitened(white_k, shifted, model, jacobian[i])
+                            for b in range(bins):
+                                jacobian[i, b] *= 1e4
                     for i in range(p):
-                        gradient[i] = np.sum(jacobian[i] * residual) - u[i]
+                        gradient[i] = _product(jacobian[i], residual) - u[i]
                         for j in range(p):
-                            hessian[i, j] = np.sum(jacobian[i] * jacobian[j]) + (1.0 if i == j else 0.0)
+                            hessian[i, j] = _product(jacobian[i], jacobian[j]) + (1.0 if i == j else 0.0)
                     gain = 0.0
                     for _ in range(6):
-                        damped[:] = hessian
                         for i in range(p):
-                            damped[i, i] *= 1.0 + damping
+                            for j in range(p):
+                                damped[i, j] = hessian[i, j] * (1.0 + damping if i == j else 1.0)
                         _factorise(damped, lower)
                         _solve(lower, gradient, move)
-                        longest = np.max(np.abs(move))
-                        trial[:] = u + move * (0.7 / max(longest, 0.7))
-                        _parameters(trial, fixed[m], prior, values)
-                        bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
-                        total = _whitened(whitening[k], level, shifted, trial_residual) + np.sum(
-                            trial * trial
+                        longest = 0.7
+                        for i in range(p):
+                            longest = max(longest, abs(move[i]))
+                        for i in range(p):
+                            trial[i] = u[i] + move[i] * (0.7 / longest)
+                        total = _misfit(
+                            trial,
+                            fixed[m],
+                            prior,
+                            form,
+                            axes,
+                            table,
+                            nodes,
+                            t,
+                            white,
+                            lnq,
+                            level,
+                            white_k,
+                            values,
+                            shifted,
+                            trial_residual,
                         )
                         if total < objective:
                             gain = objective - total
                             objective = total
-                            u[:], model[:], residual[:] = trial, shifted, trial_residual
+                            _copy(trial, u)
+                            _copy(shifted, model)
+                            _copy(trial_residual, residual)
                             damping *= 0.2
                             break
                         damping = max(0.1, 5.0 * damping)
@@ -550,11 +653,11 @@ def _maxima(
                 if objective < best:
                     best = objective
                     half_log = _factorise(hessian, lower)
-                    gradient[:] = 0.0
-                    gradient[0] = 1.0
+                    for i in range(p):
+                        gradient[i] = 1.0 if i == 0 else 0.0
                     _solve(lower, gradient, move)
                     evidence[m, k] = -0.5 * objective - half_log
                     centre[m, k], scale[m, k] = u[0], math.sqrt(move[0])
-                    _parameters(u, fixed[m], prior, theta[m, k])
-                    after[:] = u
-            before[:] = after
+                    _parameters(u, held, prior, theta[m, k])
+                    _copy(u, after)
+            _copy(after, before)

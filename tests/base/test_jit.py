@@ -17,7 +17,7 @@ def add_up(values):
 
 def test_kernels_run_without_a_cache_folder(monkeypatch):
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
-    for decorate in (jit.kernel, jit.sum_kernel, jit.gap_sum_kernel):
+    for decorate in (jit.kernel, jit.inner_kernel, jit.sum_kernel, jit.gap_sum_kernel):
         decorate(add_up)
     assert jit.kernel(add_up)(np.arange(5.0)) == 10.0
 

@@ -80,7 +80,7 @@ WITH_KERNELS = ("numba", "scipy.linalg")
 KERNELS = {
     "contact solver": ("contact", 12),
     "increment sums": ("dimensions", 1),
-    "posterior": ("dimensions", 10),
+    "posterior": ("dimensions", 13),
     "covering area": ("dimensions", 1),
     "dividers": ("dimensions", 1),
     "minimum cover": ("domains", 1),
