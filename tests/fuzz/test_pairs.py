@@ -48,8 +48,9 @@ def test_two_wrong_arguments_are_both_named(name):
             continue
         values = (VALUES[word]() for word in WRONG)
         wrong = (value for value in values if names(problems(**{argument: value}), argument))
-        if found := list(wrong)[:1]:
-            alone[argument] = found[0]
+        for value in wrong:
+            alone[argument] = value
+            break
     hidden = []
     for number, first in enumerate(alone):
         for second in list(alone)[number + 1 :]:
@@ -82,13 +83,10 @@ def test_two_wrong_values_of_a_scene_are_both_named(tmp_path, name):
 
     alone = {}
     for place in places(SCENES[name]):
-        wrong = [
-            value
-            for value in WRONG_IN_SCENES
-            if names(problems(changed(SCENES[name], place, value)), place[-1])
-        ]
-        if wrong:
-            alone[place] = wrong[0]
+        for value in WRONG_IN_SCENES:
+            if names(problems(changed(SCENES[name], place, value)), place[-1]):
+                alone[place] = value
+                break
     pairs = [(first, second) for n, first in enumerate(alone) for second in list(alone)[n + 1 :]]
     hidden = []
     for first, second in pairs[::SHARE]:

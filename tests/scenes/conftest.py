@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from matplotlib.figure import Figure
 
 
 @pytest.fixture(autouse=True)
@@ -11,7 +12,16 @@ def wide_screen(monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
 
 
-@pytest.fixture(autouse=True, scope="session")
+@pytest.fixture(autouse=True, scope="module")
+def empty_figures():
+    """Write the files of the figures without their content, which `tests/plotting` tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fractalcontact.plotting._draw._draw_row", lambda row, tree: Figure((1.0, 1.0)))
+        patch.setattr("fractalcontact.plotting._draw.draw_with_band", lambda drawings, members: drawings[0]())
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
 def one_process():
     """Run the parts of studies in this process, where tests record their calls, however slow it is."""
     with pytest.MonkeyPatch.context() as patch:
