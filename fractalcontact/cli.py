@@ -144,6 +144,15 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     report.add_argument("--csv", metavar="FOLDER", help="also write every curve there as a CSV file")
     report.set_defaults(action=_report)
 
+    export = commands.add_parser("export", help="write the maps of a result file for ParaView or Fiji")
+    export.add_argument("file", help="a result file: heights, and the maps that [want] keep stores")
+    export.add_argument(
+        "--to", choices=("vti", "tiff"), default="vti", help="VTK image data (default) or stacks of TIFF"
+    )
+    export.add_argument("-o", "--out", help="folder for the files (default: maps beside the result)")
+    export.add_argument("--force", action="store_true", help="overwrite files of the same names")
+    export.set_defaults(action=_export)
+
     info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
     info.add_argument("file", help="a NetCDF file that this package wrote")
     info.set_defaults(action=_info)
@@ -452,6 +461,16 @@ def _report(options: argparse.Namespace) -> int:
     print(f"written: {path}")
     if options.csv is not None:
         print(f"written to {options.csv}: {len(scenes.tables(tree, options.csv))} CSV files")
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    from fractalcontact import open as open_result
+    from fractalcontact import scenes
+
+    folder = options.out or Path(options.file).with_name("maps")
+    files = scenes.export(open_result(options.file), folder, to=options.to, force=options.force)
+    print(f"written to {folder}: {len(files)} files, {files[0].name} ...")
     return 0
 
 

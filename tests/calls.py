@@ -283,6 +283,7 @@ CALLS = {
     "scenes.reproduce": lambda: {"result": rough()},
     "scenes.report": lambda: {"result": study(), "path": PLACE / "report.html"},
     "scenes.tables": lambda: {"result": study()},
+    "scenes.export": lambda: {"result": rough(), "folder": PLACE / "maps", "to": "tiff", "force": True},
     "scenes.template": lambda: {"question": "roughness", "scan": file("scan"), "folder": PLACE},
     "plotting.surface": lambda: {"surface": rough(), "block": rough()[:8, :8]},
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},

@@ -84,6 +84,9 @@ CALLS = {
     "scenes.template": lambda folder: fc.scenes.template(
         "roughness", fc.save(rough(), folder / "scan.nc"), folder=folder
     ),
+    "scenes.export": lambda folder: str(
+        [path.name for path in fc.scenes.export(rough(), folder / "maps", to="tiff", force=True)]
+    ),
     "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
     "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
     "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),

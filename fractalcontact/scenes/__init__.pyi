@@ -1,5 +1,6 @@
 from ._html_report import report as report
 from ._json_schema import json_schema as json_schema
+from ._maps import export as export
 from ._plan import plan as plan
 from ._reproduce import reproduce as reproduce
 from ._run import run as run
@@ -12,6 +13,7 @@ from ._validation import validate as validate
 
 __all__ = [
     "Scene",
+    "export",
     "json_schema",
     "load",
     "plan",

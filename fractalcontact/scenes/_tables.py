@@ -55,7 +55,7 @@ def tables(result: xr.DataTree | xr.Dataset, folder: str | os.PathLike[str] | No
         if folder is not None:
             problems.path("folder", folder)
     frames: dict[str, Any] = {}
-    for path, dataset in _groups(result):
+    for path, dataset in groups_of(result):
         for dims in _sets_of_dims(dataset):
             name = f"{path}_by_{'_'.join(dims)}" if dims else f"{path}_{SINGLE}"
             frames[name] = _frame(dataset, dims)
@@ -67,7 +67,7 @@ def tables(result: xr.DataTree | xr.Dataset, folder: str | os.PathLike[str] | No
     return frames
 
 
-def _groups(result: xr.DataTree | xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+def groups_of(result: xr.DataTree | xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     """Return the name and the Dataset of every group that has data."""
     if isinstance(result, xr.Dataset):
         return [("result", result)]
@@ -98,11 +98,11 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
     )
     coords = [name for name in frame.columns if name not in names and name not in dims]
     frame = frame[[*dims, *coords, *names]]
-    frame.columns = [_head(dataset, str(name)) for name in frame.columns]
+    frame.columns = [heading(dataset, str(name)) for name in frame.columns]
     return frame
 
 
-def _head(dataset: xr.Dataset, name: str) -> str:
+def heading(dataset: xr.Dataset, name: str) -> str:
     """Return the name of a variable with its unit."""
     attributes = dataset[name].attrs if name in dataset.variables else {}
     quantity = QUANTITIES.get(name)

@@ -142,6 +142,7 @@ KEPT = {
     "a list as a study": ("scenes.report", "result", list, "result"),
     "a file that is missing among figures": ("scenes.report", "figures", lambda: ["nowhere.png"], "figures"),
     "a file as the folder of a report": ("scenes.report", "path", lambda: file("surface") / "a.html", "path"),
+    "a file as the folder of maps": ("scenes.export", "folder", lambda: file("surface"), "folder"),
     "a file as the folder of tables": ("scenes.tables", "folder", lambda: file("surface"), "folder"),
     "a file as the folder of figures": ("plotting.draw", "folder", lambda: file("surface"), "folder"),
     "a number as the folder of a scene": ("scenes.template", "folder", lambda: 3, "folder"),

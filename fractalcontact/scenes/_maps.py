@@ -1,0 +1,184 @@
+"""The maps of a study for other programs: VTK image data for ParaView, TIFF for Fiji and ImageJ."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.errors import MissingExtra
+from fractalcontact.base.netcdf import written_whole
+from fractalcontact.base.validation import Problems, Words, writing
+from fractalcontact.scenes._tables import MAP_DIMS, groups_of, heading
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.scenes.export"
+MICROMETRE = 1e-6  # unit of the pixels in TIFF: ImageJ shows lengths in it
+
+
+def export(
+    result: xr.DataTree | xr.Dataset | xr.DataArray,
+    folder: str | os.PathLike[str],
+    *,
+    to: str = "vti",
+    force: bool = False,
+) -> list[Path]:
+    """Write the maps of a result for ParaView (VTK image data, .vti) or Fiji and ImageJ (TIFF).
+
+    Parameters
+    ----------
+    result : DataTree, Dataset or DataArray
+        A study, a result or a surface: all variables over y and x are written, heights, states, pressures,
+        gaps and labels of islands. Curves are in `fractalcontact.scenes.tables`.
+    folder : path-like
+        Created if it does not exist.
+    to : {"vti", "tiff"}
+        "vti": one file for every plane of a group, `joints_closure_shear000_step003.vti`, with all its maps
+        as they are, at points with the spacing and origin (m) of the surface; ParaView opens the files of a
+        path as a series. "tiff": one file for every map, with its planes as a stack whose labels name shear
+        and load. Numbers have 32 bits, states and masks 8; the row of the greatest y is on top, and the
+        pixels are in um. Names of arrays hold the unit: `pressure (Pa)`.
+    force : bool, default False
+        Overwrite files under these names.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    InvalidInput
+        `result` has no maps, or the folder has files of these names or cannot be written.
+    MissingExtra
+        "vti" needs pyevtk (extra `vtk`).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+    >>> pressed = fc.contact.press(surface, contact_modulus=2e10, nominal_pressure=[1e6, 2e6])
+    >>> [path.name for path in fc.scenes.export(pressed, tempfile.mkdtemp(), to="tiff")]
+    ['result_state.tif']
+    """
+    with Problems(WHERE) as problems:
+        is_result = isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree))
+        problems.require(is_result, "result", "a DataTree, Dataset or DataArray", type(result).__name__)
+        problems.path("folder", folder)
+        problems.choice("to", to, FORMATS)
+        problems.boolean("force", force)
+    if to == "vti" and find_spec("pyevtk") is None:
+        raise MissingExtra("VTK image data", "pyevtk", "vtk")
+    if isinstance(result, xr.DataArray):
+        result = result.to_dataset(name="values" if result.name is None else result.name)
+    target = Path(folder)
+    files = {target / file.name: file for group in groups_of(result) for file in FORMATS[to](*group)}
+    with Problems(WHERE) as problems:
+        problems.require(bool(files), "result", "maps over y and x", Words("none"))
+        taken = [path.name for path in files if path.exists()] if not force else []
+        expected = "a folder without files of these names (another folder, or force to overwrite)"
+        problems.require(not taken, "folder", expected, Words(f"{target.name!r} with {', '.join(taken[:3])}"))
+    with writing(WHERE, "folder", target):
+        target.mkdir(parents=True, exist_ok=True)
+        for path, file in files.items():
+            with written_whole(path) as temporary:
+                file.write(temporary)
+    return list(files)
+
+
+class _File(NamedTuple):
+    """The name of a file, and what writes it."""
+
+    name: str
+    write: Callable[[Path], Any]
+
+
+def _maps(dataset: xr.Dataset) -> Iterator[tuple[tuple[str, ...], list[str]]]:
+    """Yield the leading dims of the maps of numbers, each set once, with the names of its maps."""
+    by_dims: dict[tuple[str, ...], list[str]] = {}
+    for name, variable in dataset.data_vars.items():
+        if set(variable.dims) >= MAP_DIMS and variable.dtype.kind in "biuf":
+            leading = tuple(str(dim) for dim in variable.dims if dim not in MAP_DIMS)
+            by_dims.setdefault(leading, []).append(str(name))
+    yield from by_dims.items()
+
+
+def _vti_files(group: str, dataset: xr.Dataset) -> Iterator[_File]:
+    for leading, names in _maps(dataset):
+        maps = {name: dataset[name].transpose(*leading, "y", "x") for name in names}
+        for index in np.ndindex(*(dataset.sizes[dim] for dim in leading)):
+            place = "".join(f"_{dim}{number:03d}" for dim, number in zip(leading, index, strict=True))
+            own = "" if leading or len(list(_maps(dataset))) == 1 else "_surface"
+            planes = {heading(dataset, name): each[index] for name, each in maps.items()}
+            yield _File(f"{group}{own}{place}.vti", _vti_writer(planes))
+
+
+def _vti_writer(planes: dict[str, xr.DataArray]) -> Callable[[Path], Any]:
+    def write(path: Path) -> None:
+        from pyevtk.hl import imageToVTK
+
+        plane = next(iter(planes.values()))
+        origin, spacing = zip(*(_axis(plane[dim].values) for dim in ("x", "y")), strict=True)
+        points = {name: _column_major(each.values) for name, each in planes.items()}
+        # a spacing of 0 across the plane is refused by ParaView's filters
+        written = imageToVTK(str(path), (*origin, 0.0), (*spacing, min(spacing)), pointData=points)
+        Path(written).replace(path)
+
+    return write
+
+
+def _axis(values: Array) -> tuple[float, float]:
+    """Return the first coordinate and the spacing; that of a single point is 1."""
+    first = float(values[0])
+    return first, (float(values[-1]) - first) / (values.size - 1) if values.size > 1 else 1.0
+
+
+def _column_major(values: Array) -> Array:
+    """Return a plane over (y, x) as VTK takes it: (x, y, z), x running first."""
+    plane = values.astype(np.uint8) if values.dtype.kind == "b" else values
+    return np.asfortranarray(plane.T[:, :, np.newaxis])
+
+
+def _tiff_files(group: str, dataset: xr.Dataset) -> Iterator[_File]:
+    for leading, names in _maps(dataset):
+        for name in names:
+            yield _File(f"{group}_{name}.tif", _tiff_writer(dataset, name, leading))
+
+
+def _tiff_writer(dataset: xr.Dataset, name: str, leading: tuple[str, ...]) -> Callable[[Path], Any]:
+    def write(path: Path) -> None:
+        import tifffile
+
+        field = dataset[name].transpose(*leading, "y", "x")
+        is_flag = field.dtype.kind == "b" or (field.dtype.kind in "iu" and field.dtype.itemsize == 1)
+        values = field.values.astype(np.uint8 if is_flag else np.float32)
+        planes = values.reshape(-1, *values.shape[-2:])[:, ::-1]
+        (_, dx), (_, dy) = (_axis(field[dim].values) for dim in ("x", "y"))
+        metadata = {
+            "axes": "ZYX",
+            "unit": "um",
+            "Labels": [_label(field, leading, index) for index in np.ndindex(*values.shape[:-2])],
+            "Info": f"{heading(dataset, name)}: {field.attrs.get('long_name', name)}",
+        }
+        resolution = MICROMETRE / dx, MICROMETRE / dy
+        tifffile.imwrite(path, planes, imagej=True, resolution=resolution, metadata=metadata)
+
+    return write
+
+
+def _label(field: xr.DataArray, leading: tuple[str, ...], index: tuple[int, ...]) -> str:
+    """Return the coordinates of a plane in words: shear (m) = 0.0002, normal_force (N) = 300."""
+    plane = field[index]
+    known = {name: coord for name, coord in plane.coords.items() if coord.ndim == 0}
+    words = [f"{heading(field.to_dataset(name='map'), str(name))} = {c.item()}" for name, c in known.items()]
+    return ", ".join(words) or ", ".join(f"{dim} {n}" for dim, n in zip(leading, index, strict=True))
+
+
+FORMATS: dict[str, Callable[[str, xr.Dataset], Iterator[_File]]] = {"vti": _vti_files, "tiff": _tiff_files}
