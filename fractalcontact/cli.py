@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import sys
 import textwrap
 import warnings
@@ -24,7 +23,6 @@ from fractalcontact.base.process import block_dask_import, collect_garbage_less_
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
-PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}  # of Pa
 SOFTEST = 1e4  # Pa: below the softest gels; a modulus below it is in another unit
 QUESTIONS = {
     "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
@@ -172,11 +170,9 @@ def _add_run_options(command: argparse.ArgumentParser) -> None:
 
 def _pascal(text: str) -> float:
     """Return a pressure in Pa, given as a number or with its unit: `30 GPa`."""
-    parts = re.fullmatch(r"\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*", text)
-    try:
-        value = float(parts[1]) * PREFIXES[parts[2]] if parts else None
-    except ValueError:
-        value = None
+    from fractalcontact.base.units import pascals
+
+    value = pascals(text)
     if value is None:
         raise argparse.ArgumentTypeError(
             f"expected a pressure in Pa, or with its unit (30 GPa), got {text!r}"

@@ -15,6 +15,8 @@ PREFIXES = {
 }  # fmt: skip
 SMALLEST = 0.5  # the largest value is at least this many of the shown units (0.05 m2, 0.005 m3)
 PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
+PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
+OF_PASCAL = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -99,6 +101,21 @@ def quantity_text(value: Any, units: str, digits: int = 3) -> str:
     return scale_for(units, value).text(value, digits)
 
 
+def pascals(text: str) -> float | None:
+    """Return a pressure in Pa that is written as a number or with its unit; None for other words.
+
+    Examples
+    --------
+    >>> pascals("30 GPa"), pascals("2e6"), pascals("30 GN")
+    (30000000000.0, 2000000.0, None)
+    """
+    parts = PRESSURE.match(text)
+    try:
+        return float(parts[1]) * OF_PASCAL[parts[2]] if parts else None
+    except ValueError:
+        return None
+
+
 def number(value: float, digits: int = 3) -> str:
     """Return a number with so many digits, without an exponent where it is between 1e-4 and 1e7.
 
@@ -123,6 +140,17 @@ def fixed(value: float, decimals: int, *, sign: bool = False) -> str:
     """
     text = f"{value:+.{decimals}f}" if sign else f"{value:.{decimals}f}"
     return text if text.strip("+-0.") else text.lstrip("+-")
+
+
+def jrc_text(value: float, decimals: int = 1) -> str:
+    """Return a joint roughness coefficient; words for one below its scale.
+
+    Examples
+    --------
+    >>> jrc_text(11.62), jrc_text(-75.1)
+    ('11.6', 'below 0')
+    """
+    return "below 0" if value < 0 else fixed(value, decimals)
 
 
 def _largest(values: Any) -> float:

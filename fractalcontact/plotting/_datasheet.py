@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import provenance_of
-from fractalcontact.base.units import Scale, quantity_text, scale_for
+from fractalcontact.base.units import Scale, jrc_text, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure as checked
@@ -180,8 +180,8 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
         for direction in words(coefficient["direction"]):
             row = coefficient.sel(direction=direction)
             low, high = float(row["roughness_coefficient_low"]), float(row["roughness_coefficient_high"])
-            spread = f"  (profiles {low:.1f} to {high:.1f})" if np.isfinite(low + high) else ""
-            yield f"  JRC {direction}: {float(row['roughness_coefficient']):.1f}{spread}"
+            spread = f"  (profiles {jrc_text(low)} to {jrc_text(high)})" if np.isfinite(low + high) else ""
+            yield f"  JRC {direction}: {jrc_text(float(row['roughness_coefficient']))}{spread}"
         lags, intervals = (np.unique(coefficient[name]) for name in ("lag", "regression_interval"))
         read, fitted = ([quantity_text(float(v), "m") for v in values] for values in (lags, intervals))
         yield f"      read every {', '.join(read)}; regression {', '.join(fitted)}"

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import STEEP
-from fractalcontact.base.units import number, quantity_text
+from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
 from fractalcontact.scenes._result_tables import group_of, length
 from fractalcontact.scenes._rows import aperture_as_placed
 
@@ -22,7 +22,6 @@ PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.
 TILTED = 0.5  # of the mean square height that the mean plane carries: more, and a flat touches one edge
 SPIKED_DIMENSION, SPIKED_JRC, SPIKED_LIFT = 0.01, 0.5, 0.1  # changes by spikes that are worth a sentence:
 # half of the usual interval of D, a fortieth of the scale of JRC, a tenth of the opening at first touch
-QUICK = "increments"  # the estimator that shows what spikes do: 10 ms, and gaps do not matter to it
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
 
@@ -75,7 +74,7 @@ def _spikes(tree: xr.DataTree) -> Iterator[str]:
         return
     effects: list[str] = []
     if counts.get("surface"):
-        effects += _without_spikes(tree, heights["surface"], clean["surface"])
+        effects += _without_spikes(tree, clean["surface"])
     effects += _lift_of_spikes(tree, clean)
     if effects:
         points = " and ".join(f"{count} of [{name}]" for name, count in counts.items() if count)
@@ -83,17 +82,18 @@ def _spikes(tree: xr.DataTree) -> Iterator[str]:
         yield f"points that stand out as spikes of a scan: {points}; without them {without} (--despike)."
 
 
-def _without_spikes(tree: xr.DataTree, scan: xr.DataArray, clean: xr.DataArray) -> Iterator[str]:
+def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
     """Yield the fractal dimension and the roughness coefficient without spikes, where they are others."""
     estimates, jrc = group_of(tree, "dimensions"), group_of(tree, "joints/roughness_coefficient")
     if estimates is not None and "default" in estimates["method"].values:
         from fractalcontact import dimensions
 
-        before, after = (
-            float(dimensions.estimate(face, QUICK)["fractal_dimension"][0]) for face in (scan, clean)
+        before = float(estimates["fractal_dimension"].sel({"method": "default"}))
+        after = float(
+            dimensions.estimate(clean, **_scene(tree).get("dimensions", {}))["fractal_dimension"][0]
         )
-        if abs(after - before) > SPIKED_DIMENSION:
-            yield f"D (of {QUICK}) is {after:.2f}, not {before:.2f}"
+        if not abs(after - before) <= SPIKED_DIMENSION:  # also where there is no D with them, or without
+            yield f"D is {fixed(after, 2)}, not {fixed(before, 2)}"
     if jrc is not None:
         from fractalcontact import joints
 
@@ -101,8 +101,8 @@ def _without_spikes(tree: xr.DataTree, scan: xr.DataArray, clean: xr.DataArray) 
         values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
         pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
         if max(abs(after - before) for _, after, before in pairs) > SPIKED_JRC:
-            text = ", ".join(f"{after:.0f}, not {before:.0f}, toward {name}" for name, after, before in pairs)
-            yield f"JRC is {text}"
+            text = (f"{jrc_text(a, 0)}, not {jrc_text(b, 0)}, toward {name}" for name, a, b in pairs)
+            yield f"JRC is {', '.join(text)}"
 
 
 def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:

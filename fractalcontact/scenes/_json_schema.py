@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
+from fractalcontact.base.units import PRESSURE
 from fractalcontact.scenes._functions import arguments_of, public_function
 from fractalcontact.scenes._scene import PLANES, WANT_KEYS, MaterialTable
 from fractalcontact.scenes._scene_file import (
@@ -19,8 +20,10 @@ from fractalcontact.scenes._scene_file import (
     NUMBERS,
     ONE_NUMBER,
     PAIRS,
+    PRESSURES,
     READING,
     SAMPLES,
+    SPELLINGS,
     joint_keys,
 )
 from fractalcontact.scenes._stages import (
@@ -41,6 +44,7 @@ BOUNDS = {
     "below": "exclusiveMaximum",
     "at_most": "maximum",
 }
+WITH_UNIT = {"type": "string", "pattern": PRESSURE.pattern}
 RANGES = [{"$ref": "#/definitions/even_range"}, {"$ref": "#/definitions/logarithmic_range"}]
 PURPOSES = {
     "surface": "The lower face, or the only surface: one of read, sample, generate.",
@@ -139,14 +143,18 @@ def _described(properties: Mapping[str, Schema], texts: Mapping[str, str]) -> di
     }
 
 
-def _number(bounds: Mapping[str, float]) -> Schema:
-    return {"type": "number"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
+def _number(bounds: Mapping[str, float], key: str = "") -> Schema:
+    """Return one number; a pressure may have its unit."""
+    number = {"type": "number"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
+    return {"anyOf": [number, WITH_UNIT]} if key in PRESSURES else number
 
 
-def _numbers(bounds: Mapping[str, float], most: int | None = None) -> Schema:
+def _numbers(bounds: Mapping[str, float], most: int | None = None, key: str = "") -> Schema:
     """Return one number, a list of them, or a range."""
-    several = {"type": "array", "minItems": 1, "items": _number(bounds)}
-    return {"anyOf": [_number(bounds), several | ({"maxItems": most} if most else {}), *RANGES]}
+    one = _number(bounds, key)
+    several = {"type": "array", "minItems": 1, "items": one}
+    alternatives = one.get("anyOf", [one])
+    return {"anyOf": [*alternatives, several | ({"maxItems": most} if most else {}), *RANGES]}
 
 
 def _ranges() -> list[Schema]:
@@ -166,11 +174,13 @@ def _words(allowed: Iterable[str]) -> Schema:
 def _value(key: str) -> Schema:
     """Return what `load` accepts for an argument that several functions share; anything for others."""
     if key in ONE_NUMBER:
-        return _number(ONE_NUMBER[key])
+        return _number(ONE_NUMBER[key], key)
     if key in NUMBERS:
-        return _numbers(NUMBERS[key])
+        return _numbers(NUMBERS[key], key=key)
     if key == "direction":
-        direction = {"anyOf": [{"enum": list(COMPASS)}, _number({"above": -1e9, "below": 1e9})]}
+        direction = {
+            "anyOf": [{"enum": [*COMPASS, *SPELLINGS["direction"]]}, _number({"above": -1e9, "below": 1e9})]
+        }
         return {"anyOf": [direction, {"type": "array", "items": direction}]}
     return {}
 
@@ -214,7 +224,9 @@ def _material() -> dict[str, Schema]:
         bounds = entry.metadata["bounds"]
         is_pair = entry.name in PAIRS
         several = is_pair or entry.name == "yield_pressure"
-        properties[entry.name] = _numbers(bounds, 2 if is_pair else None) if several else _number(bounds)
+        properties[entry.name] = (
+            _numbers(bounds, 2 if is_pair else None, entry.name) if several else _number(bounds, entry.name)
+        )
     return properties
 
 
@@ -246,7 +258,7 @@ def _shared_texts(stages: Iterable[str]) -> dict[str, str]:
 def _want() -> Schema:
     from fractalcontact import dimensions  # only here: it imports the estimators
 
-    words = dict(WANTED) | {"dimensions": ("default", *dimensions.methods())}
+    words = dict(WANTED) | {"dimensions": ("default", *dimensions.methods(), *SPELLINGS["dimensions"])}
     properties = {key: _words(words[key]) if key in words else FLAG for key in WANT_KEYS}
     return _table(properties, OWN) | {"minProperties": 1}
 

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.results import provenance_of
-from fractalcontact.base.units import number, quantity_text
+from fractalcontact.base.units import jrc_text, number, quantity_text
 from fractalcontact.scenes._result_tables import (
     MEMBER,
     ROUNDING,
@@ -138,9 +138,20 @@ def _outside_scale(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 
 def _jrc(state: xr.Dataset) -> Any:
-    """Return the roughness coefficient; words for one beyond the scale."""
+    """Return the roughness coefficient; words for one below the scale."""
     value = state["roughness_coefficient"]
-    return "below 0" if value.ndim == 0 and float(value) < 0 else value
+    return value if value.ndim else jrc_text(float(value))
+
+
+def _jrc_scatter(state: xr.Dataset) -> str | None:
+    """Return the ends of the scatter of the profiles; words for those below the scale."""
+    names = ("roughness_coefficient_low", "roughness_coefficient_high")
+    if not set(names) <= set(state.variables):
+        return None
+    low, high = (float(state[name].mean()) for name in names)
+    if not np.isfinite(low + high):
+        return "none"
+    return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))
 
 
 roughness_coefficient = Rows(
@@ -148,7 +159,7 @@ roughness_coefficient = Rows(
     (
         Column("JRC", _jrc, 1),
         Column("slope Z2", "profile_slope", 3),
-        Column("scatter of the profiles", ("roughness_coefficient_low", "roughness_coefficient_high"), 1),
+        Column("scatter of the profiles", _jrc_scatter),
     ),
     _outside_scale,
 )  # fmt: skip
@@ -296,7 +307,9 @@ def _greatest_shear(state: xr.Dataset) -> Any:
 
 
 def _mean_slope(state: xr.Dataset) -> str | None:
-    return plain(state["mean_slope"], 4, sign=True) if "mean_slope" in state else None
+    """Return the slope of the mean plane; None of a face that is level to the digits shown."""
+    is_shown = "mean_slope" in state and float(abs(state["mean_slope"]).max()) >= 0.5e-4
+    return plain(state["mean_slope"], 4, sign=True) if is_shown else None
 
 
 rigid_dilatancy = Rows(

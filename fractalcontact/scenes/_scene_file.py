@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.compass import AZIMUTHS
+from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.lengths import UNITS
+from fractalcontact.base.units import pascals
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
 from fractalcontact.scenes._functions import arguments_of
 from fractalcontact.scenes._plan import check_needs, stages_of
@@ -55,7 +58,7 @@ NOT_IN_KEYS = re.compile(r"[^\w\s.\"'-]")
 KEY_PART = re.compile(r"[\w\"']\s*\.")
 DEEPEST = 8  # levels of tables and lists; a scene has four
 TOO_DEEP = "tables or lists are nested too deeply: expected a table, its sub-tables and lists in them"
-COMPASS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
+COMPASS = tuple(AZIMUTHS)
 
 # bounds of the arguments that several stages share: one number, or one or several
 ONE_NUMBER: dict[str, dict[str, Any]] = {
@@ -87,6 +90,13 @@ SYMBOLS = {
     "nu": "poisson",
     "h": "hurst",
 }
+# arguments in Pa, which may have their unit, and words for others
+PRESSURES = (
+    "young", "hardness", "yield_pressure", "contact_modulus", "nominal_pressure", "seating_pressure",
+    "wall_strength", "tensile_strength", "upstream_pressure", "downstream_pressure", "drain_pressure",
+    "total_stress",
+)  # fmt: skip
+SPELLINGS: dict[str, dict[str, str]] = {"direction": AZIMUTH_WORDS, "dimensions": {"psd": "spectrum"}}
 PAIRS = ("young", "poisson")  # one value, or that of each body
 
 
@@ -159,7 +169,8 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
         return scene, problems  # the check loads every function whose arguments the tables may name
     if _is_too_deep(scene.tables):
         raise InvalidInput(problems.where, [TOO_DEEP])
-    tables = {key: _expand_ranges(value, key, problems) for key, value in scene.tables.items()}
+    tables = {key: _in_plain_words(value, key) for key, value in scene.tables.items()}
+    tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
     for name in TABLES:
         if not isinstance(tables.get(name, {}), dict):
             problems.add(name, "a table", tables[name])
@@ -201,6 +212,20 @@ def _find(path: Path) -> Path:
     raise UnreadableFile(
         "scene", [f"path: expected a scene file or one of {names}, got {path.name!r}: no such file"]
     )
+
+
+def _in_plain_words(value: Any, key: str) -> Any:
+    """Replace what the commands understand as well: "30 GPa", "west", and "psd" for the spectrum."""
+    if isinstance(value, dict):
+        return {word: _in_plain_words(item, word) for word, item in value.items()}
+    if isinstance(value, list):
+        return [_in_plain_words(item, key) for item in value]
+    if not isinstance(value, str):
+        return value
+    if key in PRESSURES:
+        pressure = pascals(value)
+        return value if pressure is None else pressure
+    return SPELLINGS.get(key, {}).get(value, value)
 
 
 def _expand_ranges(value: Any, key: str, problems: Problems) -> Any:

@@ -323,3 +323,37 @@ def test_key_of_another_table_is_named_first(write):
     assert first.startswith("material.JRC: ")
     assert "an unknown key: 'roughness_coefficient' belongs to [joint." in first
     assert second.startswith("material.young: ")
+
+
+def test_words_of_the_commands_are_understood(tmp_path):
+    """Pressures with their unit, directions in words, and psd."""
+    text = """
+[surface]
+generate = "fbm"
+shape = [48, 48]
+spacing = 2e-4
+hurst = 0.8
+rms_increment = 1e-6
+[material]
+young = ["30 GPa", "2e11"]
+poisson = 0.2
+hardness = "1.5GPa"
+[joint]
+shear = 0.0
+direction = "west"
+nominal_pressure = ["0.5 MPa", 2e6]
+[want]
+joints = ["closure"]
+dimensions = ["psd"]
+"""
+    path = tmp_path / "words.toml"
+    path.write_text(text)
+    scene = fc.scenes.load(path)
+    assert scene.material.young == [30e9, 2e11]
+    assert scene.material.hardness == 1.5e9
+    assert scene.table("joint")["direction"] == "W"
+    assert scene.table("joint")["nominal_pressure"] == [0.5e6, 2e6]
+    assert scene.want.dimensions == ("spectrum",)
+    path.write_text(text.replace("30 GPa", "30 GN").replace("west", "left"))
+    with pytest.raises(InvalidInput, match=r"(?s)young.*30 GN.*left"):
+        fc.scenes.load(path)

@@ -317,3 +317,17 @@ def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):
     np.testing.assert_array_equal(stored["spot_size"], alone["spot_size"])
     count = int(fc.domains.islands(state)["n_islands"][-1, -1])
     assert rows(tree, "islands")[-1]["islands"] == str(count)
+
+
+def test_slope_of_a_level_face_is_left_out():
+    """A mean slope that rounds to zero is no result."""
+    dilatancy = fc.joints.dilatancy(
+        fc.joints.Crack(fc.surfaces.spectral((32, 32), 1e-4, hurst=0.8, rms_slope=0.1, rng=1)),
+        shear=[0, 1e-4],
+    )
+    tree = xr.DataTree.from_dict({"/joints/rigid_dilatancy": dilatancy})
+    assert "rigid dilatancy" in fc.scenes.summary(tree)
+    assert "slope of face" not in fc.scenes.summary(tree)
+    tilted = tree.copy()
+    tilted["joints/rigid_dilatancy"] = dilatancy.assign(mean_slope=dilatancy.mean_slope + 0.01)
+    assert "+0.0100" in fc.scenes.summary(tilted)

@@ -224,13 +224,33 @@ def test_spikes_of_a_roughness_scan(scans, capsys):
     out = " ".join(capsys.readouterr().out.split())
     count = int(re.search(r"spikes of a scan: (\d+) of \[surface\]", out)[1])
     assert 15 <= count <= 20
-    without, given = map(float, re.search(r"JRC is (\S+), not (\S+), toward E", out).groups())
-    assert given == pytest.approx(jrc["spiked"], abs=1)
-    assert without == pytest.approx(jrc["clean"], abs=1)
-    assert main(["roughness", "spiked.nc", "--despike", "-o", "clean"]) == 0
+    without, given = re.search(r"JRC is (.+?), not (\S+), toward E", out).groups()
+    assert float(given) == pytest.approx(jrc["spiked"], abs=1)
+    assert jrc["clean"] < 0
+    assert without == "below 0"
+    dimension, with_spikes = re.search(r"D is (\S+), not (\S+),", out).groups()  # of the same estimator
+    assert re.search(rf"default {with_spikes}", out)
+    assert main(["roughness", "spiked.nc", "--despike", "--level", "1", "-o", "clean"]) == 0
+    cleaned = fc.open("clean/result.nc")["dimensions/fractal_dimension"].sel({"method": "default"})
+    assert f"{float(cleaned):.2f}" == dimension
     out = " ".join(capsys.readouterr().out.split())
     assert "stand out" not in out
     assert f"{count} points removed as spikes" in out
+
+
+def test_jrc_below_its_scale_is_said_in_words(scans, capsys):
+    """Nearly smooth: the regression gives negative numbers, which no table and no remark shows."""
+    smooth = 1e-2 * fc.open("lower.nc").load()
+    spiked = smooth.copy(deep=True)
+    spiked.values[20:80:12, 20:80:12] += 1e-3
+    fc.save(smooth, "smooth.nc")
+    fc.save(spiked, "spiked.nc")
+    for name in ("smooth", "spiked"):
+        assert main(["roughness", f"{name}.nc", "-o", name]) == 0
+        out = " ".join(capsys.readouterr().out.split())
+        assert "below 0" in out
+        assert not re.search(r"(?<=\s)-\d", out), out
+    assert "JRC is below 0, not" in out
 
 
 def test_swapped_faces_are_refused(scans, capsys):
