@@ -181,7 +181,7 @@ def _draw_fit(above: LinePanel, below: LinePanel, fit: xr.Dataset, names: tuple[
     style = {"color": _style.RED, "marker": ""}
     above.line("fit", ends, np.exp(level + slope * np.log(ends)), lw=1.4, **style)
     below.line("fit", ends, [slope] * 2, lw=1.2, **style)
-    text = f"slope {slope:.2f}\n" + rf"$\Delta$ = {dimension:.2f}"
+    text = f"slope {slope:.2f}\n" + f"$D$ = {dimension:.2f}"
     place, side = (0.96, "right") if slope < 0 else (0.04, "left")
     above.ax.text(place, 0.96, text, transform=above.ax.transAxes, va="top", color=_style.RED, ha=side)
 
@@ -220,7 +220,7 @@ def dimensions(
     >>> estimates = fc.dimensions.estimate(surface, ["default", "variogram"])
     >>> ax = fc.plotting.dimensions(estimates, truth=2.2)
     >>> print([label.get_text() for label in ax.get_yticklabels()], "|", ax.get_xlabel())
-    ['default', 'variogram'] | fractal dimension $\Delta$
+    ['default', 'variogram'] | fractal dimension $D$
     """
     names, dims = ("method", "hurst", "fractal_dimension"), ("method",)
     data = result_of(estimates, "dimensions", names, dims, argument="estimates")

@@ -33,7 +33,7 @@ SHORT = {
     "shear_strength": r"shear strength $\tau$",
     "box_dimension": r"box dimension $\Delta_\sigma$",
     "lacunarity": r"lacunarity $\Lambda$",
-    "fractal_dimension": r"fractal dimension $\Delta$",
+    "fractal_dimension": "fractal dimension $D$",
     "area": "island area",
     "cube_size": "cube edge",
     "variation": "height variation",
