@@ -77,8 +77,8 @@ def sample(name: str) -> xr.DataArray:
     Parameters
     ----------
     name : str
-        "concrete_crack": a synthetic crack face, 512 x 512 points 80 um apart; its script is in `datasets`. It
-        is no part of the scene of that name, which makes a smoother face of its own.
+        "concrete_crack": a synthetic crack face, 512 x 512 points 80 um apart; its script is in `datasets`.
+        The scene of that name makes a smoother face of its own.
         "jacksboro_fault_dem": a measured land surface of 344 x 403 points, about 93 m by 74 m apart, in
         integer metres, from matplotlib.
         "freiberg_gneiss_side_a", "freiberg_gneiss_side_b", "afm_10um_di3", "wli_126um_opd1": measured
