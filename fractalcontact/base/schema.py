@@ -42,54 +42,26 @@ class Quantity:
 OPEN, CONTACT, YIELDED = 0, 1, 2
 STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
 SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
-_STATE = {
-    "flag_values": np.array([OPEN, CONTACT, YIELDED], dtype=np.int8),
-    "flag_meanings": "open contact yielded",
-}
 
-_STOP_REASONS = (
-    "converged",
-    "rounding",
-    "stagnated",
-    "iteration_limit",
-    "force_missed",
-    "beyond_full_contact",
-)
-STOP_REASONS = {name: np.int8(value) for value, name in enumerate(_STOP_REASONS)}
-_STOP = {
-    "flag_values": np.array(list(STOP_REASONS.values()), dtype=np.int8),
-    "flag_meanings": " ".join(STOP_REASONS),
-}
 
+def _flags(meanings: str, first: int = 0) -> dict[str, Any]:
+    """Return the CF attributes of flags that count from `first`."""
+    count = len(meanings.split())
+    return {"flag_values": np.arange(first, first + count, dtype=np.int8), "flag_meanings": meanings}
+
+
+_STATE = _flags("open contact yielded")
+_STOP = _flags("converged rounding stagnated iteration_limit force_missed beyond_full_contact")
+STOP_REASONS = dict(zip(_STOP["flag_meanings"].split(), _STOP["flag_values"], strict=True))
 STICK, SLIP = 1, 2
-_SLIP_STATE = {
-    "flag_values": np.array([OPEN, STICK, SLIP], dtype=np.int8),
-    "flag_meanings": "open stick slip",
-}
-_SLIP_METHOD = {
-    "flag_values": np.array([0, 1], dtype=np.int8),
-    "flag_meanings": "superposition full",
-}
+_SLIP_STATE = _flags("open stick slip")
+_SLIP_METHOD = _flags("superposition full")
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")  # that `partial_slip` can return
-
 CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  # that `press` can return
-
-_EVENT = {
-    "flag_values": np.array([0, 1, 2, 3, 4, 5], dtype=np.int8),
-    "flag_meanings": "continuation birth death merge split merge_and_split",
-}
-_SIGNATURE = {
-    "flag_values": np.arange(7, dtype=np.int8),
-    "flag_meanings": "measured empty full no_window filled too_few unresolved",
-}
-_SCALE_POSITION = {
-    "flag_values": np.array([-1, 0, 1], dtype=np.int8),
-    "flag_meanings": "below inside above",
-}
-_PREFERRED_LAW = {
-    "flag_values": np.array([0, 1, 2, 3], dtype=np.int8),
-    "flag_meanings": "undecided exponential hyperbolic neither",
-}
+_EVENT = _flags("continuation birth death merge split merge_and_split")
+_SIGNATURE = _flags("measured empty full no_window filled too_few unresolved")
+_SCALE_POSITION = _flags("below inside above", first=-1)
+_PREFERRED_LAW = _flags("undecided exponential hyperbolic neither")
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_FACET = {"comment": "NaN where no facet faces the shear"}
@@ -97,10 +69,13 @@ _NO_WATER = {"comment": "NaN where no water comes from an edge or a drain"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
 
-def _with_ends(name: str, units: str, long_name: str, words: str = "") -> dict[str, Quantity]:
-    """Return the rows of a quantity and of the ends of its 95 % interval, called `words` there."""
+def _with_ends(
+    name: str, units: str, long_name: str, attributes: dict[str, Any] | None = None, share: str = "95 % "
+) -> dict[str, Quantity]:
+    """Return the rows of a quantity and of the ends of its interval, to which alone the attributes belong."""
+    of = f"{share}interval of the {name.replace('_', ' ').replace('minkowski', 'Minkowski')}"
     ends = {
-        f"{name}_{short}": Quantity(units, f"{end} end of the 95 % interval of the {words or long_name}")
+        f"{name}_{short}": Quantity(units, f"{end} end of the {of}", attributes or {})
         for short, end in (("low", "lower"), ("high", "upper"))
     }
     return {name: Quantity(units, long_name), **ends}
@@ -160,13 +135,7 @@ QUANTITIES: dict[str, Quantity] = {
     # dimensions
     "method": Quantity(None, "estimator"),
     "hurst": Quantity("1", "Hurst exponent"),
-    "fractal_dimension": Quantity("1", "fractal dimension"),
-    "fractal_dimension_low": Quantity(
-        "1", "lower end of the 95 % confidence interval of the fractal dimension", _NO_INTERVAL
-    ),
-    "fractal_dimension_high": Quantity(
-        "1", "upper end of the 95 % confidence interval of the fractal dimension", _NO_INTERVAL
-    ),
+    **_with_ends("fractal_dimension", "1", "fractal dimension", _NO_INTERVAL),
     "note": Quantity(None, "remarks on the estimate"),
     "reason": Quantity(None, "why there is no interval, or no estimate"),
     "window_rule": Quantity(None, "how the scales of the fit were chosen"),
@@ -190,12 +159,8 @@ QUANTITIES: dict[str, Quantity] = {
     "isotropy_p_value": Quantity(
         "1", "p value of isotropy: probability that an isotropic surface differs as much"
     ),
-    "anisotropy_ratio": Quantity("1", "ratio of the longest to the shortest correlation length"),
-    "anisotropy_ratio_low": Quantity(
-        "1", "lower end of the 95 % confidence interval of the anisotropy ratio", _NO_INTERVAL
-    ),
-    "anisotropy_ratio_high": Quantity(
-        "1", "upper end of the 95 % confidence interval of the anisotropy ratio", _NO_INTERVAL
+    **_with_ends(
+        "anisotropy_ratio", "1", "ratio of the longest to the shortest correlation length", _NO_INTERVAL
     ),
     "anisotropy_azimuth": Quantity("degree", "azimuth of the longer correlation (E = 0, anticlockwise)"),
     "anisotropy_p_value": Quantity(
@@ -315,20 +280,12 @@ QUANTITIES: dict[str, Quantity] = {
     "peak_strength_shear": Quantity("m", "shear from which the greatest shear strength extends"),
     "shear_stress": Quantity("Pa", "shear stress on the block, positive towards its direction"),
     "point": Quantity("1", "point of the path of shear"),
-    "closure_length": Quantity("m", "closure in which the pressure grows by e, of the exponential law"),
-    "reference_pressure": Quantity("Pa", "pressure at zero closure of the exponential law"),
+    **_with_ends("closure_length", "m", "closure in which the pressure grows by e, of the exponential law"),
+    **_with_ends("reference_pressure", "Pa", "pressure at zero closure of the exponential law"),
     "exponential_misfit": Quantity("m", "root mean square difference from the exponential law"),
-    "initial_stiffness": Quantity("Pa m-1", "normal stiffness at zero pressure of the hyperbolic law"),
-    "greatest_closure": Quantity("m", "greatest closure of the hyperbolic law"),
+    **_with_ends("initial_stiffness", "Pa m-1", "normal stiffness at zero pressure of the hyperbolic law"),
+    **_with_ends("greatest_closure", "m", "greatest closure of the hyperbolic law"),
     "hyperbolic_misfit": Quantity("m", "root mean square difference from the hyperbolic law"),
-    "closure_length_low": Quantity("m", "lower end of the 95 % interval of the closure length"),
-    "closure_length_high": Quantity("m", "upper end of the 95 % interval of the closure length"),
-    "reference_pressure_low": Quantity("Pa", "lower end of the 95 % interval of the reference pressure"),
-    "reference_pressure_high": Quantity("Pa", "upper end of the 95 % interval of the reference pressure"),
-    "initial_stiffness_low": Quantity("Pa m-1", "lower end of the 95 % interval of the initial stiffness"),
-    "initial_stiffness_high": Quantity("Pa m-1", "upper end of the 95 % interval of the initial stiffness"),
-    "greatest_closure_low": Quantity("m", "lower end of the 95 % interval of the greatest closure"),
-    "greatest_closure_high": Quantity("m", "upper end of the 95 % interval of the greatest closure"),
     "preferred_law": Quantity("1", "law that the closures of the first loading prefer", _PREFERRED_LAW),
     "law_score": Quantity("1", "statistic of Vuong, exponential against hyperbolic law"),
     "seating_pressure": Quantity("Pa", "nominal pressure from which the closure is counted"),
@@ -373,9 +330,7 @@ QUANTITIES: dict[str, Quantity] = {
     "variogram_dimension": Quantity("1", "dimension by the variogram"),
     "spectrum_dimension": Quantity("1", "dimension by the power spectral density"),
     "delta_height": Quantity("m", "root mean square height of the delta-surface"),
-    "decorrelation_length": Quantity("m", "shear at which the facing heights have decorrelated"),
-    "decorrelation_length_low": Quantity("m", "lower end of the 95 % interval of the decorrelation length"),
-    "decorrelation_length_high": Quantity("m", "upper end of the 95 % interval of the decorrelation length"),
+    **_with_ends("decorrelation_length", "m", "shear at which the facing heights have decorrelated"),
     "missing_reason": Quantity(None, "why a value or its interval is missing"),
     "shift_x": Quantity("m", "shift of the upper face along x"),
     "shift_y": Quantity("m", "shift of the upper face along y"),
@@ -422,15 +377,10 @@ QUANTITIES: dict[str, Quantity] = {
     "side": Quantity("m", "side of the square"),
     "window_low": Quantity("m", "shortest side of a square in the window"),
     "window_high": Quantity("m", "longest side of a square in the window"),
-    **_with_ends("spot_size", "m", "4 coverage over perimeter per area, the diameter of discs", "spot size"),
-    **_with_ends("gap_size", "m", "square that meets the set at half of its positions", "gap size"),
+    **_with_ends("spot_size", "m", "4 coverage over perimeter per area, the diameter of discs"),
+    **_with_ends("gap_size", "m", "square that meets the set at half of its positions"),
     **_with_ends("gap_size_ratio", "1", "gap size over that of the state before"),
-    **_with_ends(
-        "pair_correlation_length",
-        "m",
-        "distance up to which the pair correlation exceeds 2",
-        "pair-correlation length",
-    ),
+    **_with_ends("pair_correlation_length", "m", "distance up to which the pair correlation exceeds 2"),
     **_with_ends("domain_dimension", "1", "box dimension of the domain over the window"),
     **_with_ends("domain_dimension_change", "1", "box dimension less that of the state before"),
     "local_dimension_min": Quantity("1", "least local box dimension in the window"),
@@ -438,20 +388,11 @@ QUANTITIES: dict[str, Quantity] = {
     "spots_dimension": Quantity("1", "box dimension of random spots of equal area, widths and number"),
     **_with_ends("excess_dimension", "1", "box dimension less that of random spots"),
     **_with_ends("excess_dimension_change", "1", "excess dimension less that of the state before"),
-    **_with_ends(
-        "clustering", "1", "squares that meet random spots over those that meet the set", "clustering"
-    ),
+    **_with_ends("clustering", "1", "squares that meet random spots over those that meet the set"),
     **_with_ends("clustering_ratio", "1", "clustering over that of the state before"),
-    **_with_ends(
-        "integral_range", "m2", "integral range: area of an independent patch of the set", "integral range"
-    ),
+    **_with_ends("integral_range", "m2", "integral range: area of an independent patch of the set"),
     **_with_ends("integral_range_ratio", "1", "integral range over that of the state before"),
-    **_with_ends(
-        "lacunarity_ratio",
-        "1",
-        "lacunarity less 1 of boxes along x over that of boxes along y",
-        "lacunarity ratio",
-    ),
+    **_with_ends("lacunarity_ratio", "1", "lacunarity less 1 of boxes along x over that of boxes along y"),
     "hit_fraction": Quantity("1", "share of positions at which the square meets the set"),
     "spots_fraction": Quantity("1", "share of positions at which the square meets random spots"),
     "median_cells": Quantity("1", "number of cells of the median island"),
@@ -462,7 +403,7 @@ QUANTITIES: dict[str, Quantity] = {
     "box_measure": Quantity(
         "1", "number of boxes that meet the set, cut boxes by their part inside the mask"
     ),
-    "box_dimension": Quantity("1", "box dimension of the set"),
+    **_with_ends("box_dimension", "1", "box dimension of the set", _NO_INTERVAL, share=""),
     "null_dimension": Quantity("1", "box dimension of the random null of equal coverage"),
     "null_spread": Quantity("1", "standard deviation of the box dimension of the random null"),
     "box_local_slope": Quantity("1", "local box dimension, -d ln(box_measure)/d ln(box_size)"),
@@ -475,44 +416,24 @@ QUANTITIES: dict[str, Quantity] = {
     "coverage": Quantity("1", "fraction of the observed cells in the set"),
     "is_saturated": Quantity("1", "more than half of the largest boxes meet the islands of the set"),
     "follows_power_law": Quantity("1", "the local slopes of the window agree with one power law"),
-    "minkowski_dimension": Quantity("1", "Minkowski dimension of the set"),
-    "minkowski_dimension_low": Quantity(
-        "1", "lower end of the interval of the Minkowski dimension", _NO_INTERVAL
-    ),
-    "minkowski_dimension_high": Quantity(
-        "1", "upper end of the interval of the Minkowski dimension", _NO_INTERVAL
-    ),
+    **_with_ends("minkowski_dimension", "1", "Minkowski dimension of the set", _NO_INTERVAL, share=""),
     "radius": Quantity("1", "radius by which the set is dilated, in cells"),
     "radius_length": Quantity("m", "radius by which the set is dilated"),
     "grown_fraction": Quantity("1", "area within the radius of the set over the observed area"),
     "null_fraction": Quantity("1", "area within the radius of the random null over the observed area"),
-    "correlation_dimension": Quantity("1", "correlation dimension of the set"),
-    "correlation_dimension_low": Quantity(
-        "1", "lower end of the interval of the correlation dimension", _NO_INTERVAL
-    ),
-    "correlation_dimension_high": Quantity(
-        "1", "upper end of the interval of the correlation dimension", _NO_INTERVAL
-    ),
+    **_with_ends("correlation_dimension", "1", "correlation dimension of the set", _NO_INTERVAL, share=""),
     "mean_mass": Quantity("1", "mean number of cells of the set in a square around one of them"),
     "null_mass": Quantity("1", "mean number of cells of the random null in a square around one of them"),
     **_with_ends("lacunarity", "1", "gliding-box lacunarity"),
     "null_lacunarity": Quantity("1", "lacunarity of the random null of equal coverage"),
     "normalised_lacunarity": Quantity("1", "lacunarity minus 1 over that of single cells minus 1"),
-    "box_dimension_low": Quantity("1", "lower end of the interval of the box dimension", _NO_INTERVAL),
-    "box_dimension_high": Quantity("1", "upper end of the interval of the box dimension", _NO_INTERVAL),
-    "boundary_dimension_low": Quantity(
-        "1", "lower end of the interval of the dimension of the boundary", _NO_INTERVAL
-    ),
-    "boundary_dimension_high": Quantity(
-        "1", "upper end of the interval of the dimension of the boundary", _NO_INTERVAL
-    ),
     "area_dimension": Quantity("1", "dimension of the set by its area at several resolutions"),
     "resolution": Quantity("m", "spacing to which the contact is resolved"),
     "boundary_sides": Quantity("1", "number of sides of cells on the boundary of the set"),
     "largest_share": Quantity("1", "share of the set in its largest island", _NO_ISLAND),
     "singularity_strength": Quantity("1", "singularity strength alpha(q)"),
     "singularity_spectrum": Quantity("1", "singularity spectrum f(alpha(q))"),
-    "boundary_dimension": Quantity("1", "dimension of the boundary of the set"),
+    **_with_ends("boundary_dimension", "1", "dimension of the boundary of the set", _NO_INTERVAL, share=""),
     "moment_order": Quantity("1", "order q of the moment"),
     "generalised_dimension": Quantity("1", "generalised dimension D_q"),
     "mass_exponent": Quantity("1", "mass exponent tau(q)"),
@@ -588,14 +509,8 @@ QUANTITIES: dict[str, Quantity] = {
     "noise": Quantity("1", "rms height of white noise over the rms increment"),
     "marks": Quantity("1", "amplitude of an oblique wave over the rms increment"),
     "least_error": Quantity("1", "least standard deviation of the Hurst exponent (Cramer-Rao bound)"),
-    "error_ratio": Quantity("1", "root mean square error over the Cramer-Rao bound"),
-    "error_ratio_low": Quantity("1", "lower end of the 95 % interval of the error over the Cramer-Rao bound"),
-    "error_ratio_high": Quantity(
-        "1", "upper end of the 95 % interval of the error over the Cramer-Rao bound"
-    ),
-    "interval_coverage": Quantity("1", "share of the 95 % intervals that hold the true exponent"),
-    "interval_coverage_low": Quantity("1", "lower end of the 95 % interval of the coverage"),
-    "interval_coverage_high": Quantity("1", "upper end of the 95 % interval of the coverage"),
+    **_with_ends("error_ratio", "1", "root mean square error over the Cramer-Rao bound"),
+    **_with_ends("interval_coverage", "1", "share of the 95 % intervals that hold the true exponent"),
     "interval_share": Quantity("1", "share of the surfaces with an interval"),
     "member_count": Quantity("1", "number of surfaces"),
 }
