@@ -5,6 +5,8 @@ A function that knows more states it itself, in the attributes `reason` or `comm
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
@@ -64,11 +66,15 @@ REASONS = {
 }
 
 
-def give_reasons(result: xr.Dataset | xr.DataArray) -> None:
-    """Set the attribute `reason` of every variable or coordinate with NaN that states none, in place."""
+def give_reasons(result: xr.Dataset | xr.DataArray, own: Mapping[str, str]) -> None:
+    """Set the attribute `reason` of every variable or coordinate with NaN that states none, in place.
+
+    `own` are the reasons of the function that made the result; they go before those of this module.
+    """
+    reasons = {**REASONS, **own}
     variables = result.variables if isinstance(result, xr.Dataset) else result.coords.variables
-    for name in variables.keys() & REASONS.keys():
+    for name in variables.keys() & reasons.keys():
         variable = variables[name]
         stated = "reason" in variable.attrs or "NaN" in variable.attrs.get("comment", "")
         if variable.dtype.kind == "f" and not stated and np.isnan(variable.values).any():
-            variable.attrs["reason"] = REASONS[str(name)]
+            variable.attrs["reason"] = reasons[str(name)]

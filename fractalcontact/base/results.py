@@ -53,6 +53,7 @@ R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
 PLACES_SHOWN = 5  # in a warning
 WORK = {"transforms": "pairs of transforms", "iterations": "iterations"}
+NO_REASONS: Mapping[str, str] = {}
 ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 
 
@@ -79,6 +80,7 @@ def public_result(
     error: type[InvalidInput] = InvalidInput,
     in_blocks: bool = False,
     memory: Estimate = ARRAYS,
+    reasons: Mapping[str, str] = NO_REASONS,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
 
@@ -101,6 +103,8 @@ def public_result(
     memory : float or callable
         Bytes that a call takes at its peak beyond its arguments: for each cell of its largest array, or
         ``memory(plane, arguments)`` (see `base.memory`). More than may be taken is refused beforehand.
+    reasons : mapping
+        Why a variable of the result has NaN, by name, where the function does not state it itself.
     """
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
@@ -156,7 +160,7 @@ def public_result(
                 result = _with_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
             result = label(result, keep_notes=True)
-            give_reasons(result)
+            give_reasons(result, reasons)
             result = stamp(result, name, parameters, **entries)
             if notes:
                 result.attrs["history"] += f" (surface: {notes})"

@@ -64,7 +64,6 @@ _SCALE_POSITION = _flags("below inside above", first=-1)
 _PREFERRED_LAW = _flags("undecided exponential hyperbolic neither")
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
-_NO_FACET = {"comment": "NaN where no facet faces the shear"}
 _NO_WATER = {"comment": "NaN where no water comes from an edge or a drain"}
 _NO_ISLAND = {"comment": "NaN where the set is empty"}
 
@@ -303,7 +302,7 @@ QUANTITIES: dict[str, Quantity] = {
     "regression_interval": Quantity("m", "sampling interval to which the regression was fitted"),
     "area_fraction": Quantity("1", "share of the area that faces the shear"),
     "theta_max": Quantity("degree", "greatest apparent dip towards the shear"),
-    "shape": Quantity("1", "exponent C of the area over the apparent dip", _NO_FACET),
+    "shape": Quantity("1", "exponent C of the area over the apparent dip"),
     "roughness_metric": Quantity("degree", "directional roughness theta_max/(C+1)"),
     "mean_dip": Quantity("degree", "mean apparent dip of the area that faces the shear"),
     "shear_displacement": Quantity("m", "shear displacement of the block with its elastic part"),

@@ -55,7 +55,12 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     return node * plane.cells / plane.planes * min(plane.planes, thread_count())
 
 
-@public_result(title="Elastic contact of a rough surface", check=_check, memory=_memory)
+@public_result(
+    title="Elastic contact of a rough surface",
+    reasons=dict.fromkeys(("contact_stiffness", "relative_conductance"), NO_STIFFNESS),
+    check=_check,
+    memory=_memory,
+)
 def press(
     surface: xr.DataArray,
     *,
@@ -243,6 +248,3 @@ def _add_reasons(result: xr.Dataset) -> None:
         for name in UNDETERMINED:
             if name in result.variables:
                 result[name].attrs["reason"] = BEYOND_REASON
-    if "contact_stiffness" in result and bool(result["contact_stiffness"].isnull().any()):
-        for name in ("contact_stiffness", "relative_conductance"):
-            result[name].attrs["reason"] = NO_STIFFNESS

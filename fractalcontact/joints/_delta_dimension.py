@@ -49,6 +49,7 @@ def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, window
     title="dimension of the delta-surface",
     references=PAPER,
     achieved_error="not given: an interval of such a slope would have no stated coverage",
+    reasons=dict.fromkeys(("variogram_dimension", "spectrum_dimension"), FLAT),
     check=_check,
 )
 def delta_dimension(
@@ -128,8 +129,6 @@ def delta_dimension(
     )
     for name in ("variogram_dimension", "spectrum_dimension"):
         result[name].attrs["comment"] = DIFFERENCE_QUOTIENT
-        if flat.any():
-            result[name].attrs["reason"] = FLAT
     return result
 
 

@@ -27,6 +27,7 @@ from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, 
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+FIRST = "NaN before the first step"
 MAPS = ("residual_lower", "residual_upper")
 LARGEST_STEP = 8  # cells along an axis in which the block comes back onto the grid
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
@@ -86,7 +87,16 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         problems.require(bool(reach <= travel + 1e-6 * step), "path", expected, float(reach))
 
 
-@public_result(title="direct shear test", achieved_error="that of one step of shear per cell", check=_check)
+@public_result(
+    title="direct shear test",
+    achieved_error="that of one step of shear per cell",
+    reasons={
+        "friction_angle": FIRST,
+        "dilatancy_angle": FIRST,
+        "shear_stiffness": "NaN where the faces have no compliance of their own",
+    },
+    check=_check,
+)
 def direct_shear(
     crack: Crack,
     path: float | Sequence[float] | Array,
@@ -311,13 +321,9 @@ def _dataset(
     variables |= {"shear_stiffness": ("nominal_pressure", finite), "peak_distance": length}
     variables["basic_friction_angle"] = crack.basic_friction_angle
     result = xr.Dataset(variables, {"nominal_pressure": pressures, "point": np.arange(positions.size)})
-    for name in ("friction_angle", "dilatancy_angle"):
-        result[name].attrs["reason"] = "NaN before the first step"
     if np.isnan(columns["shear_stress"]).any():
         for name in (*columns, *peaks, "shear_displacement"):
             result[name].attrs["reason"] = "; ".join(sorted({test.reason for test in tests} - {""}))
-    if np.isnan(finite).any():
-        result["shear_stiffness"].attrs["reason"] = "NaN where the faces have no compliance of their own"
     return result.transpose("point", "nominal_pressure")
 
 

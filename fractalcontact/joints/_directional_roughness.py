@@ -42,6 +42,7 @@ def _check(problems: Problems, *, surface: Any, direction: Any) -> None:
     title="directional roughness",
     references=REFERENCES,
     achieved_error="exact to rounding, but for shape and roughness_metric, which are a fit",
+    reasons={"shape": NO_FACET},
     check=_check,
 )
 def directional_roughness(
@@ -102,13 +103,10 @@ def directional_roughness(
     facets = _facets(np.asarray(surface.values, dtype=np.float64), read_grid(surface).spacing)
     measures = np.array([_facing(facets, towards.unit) for towards in directions])
     names = ("area_fraction", "theta_max", "shape", "roughness_metric", "mean_dip")
-    result = xr.Dataset(
+    return xr.Dataset(
         {name: ("azimuth", values) for name, values in zip(names, measures.T, strict=True)},
         coords={"azimuth": [towards.azimuth for towards in directions]},
     )
-    if np.isnan(result["shape"]).any():
-        result["shape"].attrs["reason"] = NO_FACET
-    return result
 
 
 class Facets(NamedTuple):

@@ -35,7 +35,6 @@ NOT_KNOWN = (
     "depends on the distance in a way that is not known: the shears resolve one only, or the faces lock"
 )
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
-ERROR = "that of the dilatancy"
 # a window given as a decimal must not lose a point to rounding, nor one of two equally near points
 WINDOW_ROUNDING = 1.0 + 1e-9
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
@@ -86,7 +85,13 @@ def _check(
         problems.require(short, "distance", f"at most the {reach:g} m that the shears cover", distance)
 
 
-@public_result(title="friction of a joint", references=REFERENCES, achieved_error=ERROR, check=_check)
+@public_result(
+    title="friction of a joint",
+    references=REFERENCES,
+    achieved_error="that of the dilatancy",
+    reasons={"shear_strength": LOCKED},
+    check=_check,
+)
 def friction(
     dilatancy: xr.Dataset,
     *,
@@ -340,7 +345,6 @@ def _dependence(secants: xr.DataArray) -> str:
 
 def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
     """State how the peaks depend on the distance, and why values are missing."""
-    mark_locked(result, ("shear_strength",))
     locked = bool((secants >= LOCKED_ANGLE).any())
     unresolved = bool(np.isnan(secants.sel(distance=float(result["peak_distance"])).values).all())
     reason = "; ".join([LOCKED] * locked + [UNRESOLVED] * unresolved)
@@ -349,13 +353,6 @@ def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
             result[name].attrs["comment"] = _dependence(secants)
         if name in result and bool(np.isnan(result[name].values).any()):
             result[name].attrs["reason"] = reason
-
-
-def mark_locked(result: xr.Dataset, names: Sequence[str]) -> None:
-    """Add the reason to the variables that are NaN where the faces lock."""
-    for name in names:
-        if name in result and bool(np.isnan(result[name].values).any()):
-            result[name].attrs["reason"] = LOCKED
 
 
 def _dilatancy_name(dilatancy: xr.Dataset) -> str:

@@ -27,6 +27,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.partial_slip"
 LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient
+STIFFNESSES = ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio")
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 BLOCK_ROUNDING = 1e-3  # above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same
 
@@ -80,6 +81,7 @@ def _shear_path(
 @public_result(
     title="Partial slip of a joint",
     references=PAPER,
+    reasons=dict.fromkeys(STIFFNESSES, RIGID),
     check=_check,
     memory=360.0,  # of a cell: both directions of a free body (320), delta-surface and flat block
 )
@@ -178,11 +180,8 @@ def partial_slip(
     coords |= {"tangential_force": ("step", np.array(path.forces))}
     coords |= {"direction": towards.name, "azimuth": towards.azimuth}
     result = xr.Dataset(variables, coords | (block_coords(crack) if names else {}))
-    for name in ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio"):
-        finite = np.isfinite(result[name])
-        if not finite.all():
-            result[name] = result[name].where(finite)
-            result[name].attrs["reason"] = RIGID
+    for name in STIFFNESSES:
+        result[name] = result[name].where(np.isfinite(result[name]))
     by_superposition = result["slip_method"] == contact_solver.METHODS.index("superposition")
     errors = result["superposition_error"].where(by_superposition, 0.0).values
     worst = int(np.argmax(np.abs(errors)))

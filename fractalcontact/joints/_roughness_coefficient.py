@@ -83,6 +83,11 @@ def _check(
     title="joint roughness coefficient",
     references=REFERENCES,
     achieved_error="that of the correlation with the slope, which is empirical",
+    reasons={
+        "roughness_coefficient": STRAIGHT,
+        "roughness_coefficient_low": FEW_PROFILES,
+        "roughness_coefficient_high": FEW_PROFILES,
+    },
     check=_check,
 )
 def roughness_coefficient(
@@ -213,7 +218,7 @@ def _coefficient(law: Regression, slope: Any) -> Any:
 
 
 def _add_notes(result: xr.Dataset) -> None:
-    """Say which values are extrapolated or missing, and where the lag is not that of the regression."""
+    """Say which values are extrapolated, and where the lag is not that of the regression."""
     comments = []
     if (result["scale_position"] != INSIDE).any():
         comments.append(OUTSIDE)
@@ -222,11 +227,6 @@ def _add_notes(result: xr.Dataset) -> None:
         comments.append("the lag in use is not the sampling interval of the regression")
     if comments:
         result["roughness_coefficient"].attrs["comment"] = "; ".join(comments)
-    if np.isnan(result["roughness_coefficient"]).any():
-        result["roughness_coefficient"].attrs["reason"] = STRAIGHT
-    for name in ("roughness_coefficient_low", "roughness_coefficient_high"):
-        if np.isnan(result[name]).any():
-            result[name].attrs["reason"] = FEW_PROFILES
 
 
 def _lag_cells(spacing: Sequence[float], towards: Direction, lag: float) -> list[int]:

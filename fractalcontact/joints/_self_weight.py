@@ -17,7 +17,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._dilatancy import dilatancy
-from fractalcontact.joints._friction import LOCKED_ANGLE, mark_locked
+from fractalcontact.joints._friction import LOCKED, LOCKED_ANGLE
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -53,7 +53,11 @@ def _check(
         dilatancy.validate(crack, shear=shear, direction=direction, **loads, **solver)
 
 
-@public_result(title="shear strength of a joint under self-weight", check=_check)
+@public_result(
+    title="shear strength of a joint under self-weight",
+    reasons={"shear_strength": LOCKED, "strength_exponent": NO_EXPONENT},
+    check=_check,
+)
 def self_weight(
     crack: Crack,
     *,
@@ -140,9 +144,6 @@ def self_weight(
     result["friction_angle"].attrs["comment"] = MEAN_ANGLE
     if _is_rigid(crack):
         result["shear_strength"].attrs["comment"] = RIGID_FACES
-    mark_locked(result, ("shear_strength",))
-    if np.isnan(exponents).any():
-        result["strength_exponent"].attrs["reason"] = NO_EXPONENT
     if "residual" in result:
         result.attrs["achieved_residual"] = float(result["residual"].max())
     return result.assign_attrs(references=slid.attrs["references"])

@@ -83,6 +83,7 @@ def _usable(surface: Any, needed: dict[str, Any]) -> tuple[str, ...]:
     title="strength envelope",
     references=STRENGTH_REFERENCES,
     achieved_error="that of the criteria, which are empirical",
+    reasons=dict.fromkeys(("shear_strength", "friction_angle"), NO_STRENGTH),
     check=_check,
 )
 def strength_envelope(
@@ -243,9 +244,6 @@ def _explain(result: xr.Dataset, has_surface: bool) -> None:
     """Give the labels of the strength, where it is out of range, and why values are missing."""
     result["shear_strength"].attrs["long_name"] = "peak shear strength"
     result["friction_angle"].attrs["long_name"] = "angle whose tangent is the strength over the normal stress"
-    if result["shear_strength"].isnull().any():
-        for name in ("shear_strength", "friction_angle"):
-            result[name].attrs["reason"] = NO_STRENGTH
     if not result["in_range"].all():
         result["shear_strength"].attrs["comment"] = OUTSIDE
     unknown = (

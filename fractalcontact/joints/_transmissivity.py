@@ -16,28 +16,9 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import periodic_axes, read_grid
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.joints._flow_network import (
-    Network,
-    cell_flows,
-    check_gap,
-    conducting,
-    dissipation,
-    edge_conductance,
-    least_flow,
-    line_of,
-    link_network,
-    narrow_cells,
-    nothing_held,
-    spanning_cells,
-    winding_cells,
-)
-from fractalcontact.joints._network_pressure import (
-    ERROR,
-    FLOW_BYTES,
-    UNKNOWN,
-    nested_dissection,
-    pressures,
-)
+from fractalcontact.joints import _flow_network
+from fractalcontact.joints._flow_network import Network
+from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -62,11 +43,17 @@ def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic:
     problems.number("viscosity", viscosity, above=0, optional=True)
     problems.boolean("periodic", periodic, optional=True)
     problems.choices("keep", keep, MAPS)
-    if check_gap(problems, gap, RESULTS):
+    if _flow_network.check_gap(problems, gap, RESULTS):
         problems.periodic("periodic", periodic, read_grid(gap))
 
 
-@public_result(title="transmissivity of a joint", references=REFERENCES, check=_check, memory=FLOW_BYTES)
+@public_result(
+    title="transmissivity of a joint",
+    references=REFERENCES,
+    reasons=dict.fromkeys(("transmissivity", "hydraulic_aperture", "flow_conductance"), UNKNOWN),
+    check=_check,
+    memory=FLOW_BYTES,
+)
 def transmissivity(
     gap: xr.DataArray,
     *,
@@ -161,7 +148,7 @@ def transmissivity(
             "residual": (dims, np.reshape([flow.residual for flow in flows], shape)),
             "aperture": (leading, np.maximum(values, 0.0).mean(axis=(-2, -1))),
             "open_fraction": (leading, (values > 0).mean(axis=(-2, -1))),
-            "narrow_fraction": (leading, narrow_cells(values).mean(axis=(-2, -1))),
+            "narrow_fraction": (leading, _flow_network.narrow_cells(values).mean(axis=(-2, -1))),
             "overlap_fraction": (leading, (values < -rounding).mean(axis=(-2, -1))),
         },
         coords=leading_coords(gap, leading, taken=RESULTS),
@@ -181,14 +168,12 @@ def transmissivity(
 
 
 def _warn(result: xr.Dataset) -> None:
-    """State which cells were closed; warn of flows that are not known, and give the reason."""
+    """State which cells were closed; warn of flows that are not known."""
     if result["narrow_fraction"].any():
         result["transmissivity"].attrs["comment"] = NARROW
     unknown = int(result["transmissivity"].isnull().sum())
     if not unknown:
         return
-    for name in {"transmissivity", "hydraulic_aperture", "flow_conductance"} & set(result):
-        result[name].attrs["reason"] = UNKNOWN
     message = f"{WHERE}: {unknown} of {result['transmissivity'].size} flows not known: {UNKNOWN}"
     warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
@@ -224,13 +209,13 @@ def plane_flows(
     order : ndarray
         All cells (flat indices) in the order in which elimination takes them.
     """
-    gap = conducting(gap)
+    gap = _flow_network.conducting(gap)
     largest = float(gap.max())
     if not largest > 0:
         return [_no_flow(gap.shape)] * len(axes)
     unit = float(np.ldexp(1.0, int(np.frexp(largest)[1])))
     cells = (gap / unit) ** 3
-    network = link_network(cells, ratio, wraps)
+    network = _flow_network.link_network(cells, ratio, wraps)
     flows = [_flow_along(axis, network, cells, ratio, order, repeats=wraps[axis]) for axis in axes]
     return [
         replace(flow, conductivity=flow.conductivity * unit**3, flux=flow.flux * unit**3) for flow in flows
@@ -245,20 +230,20 @@ def _flow_along(
     axis: int, network: Network, cells: Array, ratio: float, order: Array, *, repeats: bool
 ) -> Flow:
     """Return the flow along an axis; lengths are in units of the spacing of x."""
-    held, ends = nothing_held(cells.shape), []
+    held, ends = _flow_network.nothing_held(cells.shape), []
     if repeats:
         network = replace(network, jump=(network.closes & (network.axis == axis)).astype(np.float64))
-        inside = winding_cells(network)
+        inside = _flow_network.winding_cells(network)
     else:
-        ends = [edge_conductance(cells, ratio, axis, place) for place in (0, -1)]
+        ends = [_flow_network.edge_conductance(cells, ratio, axis, place) for place in (0, -1)]
         for place, end, level in zip((0, -1), ends, (1.0, 0.0), strict=True):
-            held.add(line_of(axis, place), end, level)
-        inside = spanning_cells(network, axis, ends)
+            held.add(_flow_network.line_of(axis, place), end, level)
+        inside = _flow_network.spanning_cells(network, axis, ends)
     if not inside.any():
         return _no_flow(cells.shape)
     pressure, error = pressures(network, inside, order, held, axis)
-    flow = dissipation(network, pressure, inside, held)
-    least = least_flow(network, axis, inside, ends)
+    flow = _flow_network.dissipation(network, pressure, inside, held)
+    least = _flow_network.least_flow(network, axis, inside, ends)
     residual = max(least / flow - 1.0, error)
     if not residual <= ERROR:
         return Flow(
@@ -268,7 +253,7 @@ def _flow_along(
     length, width = (n * step for n, step in zip(cells.shape, spacing, strict=True))
     if axis == 1:
         length, width = width, length
-    flows = cell_flows(network, pressure, inside, axis, ends)
+    flows = _flow_network.cell_flows(network, pressure, inside, axis, ends)
     flux = flows * length / 12.0 / np.array(spacing[::-1])[:, None, None]
     pressure = np.where(inside.reshape(cells.shape), pressure, np.nan)
     return Flow(flow * length / width, True, residual, pressure, flux)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,8 +33,7 @@ LOCKED = (
 UNLOADED = 0.5  # the elastic stiffness is that of unloading to this share of the load
 
 
-@dataclass(frozen=True)
-class State:
+class State(NamedTuple):
     """The joint under a load: height of the block and closure (m), energies (J), and what is worn off (m)."""
 
     height: float
@@ -45,8 +44,7 @@ class State:
     contact_fraction: float
 
 
-@dataclass(frozen=True)
-class ShearStep:
+class ShearStep(NamedTuple):
     """One step of shear and the state at its end.
 
     `load` P on the contacts (N) is constant over the step. `rise` d is that of the block over its slip, and
@@ -183,7 +181,7 @@ def balanced_step(
     for turn in range(MAX_SOLUTIONS):
         span = above[0] - below[0]
         share = above[0] / span if span > 0 else 0.0
-        step = _mean(above[1], below[1], share)
+        step: ShearStep = _mean(above[1], below[1], share)
         is_narrow = high - low <= LOAD_ERROR or min(above[0], -below[0]) <= LOAD_ERROR
         if is_narrow and abs(excess(step)) <= LOAD_ERROR:
             joint.wear(there, step.state)
@@ -197,17 +195,11 @@ def balanced_step(
     return LOCKED
 
 
-def _mean(first: ShearStep, second: ShearStep, share: float) -> ShearStep:
-    """Return the mean of two steps, the second with this share."""
-
-    def mix(one: Any, two: Any) -> Any:
-        if isinstance(one, State):
-            return State(*(mix(getattr(one, each.name), getattr(two, each.name)) for each in fields(State)))
-        return one + share * (two - one)
-
-    return ShearStep(
-        *(mix(getattr(first, each.name), getattr(second, each.name)) for each in fields(ShearStep))
-    )
+def _mean(first: Any, second: Any, share: float) -> Any:
+    """Return the mean of two steps or of two of their numbers, the second with this share."""
+    if isinstance(first, (ShearStep, State)):
+        return type(first)(*(_mean(one, other, share) for one, other in zip(first, second, strict=True)))
+    return first + share * (second - first)
 
 
 def _moved(
