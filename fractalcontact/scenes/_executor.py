@@ -118,6 +118,11 @@ def _start_worker() -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
+def may_share(points: int) -> bool:
+    """Whether a copy of this process may take part of the work on a surface of so many points."""
+    return points <= SMALL_SURFACE and can_fork()
+
+
 def run_tasks(
     tasks: Mapping[int, Task[R]],
     store: PartStore,
@@ -142,7 +147,7 @@ def run_tasks(
         if result is not None:
             yield number, result
         rest = (time.perf_counter() - start) * len(left)
-        if len(left) > 1 and points <= SMALL_SURFACE and rest > WORTH_A_COPY and can_fork():
+        if len(left) > 1 and rest > WORTH_A_COPY and may_share(points):
             break
     numbers, half = list(left), threads.thread_count() // 2
 

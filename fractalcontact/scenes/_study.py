@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import xarray as xr
 
-from fractalcontact.base import signals
+from fractalcontact.base import signals, threads
+from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.scenes._checkpoint import PartStore, digest
-from fractalcontact.scenes._executor import Workers, run_tasks
+from fractalcontact.scenes._executor import Workers, may_share, run_tasks
 from fractalcontact.scenes._inputs import plane_share
 from fractalcontact.scenes._parts import (
     PartWithReaders,
@@ -23,6 +25,9 @@ from fractalcontact.scenes._parts import (
 from fractalcontact.scenes._plan import stages_of, stored_maps
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES, Stage
+
+# parts, joined result and seconds of each stage
+_Finished = dict[str, tuple[dict[int, xr.Dataset], xr.Dataset | None, float]]
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,13 +74,55 @@ class Study:
     def run(self, stop: signals.Stop) -> list[str]:
         """Run the stages in order; return what is missing if a stop was requested.
 
-        The surfaces come first, so that faces which do not fit are refused before a part is kept.
+        The surfaces come first, so that faces which do not fit are refused before a part is kept. What only
+        describes the surface then runs beside the contact, in a copy of this process where there may be one.
         """
         stages = sorted(
             (stage for stage in self.plan if stage.name != FIGURES),
             key=lambda stage: stage.row.takes != "file",
         )
-        for number, stage in enumerate(track(stages, self.progress, self.scene.name, unit="stage")):
+        faces = [stage for stage in stages if stage.row.takes == "file"]
+        rest = stages[len(faces) :]
+        missing = self._run_stages(faces, stop, show=False)
+        if missing:
+            return missing + [stage.name for stage in rest]
+        chains = [rest]
+        is_alone = self.workers is None and self.scene.surface.member is None
+        if is_alone and any(stage.row.presses for stage in rest) and may_share(self._points):
+            beside = [stage for stage in rest if self._describes_surface(stage)]
+            chains = [[stage for stage in rest if stage not in beside], *([beside] if beside else [])]
+
+        def run_chain(number: int) -> tuple[list[str], _Finished]:
+            half = threads.thread_count() // 2
+            with threads.limit(half) if number else nullcontext():
+                lacking = self._run_stages(chains[number], stop, show=number == 0)
+            finished = {
+                stage.name: (self.parts[stage.name], self.results.get(stage.name), self.spent[stage.name])
+                for stage in chains[number]
+                if stage.name in self.spent
+            }
+            return lacking, finished
+
+        for _, (lacking, finished) in calls_in_two_processes(run_chain, len(chains)):
+            missing += lacking
+            for name, (parts, result, spent) in finished.items():
+                self.parts[name], self.spent[name] = parts, spent
+                if result is not None:
+                    self.results[name] = result
+        self.results = {
+            stage.name: self.results[stage.name] for stage in stages if stage.name in self.results
+        }
+        return missing
+
+    def _describes_surface(self, stage: Stage) -> bool:
+        """Whether a stage reads the surface alone, and no other stage reads its result."""
+        is_read = any(stage.name in other.needs for other in self.plan if other.name != FIGURES)
+        return stage.row.takes == "surface" and stage.needs == ("surfaces",) and not is_read
+
+    def _run_stages(self, stages: list[Stage], stop: signals.Stop, *, show: bool) -> list[str]:
+        """Run some stages in order; return what is missing if a stop was requested."""
+        bar = track(stages, show and self.progress, self.scene.name, unit="stage")
+        for number, stage in enumerate(bar):
             count = self._run_stage(stage, stop)
             total = len(self.works[stage.name].parts)
             if stop:
@@ -83,6 +130,11 @@ class Study:
                 part = [f"{stage.name} ({count} of {total} parts done)"] if count < total else []
                 return part + rest
         return []
+
+    @property
+    def _points(self) -> int:
+        """Points of the surface."""
+        return int(self.results["surfaces"]["height"].size) if "surfaces" in self.results else 0
 
     def _run_stage(self, stage: Stage, stop: signals.Stop) -> int:
         """Run the missing parts of a stage; return the number of finished ones."""
@@ -96,8 +148,7 @@ class Study:
         show_parts = self.progress and len(missing) > 1
         workers = self.workers if len(missing) > 1 else None
         tasks = self._tasks(stage, work, readers, missing)
-        points = self.results["surfaces"]["height"].size if "surfaces" in self.results else 0
-        finished = run_tasks(tasks, self.store, stop, workers, points=points)
+        finished = run_tasks(tasks, self.store, stop, workers, points=self._points)
         bar = track(finished, show_parts, stage.name, unit="part", total=len(missing))
         for number, (results, seconds) in bar:
             for name, result, spent in zip(names, results, seconds, strict=True):

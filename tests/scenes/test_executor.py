@@ -1,6 +1,7 @@
 """Workers that are remote, lost, stopped or not available."""
 
 import functools
+import json
 import multiprocessing
 import os
 import pickle
@@ -21,7 +22,9 @@ import fractalcontact as fc
 from fractalcontact import cli
 from fractalcontact.base import threads
 from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.signals import Stopped
+from fractalcontact.scenes._executor import may_share
 
 SWEEP = (
     SOUND.replace("rng = 5", "rng = 5\nmembers = 5").replace("[48, 48]", "[32, 32]").replace("2.4e-3", "1e-3")
@@ -231,6 +234,30 @@ def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, te
     for name in ("joints/closure", "joints/rigid_dilatancy"):
         for variable in set(serial[name].variables) - {"run_time"}:
             xr.testing.assert_identical(serial[name][variable].variable, shared[name][variable].variable)
+
+
+def test_surface_described_beside_the_contact_has_the_same_numbers(tmp_path, monkeypatch):
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+    wanted = 'surfaces = ["height", "describe"]\ndimensions = ["default", "spectrum"]\njoints = ['
+    (tmp_path / "study.toml").write_text(SOUND.replace("joints = [", wanted), encoding="utf-8")
+    serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    monkeypatch.setattr("fractalcontact.scenes._study.may_share", may_share)
+    counts = []
+
+    def counted(function, count):
+        counts.append(count)
+        return calls_in_two_processes(function, count)
+
+    monkeypatch.setattr("fractalcontact.scenes._study.calls_in_two_processes", counted)
+    shared = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert counts == [2]
+    stages = [json.loads(tree.attrs["provenance"])["stages"] for tree in (serial, shared)]
+    assert [*stages[0]] == [*stages[1]]
+    assert [node.path for node in serial.subtree] == [node.path for node in shared.subtree]
+    for node in serial.subtree:
+        for variable in set(node.variables) - {"run_time"}:
+            found = shared[node.path][variable].variable
+            xr.testing.assert_identical(node[variable].variable, found)
 
 
 def test_last_part_keeps_all_threads(tmp_path, monkeypatch):
