@@ -1,8 +1,4 @@
-"""Single waves of a surface, such as machining marks: found in the spectrum, named and removed.
-
-Strong waves are found in any surface by the modes around them (`_wave_peaks`), faint ones in a surface whose
-modes follow a smooth spectrum (`_faint_waves`).
-"""
+"""Single waves of a surface, such as machining marks: found in its white surface, named and removed."""
 
 from __future__ import annotations
 
@@ -15,30 +11,28 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
-from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._faint_waves import WhiteSurface
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._wave_peaks import LONGEST, Peak, tapered_peaks
+from fractalcontact.dimensions._white_surface import LONGEST, WhiteSurface, carrier, is_beside
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
-MOST = 32  # waves; more are a pattern
+MOST = 32  # waves that are no multiples; more are a pattern
 MOST_REPEATED = 0.1  # share of rows or columns: a surface enlarged by repetition
-_ROUNDS = 3
+_ROUNDS = 24  # of searches: strong waves hide faint ones
 _LEFT = 0.05  # of the mean square increment, below which many waves are all there is
 _NONE_LEFT = 1e-8
 _NAMED = 3  # waves in a note
 _MULTIPLES = 12  # of a wave that are looked for at their own places
 _DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
 _FEW = 3
-_ALMOST_SINGULAR = 1e-3  # of the larger singular value
 _BESIDE = 1.5  # modes from a wave that was subtracted
 _SAME = 0.5  # modes between a wave and the multiple that it is
-_MOST_MULTIPLES, _MISSED = 96, 6  # that are looked for where two are known, up to so many that are not there
+_MOST_MULTIPLES, _MISSED = 256, 6  # that are looked for where two are known, up to so many that are not there
+_CERTAIN = 8.0  # power of a wave over the expected one, once the strong ones beside it are gone
 _ON_COMB = 4.0  # power of such a multiple over the expected one: 2 % of the modes have it
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
@@ -114,6 +108,8 @@ class Wave:
         Per point.
     cosine, sine : float
         Amplitudes in the unit of the scaled heights, with the phase 0 at the first point.
+    on_comb : bool
+        Looked for at a multiple of others, whose frequency it has.
     """
 
     wavelength: float
@@ -123,6 +119,7 @@ class Wave:
     cycles: tuple[float, float]
     cosine: float
     sine: float
+    on_comb: bool = False
 
 
 def without_waves(surface: Surface) -> tuple[Surface, str]:
@@ -174,48 +171,64 @@ def find_waves(surface: Surface) -> list[Wave]:
     """
     if surface.repeated_share > MOST_REPEATED:
         return []
-    heights = surface.heights
-    window = tuple(
+    heights, shape = surface.heights, surface.heights.shape
+    crop = tuple(
         slice((n - size) // 2, (n - size) // 2 + size)
-        for n, size in ((n, min(n, LARGEST_CROP)) for n in heights.shape)
+        for n, size in zip(shape, np.minimum(shape, LARGEST_CROP), strict=True)
     )
-    is_periodic = all(surface.grid.periodic) and max(heights.shape) <= LARGEST_CROP
-    is_whole = max(heights.shape) <= LARGEST_CROP
+    is_whole = max(shape) <= LARGEST_CROP
+    is_periodic = all(surface.grid.periodic) and is_whole
+
+    def whitened(heights: Array, is_tapered: bool) -> WhiteSurface:
+        part = without_trend(heights, plane=not is_periodic)
+        spacing = surface.plane_spacing
+        return WhiteSurface.of(part, spacing, is_periodic=is_periodic, is_tapered=is_tapered)
+
     found: list[Wave] = []
-    part = without_trend(heights[window], plane=not is_periodic)
+    new: list[Wave] = []
+    is_tapered = not is_periodic  # strong waves first
     for _ in range(_ROUNDS):
-        tapers = [window_weights(n, None if is_periodic or n == 1 else "hann") for n in part.shape]
-        multiples = _multiples(found, part.shape, surface.axes)
-        tapered = part * tapers[0][:, None] * tapers[1]
-        peaks = tapered_peaks(tapered, surface.plane_spacing, surface.axes, multiples)
-        if len(peaks) > _MOST_MULTIPLES:
-            return []
-        new = [_measured(heights, peak, surface, is_periodic=is_periodic) for peak in peaks]
-        if not new:
-            break
+        if new and is_whole and not is_periodic:
+            # without strong waves the surface is whiter, and its waves are measured better
+            white = whitened(heights, is_tapered)
+            corrected = [_corrected(surface, wave, white) for wave in new]
+            heights = _subtracted(heights, new, -1.0)
+            new = [
+                wave
+                for wave, ratio in corrected
+                if is_tapered or ratio > min(_CERTAIN, -0.5 * np.log(max(wave.p_value, 1e-300)))
+            ]
+            heights = _subtracted(heights, new)
         found += new
-        if len(found) > MOST and len(_combs(found, part.shape)) > MOST:
+        if len(found) > MOST and len(_combs(found, heights.shape)) > MOST:
             return []
+        white = whitened(heights[crop], is_tapered)
+        new = _of_combs(surface, found, white) if is_whole and not is_tapered else []
+        peaks = [] if new else white.peaks(_related(found, white.white.shape))
+        whole = white if is_whole or not peaks else whitened(heights, is_tapered)
+        for peak in peaks:
+            at = peak.cycles if is_whole else whole.refined(peak.cycles, max(shape) / LARGEST_CROP)[0]
+            if beside := [wave for wave in found if is_beside(at, np.array(wave.cycles), shape)]:
+                # what a wave has left of itself: both are fitted as one
+                heights = _subtracted(heights, beside, -1.0)
+                found = [wave for wave in found if wave not in beside]
+                at, whole = np.array(beside[0].cycles), whitened(heights, is_tapered)
+            cycles, amplitudes = whole.fitted(at, peak.ratio)
+            new.append(_named(surface, cycles, amplitudes, peak.p_value))
         heights = _subtracted(heights, new)
-        part = without_trend(heights[window], plane=not is_periodic)
-    for _ in range(0 if _is_progression(found) else _ROUNDS):
-        white = WhiteSurface.of(part, surface.plane_spacing, is_periodic=is_periodic)
-        new = _of_combs(surface, found, white) if is_whole else []
-        faint = [] if new else white.peaks(LONGEST[surface.axes], _related(found, part.shape))
-        if faint and len(_combs(found, part.shape)) + len(faint) > MOST:
-            return []
-        for peak in faint:
-            if is_whole:
-                cosine, sine, _ = white.wave(_carrier(part.shape, peak.cycles))
-                new.append(_named(surface, peak.cycles, (cosine, sine), peak.p_value))
-            else:
-                new.append(_measured(heights, peak, surface, is_periodic=is_periodic))
-        if not new:
+        if not (new or is_tapered) or _is_progression(found):
             break
-        found += new
-        heights = _subtracted(heights, new)
-        part = without_trend(heights[window], plane=not is_periodic)
+        if is_tapered and not new:  # all of them are measured again, without the taper
+            is_tapered, found, new = False, [], found
     return sorted(found, key=lambda wave: -wave.amplitude)
+
+
+def _corrected(surface: Surface, wave: Wave, white: WhiteSurface) -> tuple[Wave, float]:
+    """Return a wave that was subtracted, with what is left of it in a white surface, and its power there."""
+    cycles, amplitudes = np.array(wave.cycles), np.array([wave.cosine, wave.sine])
+    shift, rest = (0.0, np.array(white.wave(cycles)[:2])) if wave.on_comb else white.step(cycles, amplitudes)
+    corrected = _named(surface, cycles + shift, amplitudes + rest, wave.p_value, on_comb=wave.on_comb)
+    return corrected, white.power_of(cycles, amplitudes + rest)
 
 
 def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, dict[int, Wave]]]:
@@ -275,12 +288,12 @@ def _unfolded(waves: Array, cycles: Array, shape: tuple[int, ...]) -> tuple[Arra
 
 def _of_combs(surface: Surface, found: Sequence[Wave], white: WhiteSurface) -> list[Wave]:
     """Return further multiples of waves of which two are known: as their places are, little is enough."""
-    shape, power = white.white.shape, None
+    shape, level = white.white.shape, None
     new: list[Wave] = []
     for base, members in _combs(found, shape):
         if len(members) < 2:
             continue
-        power = white.power() if power is None else power
+        level = level or white.level()
         missed = 0
         for multiple in range(1, _MOST_MULTIPLES):
             cycles = (base * multiple + 0.5) % 1.0 - 0.5
@@ -292,13 +305,12 @@ def _of_combs(surface: Surface, found: Sequence[Wave], white: WhiteSurface) -> l
                 < _BESIDE
             ):
                 continue
-            cosine, sine, ratio = white.wave(_carrier(shape, cycles))
-            ratio /= max(1.0, white.around(power, cycles)[0])
+            cosine, sine, ratio = white.wave(cycles)
+            ratio /= level.at(cycles)
             missed += 1
             if ratio > _ON_COMB:
                 missed = 0
-                at = float(cycles[0]), float(cycles[1])
-                new.append(_named(surface, at, (cosine, sine), float(np.exp(-ratio))))
+                new.append(_named(surface, cycles, (cosine, sine), float(np.exp(-ratio)), on_comb=True))
     return new
 
 
@@ -321,65 +333,12 @@ def _related(found: Sequence[Wave], shape: tuple[int, ...]) -> list[Array]:
     return related
 
 
-def _multiples(found: Sequence[Wave], shape: tuple[int, ...], axes: int) -> Array:
-    """Mark the modes at the multiples of waves, and those next to them."""
-    marked = np.zeros(shape, dtype=bool)
-    near = [(row, column) for row in ((0,) if axes == 1 else (-1, 0, 1)) for column in (-1, 0, 1)]
-    for wave in found:
-        for multiple in range(2, _MULTIPLES + 1):
-            cycles = multiple * np.array(wave.cycles)
-            if float(np.abs(cycles).max()) > 0.5:
-                break
-            for side in (-1, 1):
-                place = np.rint(side * cycles * shape).astype(np.int64)
-                for step in near:
-                    marked[tuple((place + step) % shape)] = True
-    return marked
-
-
-def _measured(heights: Array, peak: Peak, surface: Surface, *, is_periodic: bool) -> Wave:
-    """Return the wave near a frequency: the largest tapered mode between those of the transform."""
-    shape = heights.shape
-    tapers = [window_weights(n, None if is_periodic or n == 1 else "hann") for n in shape]
-    centred = heights - heights.mean()
-    best = np.array(peak.cycles)
-
-    def mode(at: Array) -> complex:
-        row, column = (
-            taper * np.exp(-2j * np.pi * frequency * np.arange(n))
-            for taper, frequency, n in zip(tapers, at, shape, strict=True)
-        )
-        return complex(row @ (centred @ column))
-
-    axes = [] if is_periodic else [axis for axis in (0, 1) if shape[axis] > 1]
-    crops = [min(n, LARGEST_CROP) for n in shape]
-    # the peak of a tapered mode is nearly a parabola in its logarithm; first on the crop's steps
-    for width in (0.5 * max(shape) / max(crops), 0.5, 0.2, 0.1, 0.05):
-        for axis in axes:
-            step = np.zeros(2)
-            step[axis] = width / shape[axis]
-            low, middle, high = (np.log(abs(mode(best + sign * step))) for sign in (-1, 0, 1))
-            bend = low - 2.0 * middle + high
-            shift = np.clip(0.5 * (low - high) / bend, -2.0, 2.0) if bend < 0 else np.sign(high - low)
-            best = best + shift * step
-    # least squares with the weights of the taper: near two spacings cosine and sine are not independent
-    value, whole = mode(best), float(np.prod([taper.sum() for taper in tapers]))
-    twice = np.prod(
-        [
-            taper @ np.exp(4j * np.pi * f * np.arange(len(taper)))
-            for taper, f in zip(tapers, best, strict=True)
-        ]
-    )
-    products = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]])
-    cosine, sine = np.linalg.pinv(products, rcond=_ALMOST_SINGULAR) @ (value.real, -value.imag)
-    return _named(surface, (float(best[0]), float(best[1])), (float(cosine), float(sine)), peak.p_value)
-
-
 def _named(
     surface: Surface,
-    cycles: tuple[float, float],
-    amplitudes: tuple[float, float],
+    cycles: Array,
+    amplitudes: Sequence[float] | Array,
     p_value: float,
+    on_comb: bool = False,
 ) -> Wave:
     """Return a wave of given cycles per point and amplitudes of its cosine and sine, in SI units."""
     waves_per_metre = np.array(cycles) / np.array(surface.spacing)
@@ -388,26 +347,19 @@ def _named(
         azimuth=float(np.degrees(np.arctan2(*waves_per_metre)) % 180.0),
         amplitude=float(np.hypot(*amplitudes)) * surface.unit,
         p_value=p_value,
-        cycles=cycles,
-        cosine=amplitudes[0],
-        sine=amplitudes[1],
+        cycles=(float(cycles[0]), float(cycles[1])),
+        cosine=float(amplitudes[0]),
+        sine=float(amplitudes[1]),
+        on_comb=on_comb,
     )
 
 
-def _subtracted(heights: Array, found: Sequence[Wave]) -> Array:
-    """Return heights without some waves."""
+def _subtracted(heights: Array, found: Sequence[Wave], factor: float = 1.0) -> Array:
+    """Return heights less `factor` times some waves."""
     result = heights.copy()
     for wave in found:
-        carrier = _carrier(heights.shape, wave.cycles)
-        carrier *= complex(wave.cosine, -wave.sine)
-        result -= carrier.real
+        result -= (carrier(heights.shape, wave.cycles) * (factor * complex(wave.cosine, -wave.sine))).real
     return result
-
-
-def _carrier(shape: tuple[int, ...], cycles: Sequence[float] | Array) -> Array:
-    """Return exp(i phase) of a wave."""
-    row, column = (np.exp(2j * np.pi * f * np.arange(n)) for f, n in zip(cycles, shape, strict=True))
-    return np.asarray(row[:, None] * column)
 
 
 def _mean_square_increment(heights: Array) -> float:

@@ -213,7 +213,7 @@ def limiting_amplitude(shape, hurst, wavelength):
         scale = quad(lambda q: (1 - np.cos(q)) * q ** (-1 - 2 * hurst), 0, 500, limit=3000)[0]
         shifts = 2 * np.pi * np.arange(-200, 201)
         density = np.pi / 2 / scale * np.sum(np.abs(wavenumber + shifts) ** (-1 - 2 * hurst))
-    octaves = np.log(n / 2.05 / (4.0 if axes == 2 else 12.0))
+    octaves = np.log(n / 2.05 / (4.0 if axes == 2 else 7.0))
     places = octaves * (np.pi * (n / wavelength) ** 2 if axes == 2 else n / wavelength)
     power = brentq(lambda u: u - np.log(places / 1e-3) - axes / 2 * np.log(np.pi * u / 3), 5.0, 40.0)
     return 2 * np.sqrt(power * density / np.prod(shape))
