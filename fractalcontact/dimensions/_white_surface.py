@@ -312,15 +312,14 @@ class WhiteSurface:
         power = self.power()
         search = self._search
         level = Level.of(power, self, search)
-        if (
-            not self._is_fourier and level.share > _UNEVEN
-        ):  # ridges, a lay: their modes are correlated without a taper
-            return []
+        if not self._is_fourier and level.share > _UNEVEN:
+            return []  # ridges, a lay: their modes are correlated without a taper
         relative = power / level.padded(power.shape, self._padded)
         rows, columns = np.nonzero(relative > _FIRST * level.limit(search.number_of_modes, self._continuous))
         places = [(int(row), int(column), 0) for row, column in zip(rows, columns, strict=True)]
         places += self._near_related(relative, related, search, level)
-        places = [place for place in places if power[place[:2]] > _SHADOW * max(power[p[:2]] for p in places)]
+        strongest = max((power[place[:2]] for place in places), default=0.0)
+        places = [place for place in places if power[place[:2]] > _SHADOW * strongest]
         found: list[Peak] = []
         done: list[tuple[Array, float]] = []
         ridges = max(_ON_RIDGES, len(places) // (4 if self._padded[0] > 1 else 2))

@@ -365,3 +365,16 @@ def test_directions_of_a_surface_of_which_little_was_observed(seed):
     missing = stream.random(heights.shape) < stream.choice([0.9, 0.95, 0.97, 0.98])
     result = fc.dimensions.directions(fc.surfaces.from_array(np.where(missing, np.nan, heights), 1.0))
     assert np.isfinite(result.hurst).any() or result.hurst.attrs["reason"]
+
+
+@pytest.mark.parametrize(
+    ("points", "hurst", "missing", "scales"),
+    [(40, 0.2, 0.0, None), (40, 0.8, 0.0, None), (40, 0.2, 0.2, None), (160, 0.6, 0.0, (3.4e-3, 1.4e-2))],
+)
+def test_standard_error_is_the_scatter(points, hurst, missing, scales):
+    """Complete, with gaps, and over lags that are taken on a coarser lattice; 60 members are known to 9 %."""
+    surfaces = brownian(points, hurst, 18, members=60)
+    surfaces = surfaces.where(np.random.default_rng(19).random((points, points)) >= missing)
+    result = fc.dimensions.directions(surfaces, [0.0, 45.0, 90.0], scales=scales)
+    ratio = result.fitted_hurst.std("member") / result.standard_error.median("member")
+    assert ratio.values == pytest.approx(1.0, abs=0.3)
