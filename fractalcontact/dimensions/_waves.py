@@ -25,6 +25,7 @@ MOST_REPEATED = 0.1  # share of rows or columns: a surface enlarged by repetitio
 _ROUNDS = 24  # of searches: strong waves hide faint ones
 _LEFT = 0.05  # of the mean square increment, below which many waves are all there is
 _NONE_LEFT = 1e-8
+_LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
 _NAMED = 3  # waves in a note
 _MULTIPLES = 12  # of a wave that are looked for at their own places
 _DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
@@ -214,7 +215,9 @@ def find_waves(surface: Surface) -> list[Wave]:
                 found = [wave for wave in found if wave not in beside]
                 at, whole = np.array(beside[0].cycles), whitened(heights, is_tapered)
             cycles, amplitudes = whole.fitted(at, peak.ratio)
-            new.append(_named(surface, cycles, amplitudes, peak.p_value))
+            wave = _named(surface, cycles, amplitudes, peak.p_value)
+            if _share(heights, wave) > _LEAST_SHARE:
+                new.append(wave)
         heights = _subtracted(heights, new)
         if not (new or is_tapered) or _is_progression(found):
             break
@@ -360,6 +363,15 @@ def _subtracted(heights: Array, found: Sequence[Wave], factor: float = 1.0) -> A
     for wave in found:
         result -= (carrier(heights.shape, wave.cycles) * (factor * complex(wave.cosine, -wave.sine))).real
     return result
+
+
+def _share(heights: Array, wave: Wave) -> float:
+    """Return the mean square increment of a wave over that of some heights, along both axes."""
+    total = sum(
+        float(np.mean(np.diff(heights, axis=axis) ** 2)) for axis in (0, 1) if heights.shape[axis] > 1
+    )
+    square = wave.cosine**2 + wave.sine**2
+    return float(square * np.sum(1.0 - np.cos(2.0 * np.pi * np.array(wave.cycles)))) / max(total, 1e-300)
 
 
 def _mean_square_increment(heights: Array) -> float:

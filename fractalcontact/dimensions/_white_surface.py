@@ -269,7 +269,10 @@ class WhiteSurface:
         slope = 2.0 * np.pi * (amplitudes[1] * wave.real - amplitudes[0] * wave.imag)
         parts = [wave.real.copy(), wave.imag.copy(), *(slope * places[axis] for axis in axes)]
         columns = np.stack([self.whiten(part).ravel() for part in parts])
-        scale = np.sqrt(np.maximum(np.sum(columns * columns, axis=1), 1e-300))
+        # columns that vanish, as those of the sine and the frequency at two spacings, stay small
+        size = np.sqrt(float(np.max(np.sum(columns[:2] ** 2, axis=1))))
+        slopes = 2.0 * np.pi / 3.0**0.5 * float(np.hypot(*amplitudes)) * shape[axes]
+        scale = max(size, 1e-150) * np.concatenate([np.ones(2), np.maximum(slopes, 1e-150)])
         columns /= scale[:, None]
         values = (
             np.linalg.pinv(columns @ columns.T, rcond=_ALMOST_SINGULAR)
