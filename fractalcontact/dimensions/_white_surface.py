@@ -318,7 +318,11 @@ class WhiteSurface:
         if not self._is_fourier and level.share > _UNEVEN:
             return []  # ridges, a lay: their modes are correlated without a taper
         relative = power / level.padded(power.shape, self._padded)
-        rows, columns = np.nonzero(relative > _FIRST * level.limit(search.number_of_modes, self._continuous))
+        least = level.limit(np.array(search.number(np.zeros(2))), self._continuous)  # of the longest waves
+        rows, columns = np.nonzero(relative > _FIRST * least)
+        limits = level.limit(search.number_of_modes[rows, columns], self._continuous)
+        is_above = relative[rows, columns] > _FIRST * limits
+        rows, columns = rows[is_above], columns[is_above]
         places = [(int(row), int(column), 0) for row, column in zip(rows, columns, strict=True)]
         places += self._near_related(relative, related, search, level)
         strongest = max((power[place[:2]] for place in places), default=0.0)
@@ -447,33 +451,27 @@ class Level:
         modes[0, last + 1 :] = right[0, nx - last - 1 : 0 : -1]
         modes[1:, last + 1 :] = right[:0:-1, nx - last - 1 : 0 : -1]
         counts = modes > 1e-9
-        clipped = modes
         sizes = [(1, edge) if ny == 1 else (edge, edge) for edge in (_WIDE[surface.axes], _NARROW)]
 
         def around(values: Array) -> Array:
             outer, inner = (uniform_filter(values, size, mode="wrap") * np.prod(size) for size in sizes)
             return np.asarray(outer - inner)
 
-        number = np.maximum(around(counts.astype(float)), 1.0)
-        for _ in range(2):
-            mean = around(clipped) / number
-            clipped = np.minimum(
-                modes, _CLIPPED * np.maximum(uniform_filter(mean, sizes[1], mode="wrap"), 1e-12)
-            )
-        inside = np.isfinite(search.number_of_modes[::py, ::px][:, : last + 1])
+        most = float(np.prod(sizes[0]) - np.prod(sizes[1]))
+        number = most if counts.all() else np.maximum(around(counts.astype(float)), 1.0)
+        mean = uniform_filter(modes, sizes[0], mode="wrap")
+        mean *= _CLIPPED
+        mean = around(np.minimum(modes, mean, out=mean)) / number
         values = np.log(np.maximum(mean, 1e-12))
         values[number < _SURROUNDED * np.prod(sizes[0])] = np.inf  # beside a cut-off nothing is compared
-        by_chance = (1.0 if surface.taper is None else _CORRELATED**surface.axes) / float(
-            np.prod(sizes[0]) - np.prod(sizes[1])
-        )
+        by_chance = (1.0 if surface.taper is None else _CORRELATED**surface.axes) / most
+        inside = np.isfinite(search.number_of_modes[::py, ::px][:, : last + 1])
         tested = values[:, : last + 1][inside]
         tested = tested[np.isfinite(tested)]
         square = float(np.mean(np.square(tested))) if tested.size else 0.0
         share = max(0.0, 1.0 - _BY_CHANCE * by_chance / max(square, 1e-12))
-        if (
-            surface.taper is not None
-        ):  # a strong wave may be most of its ring, which says nothing of the level
-            share = 1.0
+        if surface.taper is not None:
+            share = 1.0  # a strong wave may be most of its ring, which then says nothing of the level
         freedom = 1.0 / (share * by_chance * _INFLATED) if share > 0.0 else np.inf
         mean = np.where(np.isinf(values), np.inf, np.exp(share * np.minimum(values, 600.0)))
         return cls(modes, mean, freedom, share)
