@@ -166,7 +166,8 @@ def _refuse_turned_face(lower: Array, upper: Array, offset: Pair, rotates: bool,
     for axis in TURNS:
         if find_pose(lower, turned_over(upper, axis), offset, rotates, tilts).is_certain:
             cure = (
-                f"expected faces seen from above, got one scanned face up: it fits with turn_upper={axis!r}"
+                f"expected faces seen from above, got one scanned face up: it fits with turn_upper={axis!r} "
+                f"(--turn-upper {axis})"
             )
             raise InvalidInput(WHERE, [f"upper: {cure}"])
 
