@@ -27,7 +27,9 @@ UNDETERMINED = (
 )  # fmt: skip
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
 SMALL_PLANE = 512 * 512  # nodes up to which surfaces are pressed side by side, each on one thread
-SIDE_BY_SIDE = 8  # surfaces for each thread between two steps of the progress bar
+# surfaces for each thread between two steps of the progress bar; 2 and 32 took 1.15 and .86 of the processor
+# time with 64 surfaces of 64 x 64 points, once each
+SIDE_BY_SIDE = 8
 INCLUDE = ("stiffness", "pressure_distribution")
 NO_STIFFNESS = (
     "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
