@@ -1,8 +1,8 @@
 """The command `fractalcontact`: run a scene, answer a question, measure accuracy, show what a file has.
 
-Exit codes: 0 success, 1 too little memory or an error of the file system, 2 invalid input (nothing was
-written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT finishes the current task and keeps the results; a
-second SIGINT stops at once.
+Exit codes: 0 success, 1 too little memory, an error of the file system, or some of many scans failed, 2
+invalid input (nothing was written), 130 or 143 stopped by SIGINT or SIGTERM. SIGINT finishes the current task
+and keeps the results; a second SIGINT stops at once.
 """
 
 from __future__ import annotations
@@ -13,11 +13,20 @@ import sys
 import textwrap
 import warnings
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory
+from fractalcontact.base.errors import (
+    FractalContactError,
+    InvalidInput,
+    MissingExtra,
+    ScaleWarning,
+    TooLittleMemory,
+)
+from fractalcontact.base.file_patterns import is_pattern
 from fractalcontact.base.memory import require_libraries
 from fractalcontact.base.process import block_dask_import, collect_garbage_less_often
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
@@ -33,10 +42,11 @@ QUESTIONS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    options = _parsers()[0].parse_args(arguments)
     if arguments is None:
         collect_garbage_less_often()
-        block_dask_import()
-    options = _parsers()[0].parse_args(arguments)
+        if getattr(options, "scheduler", None) is None:
+            block_dask_import()
     warnings.showwarning = _WarningPrinter()
     try:
         require_libraries()
@@ -92,13 +102,6 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
         "--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing"
     )
     _add_run_options(run)
-    run.add_argument(
-        "--workers",
-        type=int,
-        default=0,
-        metavar="N",
-        help="share members, shears and directions between N processes (default 0: this process)",
-    )
     run.set_defaults(action=_run)
 
     for question, line in QUESTIONS.items():
@@ -166,6 +169,19 @@ def _add_run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--force", action="store_true", help="overwrite results of another study and files of others"
     )
+    command.add_argument(
+        "--workers",
+        type=int,
+        default=0,
+        metavar="N",
+        help="share scans, members, shears and directions between N processes (default 0: this process)",
+    )
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="share them between the workers of this dask scheduler instead (tcp://host:8786); of many scans "
+        "they need the files and the folder of the results",
+    )
 
 
 def _pascal(text: str) -> float:
@@ -183,11 +199,17 @@ def _pascal(text: str) -> float:
 def _add_question(commands: Any, question: str, line: str) -> None:
     """Add a command that answers one question to a scan."""
     command = commands.add_parser(question, help=line)
-    command.add_argument("scan", help="file of the surface: every format of fractalcontact.surfaces.read")
-    if question == "joint":
-        command.add_argument(
-            "upper", help="file of the upper face: in the frame of the lower one, heights up, above it"
-        )
+    is_joint = question == "joint"
+    command.add_argument(
+        "scans",
+        nargs="+",
+        metavar="LOWER UPPER" if is_joint else "SCAN",
+        help="files of both faces, in one frame, heights up, the upper one above the lower; of many joints "
+        "all lower faces, then all upper ones in the same order, or a pattern for each in quotes"
+        if is_joint
+        else "files of the surfaces, or a pattern in quotes: every format of fractalcontact.surfaces.read",
+    )
+    if is_joint:
         command.add_argument(
             "--as-scanned", action="store_true", help="do not move the upper face into mated position"
         )
@@ -227,11 +249,13 @@ def _add_question(commands: Any, question: str, line: str) -> None:
     )
     command.add_argument("--spacing", type=float, help="distance between the points, or of the cells, in m")
     command.add_argument(
-        "-o", "--out", help="folder for the results (default: SCAN_QUESTION, without suffix)"
+        "-o",
+        "--out",
+        help="folder for the results (default: SCAN_QUESTION, without suffix; of many scans their folder)",
     )
     command.add_argument("--scene", action="store_true", help="print the scene and run nothing")
     _add_run_options(command)
-    command.set_defaults(action=_answer, question=question, plan=False, workers=0)
+    command.set_defaults(action=_answer, question=question, plan=False)
 
 
 def _answer(options: argparse.Namespace) -> int:
@@ -240,9 +264,12 @@ def _answer(options: argparse.Namespace) -> int:
 
     from fractalcontact import scenes
 
-    scan, folder = Path(options.scan), options.out
+    scan, upper = _scans(options)
+    several, folder = isinstance(scan, list) or is_pattern(scan), options.out
     if folder is None:
-        folder = f"{scan.name.partition('.')[0]}_{options.question}"
+        first = Path(scan[0] if isinstance(scan, list) else scan)
+        stem = first.resolve().parent.name.replace("*", "") if several else first.name.partition(".")[0]
+        folder = f"{stem}_{options.question}"
     arguments: dict[str, Any] = {
         name: getattr(options, name)
         for name in (
@@ -263,14 +290,13 @@ def _answer(options: argparse.Namespace) -> int:
         message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
-    if options.question == "roughness" and not options.scene:
+    if options.question == "roughness" and not options.scene and not several:
         from fractalcontact import surfaces
 
         reading = {name: arguments[name] for name in ("spacing", "units") if arguments[name] is not None}
         heights = surfaces.read(scan, **reading)
         if heights.dims == ("x",):
-            return _profile_roughness(heights, Path(folder), scan.name, options)
-    upper = getattr(options, "upper", None)
+            return _profile_roughness(heights, Path(folder), Path(scan).name, options)
     text = scenes.template(options.question, scan, upper, folder=place, **arguments)
     if options.scene:
         print(text)
@@ -292,6 +318,38 @@ def _answer(options: argparse.Namespace) -> int:
     finally:
         if Path(folder).is_dir() and not is_refused:  # also after a stop
             target.write_text(f"{_mark(text)}\n{text}", encoding="utf-8")
+
+
+def _scans(options: argparse.Namespace) -> tuple[Any, Any]:
+    """Return the file, files or pattern of a command, and those of the upper faces of joints."""
+    files = options.scans
+    if options.question != "joint":
+        return (files if len(files) > 1 else files[0]), None
+    half = len(files) // 2
+    lower, upper = files[:half], files[half:]
+    if len(lower) != len(upper):
+        got = f"{len(files)} files"
+        raise InvalidInput("fractalcontact joint", [f"expected as many lower as upper faces, got {got}"])
+    if half == 1:
+        return lower[0], upper[0]
+    pairs = list(zip(lower, upper, _own_parts(lower), _own_parts(upper), strict=True))
+    wrong = [f"{a} and {b}" for a, b, own, other in pairs if own != other]
+    if wrong:
+        remedy = "give patterns in quotes, or a scene with two lists"
+        expected = f"pairs of files whose names differ by the face alone ({remedy})"
+        raise InvalidInput("fractalcontact joint", [f"expected {expected}, got {', '.join(wrong)}"])
+    return lower, upper
+
+
+def _own_parts(names: Sequence[str]) -> list[str]:
+    """Return names without what they all begin and end with."""
+    rests = [name[_same_letters(names) :] for name in names]
+    return [rest[: len(rest) - _same_letters([each[::-1] for each in rests])] for rest in rests]
+
+
+def _same_letters(names: Sequence[str]) -> int:
+    """Return how many letters names have in common at their beginning."""
+    return len(list(takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))))
 
 
 def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.Namespace) -> int:
@@ -360,7 +418,8 @@ def _run(options: argparse.Namespace) -> int:
     speaks = not options.quiet
     out = Path(options.out or Path(str(options.scene)).stem)
     more = {"verbose": options.verbose, "workers": options.workers, "force": options.force}
-    scenes.run(options.scene, out=out, progress=speaks, summary=speaks, **more)
+    with _client(options.scheduler) as client:
+        tree = scenes.run(options.scene, out=out, progress=speaks, summary=speaks, client=client, **more)
     if speaks:
         from fractalcontact.base.tables import screen_width
 
@@ -371,7 +430,29 @@ def _run(options: argparse.Namespace) -> int:
         written = f"written to {out}: {files}{drawn}{_memory()}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
         print(f"next: open {out / 'report.html'} in a browser")
-    return 0
+    has_failed = "overview" in tree.children and (tree["overview/status"] == "failed").any()
+    return FAILED if has_failed else 0
+
+
+@contextmanager
+def _client(address: str | None) -> Iterator[Any]:
+    """Provide a client of a dask scheduler; None without an address."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise MissingExtra("--scheduler", "distributed", "dask") from error
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        expected = "the address of a running dask scheduler"
+        raise InvalidInput(
+            "fractalcontact run", [f"--scheduler: expected {expected}, got {address!r}"]
+        ) from error
+    with client:
+        yield client
 
 
 def _memory() -> str:

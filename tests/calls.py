@@ -110,6 +110,11 @@ def curve():
     return fc.dimensions.variogram(rough())
 
 
+def overview():
+    heights = ("scan", [1e-6, 2e-6, 4e-6], {"units": "m", "long_name": "rms height"})
+    return xr.Dataset({"rms_height": heights}, coords={"scan": ["a.sur", "b.sur", "c.sur"]})
+
+
 @functools.cache
 def roses():
     return fc.joints.directional_roughness(rough())
@@ -308,6 +313,7 @@ CALLS = {
     "plotting.uplift": lambda: {"result": watered()},
     "plotting.dimensions": lambda: {"estimates": estimates()},
     "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
+    "plotting.scans": lambda: {"overview": overview()},
     "plotting.directional_roughness": lambda: {"result": roses()},
     "plotting.strength_envelope": lambda: {"result": envelope()},
     "plotting.correlation": lambda: {"memory": memory()},

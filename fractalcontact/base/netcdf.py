@@ -16,7 +16,7 @@ import os
 import platform
 import shutil
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -81,10 +81,16 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
             problems.require(name.endswith(".nc"), "path", "a name that ends in '.nc'", name)
         is_labelled = isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree))
         problems.require(is_labelled, "result", "a DataArray, Dataset or DataTree", type(result).__name__)
-    target = Path(path)
     groups = _as_file(result)
     with Problems(where) as problems:
-        _check_words(problems, groups)
+        for name, dataset in groups.items():
+            _check_words(problems, name, dataset)
+    return save_groups(groups.items(), Path(path))
+
+
+def save_groups(groups: Iterable[tuple[str, xr.Dataset]], target: Path) -> Path:
+    """Write groups as they come, each by its path, with one of them in memory at a time; see `save`."""
+    where = SAVE
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
@@ -179,24 +185,23 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     return array
 
 
-def _check_words(problems: Problems, groups: Mapping[str, xr.Dataset]) -> None:
+def _check_words(problems: Problems, path: str, dataset: xr.Dataset) -> None:
     """Note names and attributes that a NetCDF file cannot hold."""
-    for path, dataset in groups.items():
-        group = path.strip("/")
-        place = f"result.{group}/" if group else "result."
-        owners = {"": dataset.attrs} | {f"{key}.": value.attrs for key, value in dataset.variables.items()}
-        for name in [*dataset.variables, *(dim for dim in dataset.dims if dim not in dataset.variables)]:
+    group = path.strip("/")
+    place = f"result.{group}/" if group else "result."
+    owners = {"": dataset.attrs} | {f"{key}.": value.attrs for key, value in dataset.variables.items()}
+    for name in [*dataset.variables, *(dim for dim in dataset.dims if dim not in dataset.variables)]:
+        expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
+        problems.require(_is_name(name), f"{place}name of a variable or dim", expected, name)
+    for owner, attributes in owners.items():
+        for key, value in attributes.items():
+            if owner and key in PACKING:
+                expected = "values that are unpacked, without this attribute of a file"
+                problems.add(f"{place}{owner}{key}", expected, value)
             expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
-            problems.require(_is_name(name), f"{place}name of a variable or dim", expected, name)
-        for owner, attributes in owners.items():
-            for key, value in attributes.items():
-                if owner and key in PACKING:
-                    expected = "values that are unpacked, without this attribute of a file"
-                    problems.add(f"{place}{owner}{key}", expected, value)
-                expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
-                problems.require(_is_name(key), f"{place}{owner}name of an attribute", expected, key)
-                expected = "text, a number or a list of them"
-                problems.require(_is_attribute(value), f"{place}{owner}{key}", expected, value)
+            problems.require(_is_name(key), f"{place}{owner}name of an attribute", expected, key)
+            expected = "text, a number or a list of them"
+            problems.require(_is_attribute(value), f"{place}{owner}{key}", expected, value)
 
 
 def _is_name(name: object) -> bool:
@@ -211,7 +216,7 @@ def _is_attribute(value: object) -> bool:
     return array.dtype.kind in "SUiuf" and array.ndim < 2
 
 
-def _write(data: Mapping[str, xr.Dataset], path: Path) -> None:
+def _write(groups: Iterable[tuple[str, xr.Dataset]], path: Path) -> None:
     """Write the groups of a file.
 
     Blocks of dask arrays are computed and written one by one, each under the lock.
@@ -220,16 +225,15 @@ def _write(data: Mapping[str, xr.Dataset], path: Path) -> None:
     from xarray.backends import NetCDF4DataStore
     from xarray.backends.common import ArrayWriter
 
-    for dataset in data.values():
-        for variable in dataset.variables.values():
-            if variable.chunks is None:
-                variable.load()  # a lazy array of another file needs the lock of xarray
     writer = ArrayWriter()  # type: ignore[no-untyped-call]
     with NETCDF_LOCK:
         file = netCDF4.Dataset(path, "w", format="NETCDF4")
     try:
-        with NETCDF_LOCK:
-            for name, dataset in data.items():
+        for name, dataset in groups:
+            for variable in dataset.variables.values():
+                if variable.chunks is None:
+                    variable.load()  # a lazy array of another file needs the lock of xarray
+            with NETCDF_LOCK:
                 store = NetCDF4DataStore(file, group=name, mode="w", lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
                 dataset.dump_to_store(store, writer=writer)
         writer.sync()  # type: ignore[no-untyped-call]

@@ -89,6 +89,7 @@ QUANTITIES: dict[str, Quantity] = {
     "direction": Quantity(None, "direction in which the block slides (E is +x, N is +y)"),
     "azimuth": Quantity("degree", "azimuth (E = 0, anticlockwise)"),
     "member": Quantity("1", "member of an ensemble"),
+    "scan": Quantity(None, "measured surface, by its file"),
     "axis": Quantity(None, "axis of the plane"),
     # surfaces
     "height": Quantity("m", "surface height"),
@@ -441,6 +442,7 @@ QUANTITIES: dict[str, Quantity] = {
     "island_step": Quantity("1", "step of the plane that holds the island"),
     "island_shear": Quantity("m", "shear displacement of the plane that holds the island"),
     "island_direction": Quantity(None, "direction of sliding of the plane that holds the island"),
+    "island_scan": Quantity(None, "scan that holds the island"),
     "island_member": Quantity("1", "ensemble member that holds the island"),
     "n_islands": Quantity("1", "number of islands"),
     "label": Quantity("1", "number of the island, 0 outside"),
@@ -482,6 +484,7 @@ QUANTITIES: dict[str, Quantity] = {
     "link_step": Quantity("1", "step of the later plane"),
     "link_shear": Quantity("m", "shear displacement of the later plane"),
     "link_direction": Quantity(None, "direction of sliding of both planes"),
+    "link_scan": Quantity(None, "scan of both planes"),
     "link_member": Quantity("1", "ensemble member of both planes"),
     "island_before": Quantity("1", "number of the island before, 0 if there is none"),
     "island_after": Quantity("1", "number of the island after, 0 if there is none"),
@@ -511,6 +514,8 @@ QUANTITIES: dict[str, Quantity] = {
     **_with_ends("error_ratio", "1", "root mean square error over the Cramer-Rao bound"),
     **_with_ends("interval_coverage", "1", "share of the 95 % intervals that hold the true exponent"),
     "interval_share": Quantity("1", "share of the surfaces with an interval"),
+    "caveats": Quantity(None, "what limits the results of the scan"),
+    "status": Quantity(None, "whether the study of the scan is done or failed"),
     "member_count": Quantity("1", "number of surfaces"),
 }
 

@@ -24,6 +24,7 @@ from ._evolution import lineage as lineage
 from ._flow import hydraulic_aperture as hydraulic_aperture
 from ._flow import uplift as uplift
 from ._islands import islands as islands
+from ._scans import scans as scans
 from ._size_curves import lacunarity as lacunarity
 from ._size_curves import signature as signature
 from ._strength import friction as friction
@@ -61,6 +62,7 @@ __all__ = [
     "path",
     "pressure_distribution",
     "scaling",
+    "scans",
     "self_weight",
     "shear_curve",
     "signature",

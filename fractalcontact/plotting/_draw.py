@@ -32,6 +32,7 @@ from fractalcontact.plotting._flow import hydraulic_aperture, uplift
 from fractalcontact.plotting._inputs import group, words
 from fractalcontact.plotting._islands import islands
 from fractalcontact.plotting._paths import at_shear, loaded_steps, shear_text
+from fractalcontact.plotting._scans import scans
 from fractalcontact.plotting._size_curves import lacunarity, signature
 from fractalcontact.plotting._strength import friction, self_weight, shear_curve, strength_envelope
 from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of, needs_log_axis
@@ -121,6 +122,7 @@ BOTH = ("shear", "step")
 STRENGTH, TESTS = "joints/shear_curve", "joints/direct_shear"
 # every figure of a study; of several rows with one file the first that has data is drawn
 FIGURES = (
+    Row("scans", "overview", "status", scans),
     Row("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
     Row("delta_surface", "joints/delta_surface", "height", _delta_surface),
     Row("joint_closure", "joints/closure", "interface_closure", _joint_closure),

@@ -2,7 +2,8 @@
 
 Only the stages that the wanted results need are computed, imported, compiled and stored.
 
-``[surface]``     the lower face, or the only surface: ``read`` a file (with spacing, units, channel),
+``[surface]``     the lower face, or the only surface: ``read`` a file (with spacing, units, channel), or many
+                  (a pattern or a list: each is a study of its own, stacked along `scan`),
                   ``sample`` a shipped one, or ``generate`` with fbm, spectral, midpoint or weierstrass and
                   its arguments (``members`` makes an ensemble); ``level``, ``despike``, ``fill`` prepare it.
                   Spikes are removed for the contact alone: the roughness is that of the surface as scanned,

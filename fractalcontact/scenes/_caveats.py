@@ -40,6 +40,8 @@ def caveats(tree: xr.DataTree) -> list[str]:
         of too few cells, pressures and strengths beyond those of the material, slopes beyond small strains,
         uplift that did not come to balance. Empty where the results have no such limit.
     """
+    if group_of(tree, "overview") is not None:  # of many scans: it has the caveats of each
+        return []
     lines = [*_spikes(tree), *_tilt(tree)]
     pressed = {path: group_of(tree, path) for path in PRESSED}
     known = {path: data for path, data in pressed.items() if data is not None and "contact_fraction" in data}

@@ -164,7 +164,7 @@ def with_seeds(scene: Scene, store: PartStore) -> Scene:
     ]
     if not names:
         return scene
-    key = f"seeds.{_hash(scene.tables)}"
+    key = f"seeds.{digest_of(scene.tables)}"
     kept = store.get(key)
     if kept is None:
         kept = xr.Dataset(attrs={name: str(secrets.randbits(48)) for name in names})
@@ -190,9 +190,10 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
     if row.takes == "crack":
         facts["crack"] = crack_options(scene, row)
     facts["needs"] = [digests[need] for need in stage.needs]
-    return _hash([stage.name, facts])
+    return digest_of([stage.name, facts])
 
 
-def _hash(facts: Any) -> str:
+def digest_of(facts: Any) -> str:
+    """Return a short digest of plain values."""
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -6,31 +6,25 @@ The surface of a member comes from its own random stream, so that it can be gene
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 import xarray as xr
 
 from fractalcontact.base import signals
 from fractalcontact.base.progress import track
-from fractalcontact.base.schema import encoded, label
 from fractalcontact.scenes._checkpoint import PartStore
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import surface_grid
-from fractalcontact.scenes._parts import concatenate
+from fractalcontact.scenes._result_tables import MEMBER
 from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stacked_results import stacked
 from fractalcontact.scenes._study import Study
-
-MEMBER = "member"
-RAGGED = ("island", "link")  # dims whose length differs from member to member
 
 
 @dataclass(frozen=True, repr=False)
 class MemberResults:
-    """Results of some members: their numbers, the joined results, the seconds of each stage."""
+    """Results of one member by stage, and the seconds of each stage."""
 
-    members: list[int]
     results: dict[str, xr.Dataset]
     seconds: dict[str, float]
 
@@ -53,8 +47,7 @@ class _MemberTask:
         study = self._study(store)
         if stop or study.run(stop):
             return None
-        results = {name: numbered(result, self.member) for name, result in study.groups().items()}
-        return MemberResults([self.member], results, study.seconds)
+        return MemberResults(study.groups(), study.seconds)
 
     def _study(self, store: PartStore) -> Study:
         table = {key: value for key, value in self.scene.table("surface").items() if key != "members"}
@@ -67,7 +60,7 @@ class Ensemble:
 
     def __init__(self, scene: Scene, store: PartStore, progress: bool, workers: Workers | None) -> None:
         self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
-        self.finished = MemberResults([], {}, {})
+        self.finished: dict[int, MemberResults] = {}
 
     def run(self, stop: signals.Stop) -> list[str]:
         """Study all members; return what is missing if a stop was requested."""
@@ -79,15 +72,18 @@ class Ensemble:
         points = math.prod(surface_grid(self.scene)[0])
         finished = run_tasks(tasks, self.store, stop, of_members, points=points)
         bar = track(finished, self.progress, self.scene.name, unit="member", total=count)
-        results = [result for _, result in sorted(bar, key=lambda entry: entry[0])]
-        if results:
-            self.finished = _joined_members(results)
-        done = len(results)
+        self.finished = dict(sorted(bar, key=lambda entry: entry[0]))
+        done = len(self.finished)
         return [] if done == count else [f"{count - done} of {count} members"]
 
     def groups(self) -> dict[str, xr.Dataset]:
         """Return the wanted results of the finished members."""
-        return self.finished.results
+        members = {member: each.results for member, each in self.finished.items()}
+        names = next(iter(members.values()), {})
+        return {
+            name: stacked({member: results[name] for member, results in members.items()}, MEMBER)
+            for name in names
+        }
 
     def preparation(self) -> dict[str, str | float]:
         """Return nothing: the surfaces of an ensemble are generated."""
@@ -96,46 +92,7 @@ class Ensemble:
     @property
     def seconds(self) -> dict[str, float]:
         """Seconds that each stage took in this run, all members together."""
-        return self.finished.seconds
-
-
-def _joined_members(results: Sequence[MemberResults]) -> MemberResults:
-    """Join the results of members in the order given."""
-    if len(results) == 1:
-        return results[0]
-    names = results[0].results
-    return MemberResults(
-        [member for result in results for member in result.members],
-        {name: _joined([result.results[name] for result in results]) for name in names},
-        {name: sum(result.seconds[name] for result in results) for name in results[0].seconds},
-    )
-
-
-def numbered(result: xr.Dataset, member: int) -> xr.Dataset:
-    """Return the result of one member with its number as first dim, and beside every row of a ragged dim."""
-    # the value of a load may differ from member to member
-    loads = [name for name, coord in result.coords.items() if name != "step" and "step" in coord.dims]
-    plain = result.drop_dims(RAGGED, errors="ignore").drop_indexes(loads, errors="ignore")
-    dataset = plain.reset_coords(loads).expand_dims({MEMBER: [member]})
-    dataset = dataset.set_coords(loads).assign_coords({MEMBER: label(dataset[MEMBER])})
-    for dim in (dim for dim in RAGGED if dim in result.dims):
-        number = xr.DataArray(np.full(result.sizes[dim], member), dims=dim, name=f"{dim}_{MEMBER}")
-        dataset = dataset.merge(_rows(result, dim)).assign_coords({number.name: label(number)})
-    for name, variable in result.variables.items():
-        dataset[name].attrs = dict(variable.attrs)
-    return encoded(dataset).assign_attrs(result.attrs)
-
-
-def _joined(results: list[xr.Dataset]) -> xr.Dataset:
-    """Join what all members have: along `member`, and the rows of ragged dims one after the other."""
-    shared = set.intersection(*(set(result.variables) for result in results))
-    common = [result.drop_vars(set(result.variables) - shared) for result in results]
-    joined = concatenate([result.drop_dims(RAGGED, errors="ignore") for result in common], MEMBER)
-    for dim in (dim for dim in RAGGED if dim in common[0].dims):
-        joined = joined.merge(concatenate([_rows(result, dim) for result in common], dim))
-    return joined
-
-
-def _rows(result: xr.Dataset, dim: str) -> xr.Dataset:
-    """Return the variables along a dim, and none of the others."""
-    return result.drop_vars([name for name, variable in result.variables.items() if dim not in variable.dims])
+        spent: dict[str, float] = {}
+        for each in self.finished.values():
+            spent |= {name: spent.get(name, 0.0) + seconds for name, seconds in each.seconds.items()}
+        return spent

@@ -27,7 +27,8 @@ from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes import _rows
-from fractalcontact.scenes._result_tables import group_of, member_count, of_member, table_of
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of
+from fractalcontact.scenes._result_tables import SCAN, group_of, member_count, of_member, table_of
 from fractalcontact.scenes._results_folder import REPORT, is_report
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._tables import tables
@@ -120,6 +121,7 @@ def report(
             for figure in figures:
                 problems.file("figures", figure)
     tree = result if isinstance(result, xr.DataTree) else _study(result)
+    tree = tree.filter(lambda node: not node.path.startswith(f"/{SCANS}/"))  # each has a page of its own
     target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
     with Problems(WHERE) as problems:
         is_free = not target.is_file() or is_report(target)
@@ -135,7 +137,7 @@ def write_report(
     """Write the report with these pictures and this summary."""
     with ThreadPoolExecutor(thread_count()) as pool:  # the encoder releases the interpreter lock
         pictures = list(pool.map(_picture_file, map(Path, figures)))
-    text = _page(tree, pictures, summary)
+    text = _page(tree, pictures, summary, target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -150,12 +152,13 @@ def _study(path: str | os.PathLike[str]) -> xr.DataTree:
     return tree  # type: ignore[no-any-return]
 
 
-def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summary) -> str:
+def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summary, target: Path) -> str:
     """Return the text of the page."""
     from jinja2 import Environment  # here: a study without a folder has no report
 
     template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
     single = of_member(tree, 0)
+    pages = {name: page for name in _scans(tree) if (target.parent / (page := page_of(name))).is_file()}
     entry = _provenance(tree)
     scene = entry.get("parameters", {}).get("scene")
     written = str(tree.attrs.get("history", "")).split(" ")[0]
@@ -174,11 +177,18 @@ def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summ
         ],
         summary=summary,
         written_rows=written_rows,
+        pages=pages,
         curves=[_curve_table(name, frame) for name, frame in _curves(tree).items()],
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(entry),
         references=str(tree.attrs.get("references", "")),
     )
+
+
+def _scans(tree: xr.DataTree) -> list[str]:
+    """Return the names of the scans of a study."""
+    overview = group_of(tree, OVERVIEW)
+    return [] if overview is None else [str(name) for name in overview[SCAN].values]
 
 
 def _surface(tree: xr.DataTree) -> dict[str, Any] | None:

@@ -46,6 +46,13 @@ BOUNDS = {
 }
 WITH_UNIT = {"type": "string", "pattern": PRESSURE.pattern}
 RANGES = [{"$ref": "#/definitions/even_range"}, {"$ref": "#/definitions/logarithmic_range"}]
+FILES = {
+    "anyOf": [
+        {"type": "string", "minLength": 1},
+        {"type": "array", "minItems": 1, "items": {"type": "string", "minLength": 1}},
+    ]
+}
+OF_JOINT = ("block", "register", "turn_upper", "lower", "upper")
 PURPOSES = {
     "surface": "The lower face, or the only surface: one of read, sample, generate.",
     "upper": "The upper face of a joint; without it the two faces match.",
@@ -58,7 +65,10 @@ PURPOSES = {
 }
 OWN = {
     "title": "Title of the study.",
-    "read": "A file, relative to the scene: every format of fractalcontact.surfaces.read.",
+    "read": "A file, relative to the scene, of every format of fractalcontact.surfaces.read; of many scans a "
+    "pattern (scans/*.sur) or a list.",
+    "lower": "Files of the lower faces, as read of [surface].",
+    "upper": "Files of the upper faces, as read of [upper]; wildcards pair them.",
     "sample": "A surface that is installed with the package.",
     "generate": "A synthetic surface; the other keys are the arguments of this function.",
     "level": "Remove the least-squares polynomial of this degree.",
@@ -126,7 +136,8 @@ def json_schema() -> Schema:
         "$schema": DRAFT,
         "title": "Scene of fractalcontact",
         **_table(_described(settings, OWN) | tables, {}),
-        "required": ["surface", "want"],
+        "required": ["want"],
+        "anyOf": [{"required": ["surface"]}, {"required": ["joint"]}],
         "definitions": dict(zip(("even_range", "logarithmic_range"), _ranges(), strict=True)),
     }
 
@@ -201,8 +212,7 @@ def _surface(place: str) -> Schema:
     planes = {"plane": {"enum": list(PLANES[place])}}
     texts = parameter_texts("surfaces.read") | OWN
     forms = [
-        _table({"read": {"type": "string", "minLength": 1}} | common | planes, texts)
-        | {"required": ["read"]},
+        _table({"read": FILES} | common | planes, texts) | {"required": ["read"]},
         _table({"sample": {"enum": list(SAMPLES)}} | common, texts) | {"required": ["sample"]},
     ]
     for name in GENERATORS:
@@ -235,7 +245,7 @@ def _with_stages(name: str, common: Iterable[str], function: str, stages: Iterab
     texts = parameter_texts(function) if function else _shared_texts(stages)
     properties = {key: _value(key) for key in common}
     if "register" in properties:
-        properties |= {"register": FLAG, "turn_upper": {"enum": ["x", "y"]}}
+        properties |= {"register": FLAG, "turn_upper": {"enum": ["x", "y"]}, "lower": FILES, "upper": FILES}
     subpackage = "joints" if name == "joint" else name
     for word in stages:
         row = STAGES[word if name == "contact" else f"{subpackage}/{word}"]
@@ -243,7 +253,7 @@ def _with_stages(name: str, common: Iterable[str], function: str, stages: Iterab
         table["description"] = f"Arguments of fractalcontact.{row.function}."
         own = properties.get(word)  # [joint.closure] is a stage, closure = 1e-6 a load
         properties[word] = table if own is None else {"anyOf": [*own.get("anyOf", [own]), table]}
-    return _table(properties, texts | {key: OWN[key] for key in ("block", "register", "turn_upper")})
+    return _table(properties, texts | {key: OWN[key] for key in OF_JOINT})
 
 
 def _shared_texts(stages: Iterable[str]) -> dict[str, str]:

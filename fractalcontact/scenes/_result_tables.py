@@ -20,13 +20,14 @@ from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale
 Array = np.ndarray[Any, np.dtype[Any]]
 Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
 
-MEMBER = "member"
+MEMBER, SCAN = "member", "scan"
 WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 FRACTIONS = ("contact_fraction", "corrected_contact_fraction", "stick_fraction", "coverage", "largest_share")
 PATHS = ("shear", "step", "nominal_pressure")  # a table without rows along one shows its last value
 # head of the first columns of a table, by dim
 KEYS = {
+    SCAN: "scan",
     "shear": "shear",
     "direction": "toward",
     "method": "method",

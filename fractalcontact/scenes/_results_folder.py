@@ -21,7 +21,7 @@ from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes._checkpoint import FOLDER
 from fractalcontact.scenes._scene import Scene
 
-REPORT, DATASHEET, TABLES = "report.html", "datasheet.pdf", "tables"
+REPORT, DATASHEET, TABLES, CSV = "report.html", "datasheet.pdf", "tables", "scans.csv"
 GENERATOR = 'name="generator" content="fractalcontact'  # of a report, in its head
 SOFTWARE = "fractalcontact"  # of a figure, as its metadata say
 HEAD = 1000  # bytes of a report that hold its head
@@ -50,7 +50,7 @@ def results_folder(out: str | os.PathLike[str] | None, scene: Scene, *, force: b
     try:
         yield folder
     except FractalContactError as error:
-        kept = any((folder / FOLDER).glob("*.npz")) or (folder / RESULT).exists()
+        kept = any(folder.glob(f"**/{FOLDER}/*.npz")) or any(folder.glob(f"**/{RESULT}"))
         if is_new and not kept and not isinstance(error, Stopped):
             shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -77,7 +77,7 @@ def is_foreign(path: Path) -> bool:
         return _scene_of(path) is None
     if path.name == REPORT:
         return not is_report(path)
-    if path.name in (TABLES, DATASHEET):
+    if path.name in (TABLES, DATASHEET, CSV):
         return _scene_of(path.with_name(RESULT)) is None
     return path.suffix == ".png" and not is_figure(path)
 
@@ -125,8 +125,13 @@ def _title(scene: Scene) -> dict[str, Any]:
 def _identity(tables: Mapping[str, Any]) -> list[Any]:
     """Return what makes two runs the same study: the title and the sources of the surfaces."""
     sources = [
-        Path(str(table.get(key))).name
+        _source(table.get(key))
         for table in (tables.get("surface", {}), tables.get("upper", {}))
         for key in ("read", "sample", "generate")
     ]
     return [tables.get("title"), *sources]
+
+
+def _source(value: Any) -> str:
+    """Return the name of a file, or of the folder of a list of scans, which may grow."""
+    return Path(str(value[0])).parent.name if isinstance(value, list) and value else Path(str(value)).name

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 import time
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf, provenance, schema, signals
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
@@ -25,10 +28,12 @@ from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._memory import check_memory
+from fractalcontact.scenes._overview import OVERVIEW, pooled
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._result_tables import MEMBER, of_member
 from fractalcontact.scenes._results_folder import (
+    CSV,
     DATASHEET,
     REPORT,
     SOFTWARE,
@@ -36,6 +41,8 @@ from fractalcontact.scenes._results_folder import (
     remove_old_figures,
     results_folder,
 )
+from fractalcontact.scenes._scan_files import scans_of
+from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study
@@ -46,7 +53,8 @@ from fractalcontact.scenes._validation import validate
 OWN_REFERENCES = "see the references of each group"
 # what the root of a result states of its groups, for a reader that opens no group
 MAIN = {
-    "dimensions": ("fractal_dimension", "fractal_dimension_low", "fractal_dimension_high"),
+    "surfaces/description": ("rms_height",),
+    "dimensions": ("fractal_dimension", "fractal_dimension_low", "fractal_dimension_high", "standard_error"),
     "joints/roughness_coefficient": ("roughness_coefficient",),
     "contact": ("contact_fraction",),
     "joints/closure": ("contact_fraction", "interface_closure"),
@@ -84,12 +92,13 @@ def run(
         Print all of it.
     workers : int, default 0
         Share the study between so many processes on this machine, at most 4 for each processor. An ensemble
-        is shared by members, any other study by the parts of a stage. A script needs an
+        is shared by members, many scans by scan, any other study by the parts of a stage. A script needs an
         ``if __name__ == "__main__"`` guard for it. With 0, a copy of this process takes part of the work on
         surfaces of up to 1024 x 1024 points and of the figures (on Linux, with two processors or more).
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
-        is set on the worker. Workers need no access to `out`; a scene that reads files needs them there.
+        is set on the worker. Workers need no access to `out`, but for many scans; a scene that reads files
+        needs them there.
     force : bool, default False
         Overwrite in `out` the results of another study, and files that this package did not write. Without
         it they are refused.
@@ -98,7 +107,13 @@ def run(
     -------
     DataTree
         Groups named after the subpackages. The root's `provenance` holds the scene, and the run time,
-        achieved error and origin of every stage.
+        achieved error and origin of every stage. Of many scans: a row for each in the group `overview`, their
+        numbers along `scan`, in the root the means with their intervals; maps are in the file alone.
+
+    Warns
+    -----
+    FractalContactWarning
+        Some of many scans failed: their rows state why.
 
     Raises
     ------
@@ -123,58 +138,132 @@ def run(
     _check(summary, verbose, force, workers, client)
     with worker_processes(workers) as processes:
         scene = validate(scene)
-        check_memory(scene, stages_of(scene), workers)
+        scans = scans_of(scene)
+        whole: Summary | None
+        if not scans:
+            check_memory(scene, stages_of(scene), workers)
         among = workers_of(processes if client is None else client)
         with results_folder(out, scene, force=force) as folder:
-            tree, whole = _run(scene, folder, progress, among, start)
+            if scans:
+                tree, whole = _run_scans(scene, scans, folder, progress, among, start)
+            else:
+                with locked(folder), signals.noted(folder is not None) as stop:
+                    tree, whole = _run(scene, folder, progress, among, start, stop)
     if summary:
         print(_text(tree, whole, verbose=verbose))  # noqa: T201
     return tree
 
 
-def _run(
-    scene: Scene, folder: Path | None, progress: bool, workers: Workers | None, start: float
-) -> tuple[xr.DataTree, Summary | None]:
-    """Return the results, and the summary where the report has computed it."""
-    store = PartStore(folder)
-    with locked(folder), signals.noted(folder is not None) as stop:
-        scene = with_seeds(scene, store)
-        study_type = Study if scene.surface.members is None else Ensemble
-        study: Study | Ensemble = study_type(scene, store, progress, workers)
-        missing = study.run(stop)
-        missing += [FIGURES] if stop and scene.want.figures else []
-        groups = study.groups()
-        for name in ("contact", "joints/closure"):
-            if name in groups:
-                warn(implausible_result(name, groups[name]))
-        tree = _assemble(scene, groups, study.seconds, missing)
-        tree.attrs |= study.preparation()
-        _note_run_time(tree, start)
-        if folder is None:
-            return tree, None
-        if missing:
-            netcdf.save(tree, folder / PARTIAL_RESULT)
-            raise signals.Stopped(
-                stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
-            )
-        # before figures and report: a disk that fills, or a kill, while they are made loses nothing
-        netcdf.save(tree, folder / RESULT)
-        (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+def _run_scans(
+    scene: Scene,
+    scans: Mapping[str, Scene],
+    folder: Path | None,
+    progress: bool,
+    workers: Workers | None,
+    start: float,
+) -> tuple[xr.DataTree, Summary]:
+    """Return the numbers of all scans, and the summary; without a folder also their maps."""
+    if folder is None:
+        with tempfile.TemporaryDirectory() as name:
+            temporary = Path(name)
+            _, whole = _run_scans(scene, scans, temporary, progress, workers, start)
+            return netcdf.open(temporary / RESULT), whole
+    with locked(folder), signals.noted() as stop:
+        studies = ScanStudies(scans, folder)
+        studies.run(_study_scan, workers, stop, progress=progress)
+        if stop:
+            done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
+            raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
+        tree = xr.DataTree()
+
+        def groups() -> Iterator[tuple[str, xr.Dataset]]:
+            nonlocal tree
+            for name in ("", OVERVIEW, *(stage.name for stage in stages_of(scene) if stage.stored)):
+                yield f"/{name}", xr.Dataset()  # first: a file lists its groups in this order
+            yield from studies.maps()
+            tree = _assemble(scene, studies.numbers, studies.seconds, [], pooled(studies.numbers[OVERVIEW]))
+            _note_run_time(tree, start)
+            tree.attrs["caveats"] = "none"
+            for node in tree.subtree:
+                yield node.path, node.to_dataset(inherit=False)
+
+        netcdf.save_groups(groups(), folder / RESULT)
         with _beside_the_result():
-            figures = []
-            if scene.want.figures:
-                figures = _draw(tree, folder, progress)
-                _note_run_time(tree, start)
-                remove_old_figures(folder, figures)
+            frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
+            with netcdf.written_whole(folder / CSV) as temporary:
+                frame.to_csv(temporary, index=False)
+            overview = xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
+            figures = _draw(overview, folder, progress) if scene.want.figures else []
+            remove_old_figures(folder, figures)
             whole = summary_of(tree)
-            tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
-            changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
-            netcdf.replace_attributes(folder / RESULT, changed)
             write_report(tree, folder / REPORT, figures, whole)
-            if scene.want.datasheet:
-                tables(tree, folder / TABLES)
-                _draw_datasheet(tree, folder / DATASHEET)
-        store.clear()
+        failed = sum(map(bool, studies.reasons.values()))
+        if failed:
+            message = f"{failed} of {len(scans)} scans failed; the table states why"
+            warnings.warn(message, FractalContactWarning, stacklevel=3)
+        return tree, whole
+
+
+def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> None:
+    """Validate and study one scan, in a folder of its own."""
+    start = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the report of the scan has them
+        scene = validate(scene)
+        check_memory(scene, stages_of(scene))
+        folder.mkdir(exist_ok=True)
+        with locked(folder):
+            _run(scene, folder, False, None, start, stop, facts)
+
+
+def _run(
+    scene: Scene,
+    folder: Path | None,
+    progress: bool,
+    workers: Workers | None,
+    start: float,
+    stop: signals.Stop,
+    facts: Mapping[str, str] = MappingProxyType({}),
+) -> tuple[xr.DataTree, Summary | None]:
+    """Return the results, with these `facts` as attributes, and the summary where the report computed it."""
+    store = PartStore(folder)
+    scene = with_seeds(scene, store)
+    study_type = Study if scene.surface.members is None else Ensemble
+    study: Study | Ensemble = study_type(scene, store, progress, workers)
+    missing = study.run(stop)
+    missing += [FIGURES] if stop and scene.want.figures else []
+    groups = study.groups()
+    for name in ("contact", "joints/closure"):
+        if name in groups:
+            warn(implausible_result(name, groups[name]))
+    tree = _assemble(scene, groups, study.seconds, missing)
+    tree.attrs |= {**study.preparation(), **facts}
+    _note_run_time(tree, start)
+    if folder is None:
+        return tree, None
+    if missing:
+        netcdf.save(tree, folder / PARTIAL_RESULT)
+        raise signals.Stopped(
+            stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
+        )
+    # before figures and report: a disk that fills, or a kill, while they are made loses nothing
+    netcdf.save(tree, folder / RESULT)
+    (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+    with _beside_the_result():
+        figures = []
+        if scene.want.figures:
+            figures = _draw(tree, folder, progress)
+            _note_run_time(tree, start)
+            remove_old_figures(folder, figures)
+        whole = summary_of(tree)
+        tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
+        changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
+        netcdf.replace_attributes(folder / RESULT, changed)
+        write_report(tree, folder / REPORT, figures, whole)
+        if scene.want.datasheet:
+            tables(tree, folder / TABLES)
+            _draw_datasheet(tree, folder / DATASHEET)
+    store.clear()
     return tree, whole
 
 
@@ -200,9 +289,12 @@ def _assemble(
     results: Mapping[str, xr.Dataset],
     seconds: Mapping[str, float],
     missing: list[str],
+    main: xr.Dataset | None = None,
 ) -> xr.DataTree:
-    """Return the finished results as a tree that states what is missing."""
-    groups = {"/": _main_results(results)} | {f"/{name}": result for name, result in results.items()}
+    """Return the finished results as a tree that states what is missing; in its root the `main` ones."""
+    groups = {"/": _main_results(results) if main is None else main} | {
+        f"/{name}": result for name, result in results.items()
+    }
     description = groups.pop("/surfaces/description", None)
     if description is not None:
         heights = groups.get("/surfaces", xr.Dataset())
@@ -256,9 +348,17 @@ def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:
     plain = dict(tables)
     for name in ("surface", "upper"):
         read = plain.get(name, {}).get("read")
-        if isinstance(read, str) and (Path(read).is_absolute() or read.startswith("~")):
-            plain[name] = {**plain[name], "read": Path(read).name}
+        if isinstance(read, list):
+            plain[name] = {**plain[name], "read": [_name_outside(each) for each in read]}
+        elif read is not None:
+            plain[name] = {**plain[name], "read": _name_outside(read)}
     return plain
+
+
+def _name_outside(read: Any) -> Any:
+    """Return the name alone of a file with an absolute path."""
+    is_outside = isinstance(read, str) and (Path(read).is_absolute() or read.startswith("~"))
+    return Path(read).name if is_outside else read
 
 
 def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:

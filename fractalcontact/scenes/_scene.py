@@ -35,7 +35,7 @@ class SurfaceTable:
     Attributes
     ----------
     read, sample, generate : str, optional
-        One of them is given: a file, a shipped surface, or the generator.
+        One of them is given: a file (of many scans a pattern or a list), a shipped surface, or the generator.
     level, despike, fill
         Preparation of the heights.
     members, member : int, optional
@@ -44,7 +44,7 @@ class SurfaceTable:
         The other keys: arguments of `surfaces.read` or of the generator.
     """
 
-    read: str | None = None
+    read: str | list[str] | None = None
     sample: str | None = None
     generate: str | None = None
     level: int | None = None

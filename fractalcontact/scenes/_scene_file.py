@@ -171,6 +171,11 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
         raise InvalidInput(problems.where, [TOO_DEEP])
     tables = {key: _in_plain_words(value, key) for key, value in scene.tables.items()}
     tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
+    for key, name in (("lower", "surface"), ("upper", "upper")):  # files of both faces, in one table
+        if isinstance(tables.get("joint"), dict) and key in tables["joint"]:
+            own = tables.get(name)
+            tables[name] = {"read": tables["joint"][key], **(own if isinstance(own, dict) else {})}
+            tables["joint"] = {other: tables["joint"][other] for other in tables["joint"] if other != key}
     for name in TABLES:
         if not isinstance(tables.get(name, {}), dict):
             problems.add(name, "a table", tables[name])
@@ -312,7 +317,10 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         _check_keys(table, READING, name, problems)
         problems.choice(f"{name}.units", table.get("units"), UNITS, optional=True)
         if sources == ["read"]:
-            problems.path(f"{name}.read", table["read"])
+            reads = table["read"] if isinstance(table["read"], list) else [table["read"]]
+            for read in reads:
+                problems.path(f"{name}.read", read)
+            problems.require(bool(reads), f"{name}.read", "a file, a pattern or a list of files", reads)
             problems.choice(f"{name}.plane", table.get("plane"), PLANES[name], optional=True)
         else:
             problems.choice(f"{name}.sample", table["sample"], SAMPLES)

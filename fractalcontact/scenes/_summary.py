@@ -12,6 +12,7 @@ from fractalcontact.base.file_contents import stage_rows
 from fractalcontact.base.tables import Note, table
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import caveats
+from fractalcontact.scenes._overview import scan_facts, scan_tables
 from fractalcontact.scenes._result_tables import ResultTable, group_of, length, member_count, table_of
 from fractalcontact.scenes._rows import aperture_as_placed
 from fractalcontact.scenes._stages import STAGES
@@ -76,7 +77,9 @@ def facts(tree: xr.DataTree) -> list[str]:
     members = member_count(tree)
     ensemble = [f"ensemble of {members} members: mean ± standard deviation over the members"]
     preparation = str(tree.attrs.get("preparation", ""))
-    lines = (ensemble if members else []) + [line for line in preparation.split("; ") if line]
+    lines = [*scan_facts(tree), *(ensemble if members else [])] + [
+        line for line in preparation.split("; ") if line
+    ]
     return [*lines, *_openings(tree)]
 
 
@@ -94,7 +97,11 @@ def _openings(tree: xr.DataTree) -> Iterator[str]:
 
 
 def _tables(tree: xr.DataTree, *, screen: bool) -> Iterator[ResultTable]:
-    """Yield the table of every stage that the study has a result of."""
+    """Yield the table of every stage that the study has a result of; of many scans first a row for each."""
+    of_scans = list(scan_tables(tree))
+    yield from of_scans
+    if of_scans:  # each has a page of its own for the rest
+        return
     for name, stage in STAGES.items():
         data = group_of(tree, name) if stage.rows is not None else None
         if data is not None and stage.rows is not None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.file_patterns import files_of, is_pattern
 from fractalcontact.base.results import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import OF_SURFACE
+
+Files = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 WHERE = "fractalcontact.scenes.template"
 QUESTIONS = ("roughness", "contact", "joint")
@@ -26,8 +30,8 @@ TRAVEL_POINTS = 60  # of a curve of the rigid dilatancy, which costs millisecond
 
 def template(
     question: str,
-    scan: str | os.PathLike[str],
-    upper: str | os.PathLike[str] | None = None,
+    scan: Files,
+    upper: Files | None = None,
     *,
     young: float | None = None,
     poisson: float = 0.2,
@@ -47,8 +51,9 @@ def template(
     question : {"roughness", "contact", "joint"}
         Dimension with its interval, roughness coefficient (JRC) and directional roughness; contact of the
         surface with a flat under growing pressure; or closure, dilatancy and leakage of two faces.
-    scan, upper : path-like
-        Files of the surface, and of the second face of a joint.
+    scan, upper : path-like, or list of them
+        Files of the surface, and of the second face of a joint. Of many scans a list, or a pattern
+        (``"scans/*.sur"``); faces are paired by what the wildcards of their patterns stand for.
     young, poisson : float
         Young's modulus (Pa) and Poisson's ratio of both bodies, for "contact" and "joint".
     folder : path-like
@@ -72,7 +77,8 @@ def template(
     Returns
     -------
     str
-        TOML. Loads and shears are chosen from the size and the slope of the surface, which is read for that.
+        TOML. Loads and shears are chosen from the size and the slope of the surface, which is read for that;
+        of many scans from the first that can be read.
 
     Raises
     ------
@@ -101,8 +107,7 @@ def template(
         is_known = problems.choice("question", question, QUESTIONS)
         is_pressed, is_joint = not is_known or question != "roughness", is_known and question == "joint"
         problems.path("folder", folder, what="the path of a folder")
-        if problems.path("scan", scan):
-            problems.require(Path(scan).is_file(), "scan", "an existing file", Path(scan).name)
+        _check_files("scan", scan, problems)
         problems.boolean("despike", despike)
         problems.integer("level", level, at_least=0, at_most=2, optional=True)
         if is_joint:
@@ -114,9 +119,9 @@ def template(
             problems.number("young", young, above=0)
             problems.boolean("register", register)
             problems.number("poisson", poisson, above=-1, at_most=0.5)
-        if is_joint and problems.path("upper", upper):
-            problems.require(Path(str(upper)).is_file(), "upper", "an existing file", Path(str(upper)).name)
-    facts = _facts(scan, options)
+        if is_joint:
+            _check_files("upper", upper, problems)
+    facts = _facts_of_first(scan, options)
     prepared: dict[str, Any] = {"despike": True} if despike else {}
     if is_pressed and (despike or facts["missing"]):
         prepared["fill"] = True
@@ -128,7 +133,7 @@ def template(
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
             }
-        tables.append(("upper", _file_table(str(upper), folder, options | prepared)))
+        tables.append(("upper", _file_table(upper or "", folder, options | prepared)))
     if is_pressed:
         angle = {} if friction_angle is None else {"basic_friction_angle": float(friction_angle)}
         material = {"young": float(young or 0.0), "poisson": float(poisson)}
@@ -138,11 +143,52 @@ def template(
         tables += _joint(facts, register, turn_upper, strength)
     else:
         tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
-    files = Path(scan).name + (f" and {Path(str(upper)).name}" if is_joint else "")
+    names = [_words(each) for each in ((scan, upper) if is_joint and upper else (scan,))]
+    files = " and ".join(dict.fromkeys(names))
     text = [f"title = {json.dumps(f'{question.capitalize()} of {files}')}", ""]
     for name, table in tables:
         text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
     return "\n".join(text)
+
+
+def _files(scan: Files) -> list[Path]:
+    """Return the files of a pattern, or of one or several scans."""
+    if isinstance(scan, str) and is_pattern(scan):
+        return [Path(each) for each in files_of(scan).values()]
+    return [Path(each) for each in _names(scan)]
+
+
+def _names(scan: Files) -> list[str | os.PathLike[str]]:
+    return list(scan) if isinstance(scan, (list, tuple)) else [scan]  # type: ignore[list-item]
+
+
+def _check_files(argument: str, scan: Any, problems: Problems) -> None:
+    """Note files that do not exist."""
+    each_valid = [
+        problems.path(argument, each) for each in (scan if isinstance(scan, (list, tuple)) else [scan])
+    ]
+    if not all(each_valid):
+        return
+    files = _files(scan)
+    problems.require(bool(files), argument, "files", scan)
+    for file in files:
+        problems.require(file.is_file(), argument, "an existing file", file.name)
+
+
+def _words(scan: Files) -> str:
+    """Return the name of a file, or of the folder of many."""
+    files = _files(scan)
+    several = len(files) > 1 or is_pattern(str(scan))
+    return f"the scans in {files[0].resolve().parent.name}" if several else files[0].name
+
+
+def _facts_of_first(scan: Files, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the facts of the first surface that can be read."""
+    *files, last = _files(scan)
+    for file in files:
+        with suppress(FractalContactError):
+            return _facts(file, options)
+    return _facts(last, options)
 
 
 def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str, Any]:
@@ -168,12 +214,11 @@ def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str
     }
 
 
-def _file_table(
-    scan: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return the table that reads a file."""
-    path = Path(os.path.relpath(Path(scan).resolve(), Path(folder).resolve())).as_posix()
-    return {"read": path, **options}
+def _file_table(scan: Files, folder: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table that reads a file, or several."""
+    start = Path(folder).resolve()
+    paths = [Path(os.path.relpath(Path(name).resolve(), start)).as_posix() for name in _names(scan)]
+    return {"read": paths if isinstance(scan, (list, tuple)) else paths[0], **options}
 
 
 def _roughness(facts: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, TooLittleMemory
+from fractalcontact.base.errors import FractalContactError, InvalidInput, TooLittleMemory
 from fractalcontact.base.grid import plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import real_numbers
@@ -33,6 +33,7 @@ from fractalcontact.scenes._inputs import (
 )
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
+from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
 from fractalcontact.scenes._stage_type import StageType
@@ -56,6 +57,7 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     """Find all problems of a scene before anything is computed or written.
 
     The surfaces are read or generated for that; a large generated one is replaced by a flat one of its size.
+    Of many scans the first one that fits the scene is read.
 
     Parameters
     ----------
@@ -85,6 +87,9 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
         expected = "a Scene or the path of a TOML file"
         problems.require(isinstance(scene, (Scene, str, os.PathLike)), "scene", expected, scene)
     scene, problems = check_tables(scene) if isinstance(scene, Scene) else parse(scene)
+    if not problems.messages and (scans := scans_of(scene)):
+        _require_valid_scan(scans)
+        return scene
     with problems:
         if not _is_valid(problems, "material"):
             known = {key: table for key, table in scene.tables.items() if key != "material"}
@@ -110,6 +115,20 @@ def validate_placed(scene: Scene, lower: xr.DataArray, upper: xr.DataArray) -> N
     surfaces = {"surface": lower, "upper": upper}
     with Problems("fractalcontact.scenes.run") as problems:
         _validate_calls(placed, surfaces, _valid_crack(placed, surfaces, problems), problems)
+
+
+def _require_valid_scan(scans: Mapping[str, Scene]) -> None:
+    """Raise the problems of the first of several scans, unless the scene fits at least one of them."""
+    first: FractalContactError | None = None
+    for scan in scans.values():
+        try:
+            validate(scan)
+        except FractalContactError as error:
+            first = first or error
+        else:
+            return
+    if first is not None:
+        raise first
 
 
 @contextmanager

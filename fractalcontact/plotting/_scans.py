@@ -1,0 +1,80 @@
+"""Many scans at a glance: how their dimension, roughness coefficient, rms height ... are distributed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base.robust import is_far
+from fractalcontact.plotting import _style
+from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._inputs import result_of
+from fractalcontact.plotting._style import AxesArray, Panels
+from fractalcontact.plotting._units import Units, scale_of
+
+SCAN = "scan"
+FIRST = {
+    "fractal_dimension": "fractal dimension D",
+    "roughness_coefficient": "JRC",
+    "rms_height": "height Sq",
+}
+NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
+NAMED = 6  # outliers in a panel that are named
+
+
+@figure
+def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
+    """Draw the distribution of the main numbers of many scans: dimension, JRC, rms height, contact area.
+
+    Each panel has one dot for every scan, sorted, with its interval where there is one; the dashed line is
+    the median. Outliers by the modified z of Iglewicz and Hoaglin (beyond 3.5) are red, with their names.
+
+    Parameters
+    ----------
+    overview : Dataset or node of a DataTree
+        The group `overview` of a study of many scans, from `fractalcontact.scenes.run`.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> names = ["a.sur", "b.sur", "c.sur"]
+    >>> height = ("scan", [1e-6, 2e-6, 3e-6], {"units": "m", "long_name": "rms height"})
+    >>> overview = xr.Dataset({"rms_height": height}, coords={"scan": names})
+    >>> fc.plotting.scans(overview)[0].get_xlabel()
+    'height Sq (µm)'
+    """
+    data = result_of(overview, "scans", (), (SCAN,), units)
+    names = [str(name) for name, values in data.data_vars.items() if values.dtype.kind == "f"]
+    names = [name for name in names if not name.endswith(NOT_SHOWN) and np.isfinite(data[name]).any()]
+    names = sorted(names, key=lambda name: [*FIRST, name].index(name))
+    shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
+    for ax, name in zip(shown, names, strict=False):
+        _draw_distribution(ax, data, name)
+    shown[0].set_ylabel("scans, sorted")
+    return shown
+
+
+def _draw_distribution(ax: Any, data: Any, name: str) -> None:
+    values = data[name]
+    order = np.argsort(values.values)[: int(np.isfinite(values).sum())]
+    scale, rank = scale_of(values), np.arange(order.size)
+    x = scale(values.values[order])
+    if {f"{name}_low", f"{name}_high"} <= set(data.variables):
+        low, high = (scale(data[f"{name}_{end}"].values[order]) for end in ("low", "high"))
+        ax.hlines(rank, low, high, color=_style.BLUE, lw=0.8, alpha=0.6)
+    far = is_far(values.values)[order]
+    ax.plot(x[~far], rank[~far], "o", ms=3, color=_style.BLUE)
+    ax.plot(x[far], rank[far], "o", ms=4, color=_style.RED)
+    ax.axvline(np.median(x), color=_style.grey(), ls="--", lw=0.8)
+    for place in np.flatnonzero(far)[:NAMED]:
+        is_left = x[place] < np.mean(ax.get_xlim())
+        ax.annotate(
+            str(data[SCAN].values[order[place]]), (x[place], rank[place]), fontsize="x-small",
+            xytext=(5 if is_left else -5, 0), textcoords="offset points", va="center",
+            ha="left" if is_left else "right",
+        )  # fmt: skip
+    ax.set_xlabel(scale.label(FIRST.get(name, str(values.attrs.get("long_name", name)).partition(":")[0])))
+    ax.set_yticks([])

@@ -1,0 +1,124 @@
+"""What there is to say of many scans: a row for each, the means with their intervals, the outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import xarray as xr
+
+from fractalcontact.base.random_effects import random_effects
+from fractalcontact.base.robust import is_far
+from fractalcontact.scenes._result_tables import (
+    SCAN,
+    Column,
+    ResultTable,
+    Rows,
+    amount,
+    column_scale,
+    group_of,
+    plain,
+    table_of,
+)
+from fractalcontact.scenes._results_folder import REPORT
+
+SCANS = "scans"  # folder and group of the single scans
+OVERVIEW = "overview"  # group: a row for every scan
+ERROR = "standard_error"  # of the fractal dimension
+WORDS = 3  # names of scans in a sentence
+# head, variable and decimals of what stands for a study
+MAIN_COLUMNS = (
+    ("dimension D", "fractal_dimension", 3),
+    ("JRC", "roughness_coefficient", 1),
+    ("Sq", "rms_height", None),
+    ("contact area", "contact_fraction", None),
+    ("closure", "interface_closure", None),
+    ("rigid dilatancy", "rigid_dilatancy", None),
+    ("peak strength", "peak_shear_strength", None),
+)
+ENDS = ("fractal_dimension_low", "fractal_dimension_high")
+_COLUMNS = [Column(head, name, decimals) for head, name, decimals in MAIN_COLUMNS]
+_ROWS = Rows(
+    "scans", (SCAN,),
+    (_COLUMNS[0], Column("95 % interval", ENDS, 3), *_COLUMNS[1:], Column("why it failed", "reason")),
+)  # fmt: skip
+
+
+def pooled(overview: xr.Dataset) -> xr.Dataset:
+    """Return the mean of every number over the scans, its interval, and the scatter between scans."""
+    means: dict[str, tuple[tuple[()], float, dict[str, str]]] = {}
+    for key, values in overview.data_vars.items():
+        if values.dtype.kind != "f" or str(key).endswith(("_low", "_high")) or key == ERROR:
+            continue
+        errors = overview[ERROR].values if key == "fractal_dimension" and ERROR in overview else 0.0
+        found = random_effects(values.values, errors)
+        text = f"{values.attrs['long_name'].partition(':')[0]}: "
+        facts = {
+            "": (found.mean, f"mean over {found.count} scans (random effects)"),
+            "_low": (found.low, "lower end of the 95 % interval of the mean over scans"),
+            "_high": (found.high, "upper end of the 95 % interval of the mean over scans"),
+            "_scatter": (found.between, "standard deviation between scans, without the error within each"),
+        }
+        for ending, (value, words) in facts.items():
+            means[f"{key}{ending}"] = ((), value, {"units": values.attrs["units"], "long_name": text + words})
+    return xr.Dataset(means)
+
+
+def folder_of(name: str) -> str:
+    """Return the name of the folder and the group of a scan."""
+    return name.replace("/", "_")
+
+
+def page_of(name: str) -> str:
+    """Return where the report of a scan lies, from that of all."""
+    return f"{SCANS}/{folder_of(name)}/{REPORT}"
+
+
+def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
+    """Yield the means over the scans and a row for every scan; nothing for a study of one surface."""
+    overview, root = group_of(tree, OVERVIEW), tree.to_dataset(inherit=False)
+    if overview is None:
+        return
+    done = int((overview["status"] == "done").sum())
+    keys, cells = [], []
+    for head, name, decimals in MAIN_COLUMNS:
+        if name not in root:
+            continue
+        scale = column_scale(root[name])
+        mean, low, high, scatter = (
+            amount(each, scale=scale) if decimals is None else plain(each, decimals)
+            for each in (root[f"{name}{end}"].rename(name) for end in ("", "_low", "_high", "_scatter"))
+        )
+        keys.append((head,))
+        cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter))
+    heads = (f"mean of {done} scans", "95 % interval", "scatter between scans")
+    yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells))
+    has_failed = done < overview.sizes[SCAN]
+    rows = _ROWS if has_failed else replace(_ROWS, columns=_ROWS.columns[:-1])
+    table = table_of(rows, tree, overview)
+    if table is not None:
+        yield table
+
+
+def scan_facts(tree: xr.DataTree) -> Iterator[str]:
+    """Yield how many scans there are and which failed, are outliers, or have caveats."""
+    overview = group_of(tree, OVERVIEW)
+    if overview is None:
+        return
+    names = overview[SCAN].values.astype(str)
+    failed = overview["status"].values == "failed"
+    yield f"{names.size} scans" + (f"; {failed.sum()} failed: {_few(names[failed])}" if failed.any() else "")
+    found = {head: names[is_far(overview[name].values)] for head, name, _ in MAIN_COLUMNS if name in overview}
+    texts = [f"{head} of {_few(far)}" for head, far in found.items() if far.size]
+    if texts:
+        yield f"outliers: {'; '.join(texts)}"
+    caveats = [name for name, text in zip(names, overview["caveats"].values, strict=True) if text]
+    if caveats:
+        yield f"scans with caveats, which their pages state: {_few(caveats)}"
+
+
+def _few(names: object) -> str:
+    """Return the first names, and how many more there are."""
+    words = [str(name) for name in names]  # type: ignore[attr-defined]
+    more = f" and {len(words) - WORDS} more" if len(words) > WORDS else ""
+    return ", ".join(words[:WORDS]) + more

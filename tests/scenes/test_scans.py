@@ -1,0 +1,233 @@
+"""Many scans as one study: which files, what is stacked, what fails, what a stop or a lost worker loses."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from study import command
+
+import fractalcontact as fc
+from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
+
+SCENE = """title = "Scans"
+[surface]
+read = "scans/*.nc"
+[want]
+surfaces = ["height", "describe"]
+dimensions = ["increments", "variogram"]
+domains = []
+"""
+GRIDS = {"a.nc": (32, 1e-4), "b.nc": (48, 1e-4), "c.nc": (32, 2e-4), "d.nc": (40, 1e-4), "e.nc": (32, 1e-4)}
+
+
+def write_scans(folder, grids=GRIDS):
+    (folder / "scans").mkdir()
+    for seed, (name, (size, spacing)) in enumerate(grids.items()):
+        surface = fc.surfaces.fbm((size, size), spacing, hurst=0.7, rms_increment=1e-5, rng=seed)
+        fc.save(surface, folder / "scans" / name)
+    (folder / "scans.toml").write_text(SCENE, encoding="utf-8")
+    return folder / "scans.toml"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Five scans, one of them damaged: its scene, folder and result."""
+    folder = tmp_path_factory.mktemp("scans")
+    scene = write_scans(folder)
+    (folder / "scans" / "damaged.nc").write_bytes(b"no heights")
+    with pytest.warns(FractalContactWarning, match="1 of 6 scans failed"):
+        result = fc.scenes.run(scene, out=folder / "out", progress=False)
+    return scene, folder / "out", result
+
+
+def same(one, other, leave_out=("run_time",)):
+    """Assert that two studies have the same bits in all groups, but for the time they took."""
+    assert [node.path for node in one.subtree] == [node.path for node in other.subtree]
+    for node in one.subtree:
+        data, twin = (each[node.path].to_dataset(inherit=False) for each in (one, other))
+        xr.testing.assert_equal(
+            data.drop_vars(leave_out, errors="ignore"), twin.drop_vars(leave_out, errors="ignore")
+        )
+
+
+def test_each_scan_equals_its_own_study(study):
+    _, out, result = study
+    for name in GRIDS:
+        surface = fc.open(out.parent / "scans" / name)
+        alone = fc.dimensions.estimate(surface, ["increments", "variogram"])
+        np.testing.assert_array_equal(result["dimensions/hurst"].sel(scan=name), alone["hurst"])
+        stored = fc.open(out / "result.nc")[f"scans/{name}/surfaces/height"]
+        np.testing.assert_array_equal(stored, surface)
+        assert (out / "scans" / name / "report.html").is_file()
+
+
+def test_a_damaged_scan_is_a_row_with_its_reason(study):
+    _, out, result = study
+    overview = result["overview"].to_dataset()
+    assert list(overview["scan"].values) == sorted([*GRIDS, "damaged.nc"])
+    row = overview.sel(scan="damaged.nc")
+    assert str(row["status"].values) == "failed"
+    assert "damaged" in str(row["reason"].values)
+    assert np.isnan(row["fractal_dimension"])
+    assert "damaged.nc" not in result["dimensions"]["scan"]
+    rows = (out / "scans.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + len(GRIDS) + 1
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert 'href="scans/a.nc/report.html"' in page
+    assert 'href="scans/damaged.nc' not in page
+
+
+def test_mean_has_the_interval_of_student_without_errors(study):
+    result = study[2]
+    heights = result["overview/rms_height"].values
+    heights = heights[np.isfinite(heights)]
+    half = 2.776445105197793 * heights.std(ddof=1) / np.sqrt(5)  # t of 4 degrees of freedom
+    mean, low, high = (float(result[f"rms_height{end}"]) for end in ("", "_low", "_high"))
+    np.testing.assert_allclose([mean, low, high], heights.mean() + half * np.array([0, -1, 1]), rtol=1e-9)
+
+
+def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
+    scene, out, result = study
+    surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-5, rng=9)
+    damaged, content = scene.parent / "scans" / "damaged.nc", b"no heights"
+    times = {name: (out / "scans" / name / "result.nc").stat().st_mtime_ns for name in GRIDS}
+    fc.save(surface, damaged)
+    mended = fc.scenes.run(scene, out=out, progress=False)
+    damaged.write_bytes(content)
+    assert {name: (out / "scans" / name / "result.nc").stat().st_mtime_ns for name in GRIDS} == times
+    assert (mended["overview/status"] == "done").all()
+    np.testing.assert_array_equal(
+        mended["dimensions/hurst"].drop_sel(scan="damaged.nc"), result["dimensions/hurst"]
+    )
+
+
+def test_workers_change_no_bit(tmp_path):
+    scene = write_scans(tmp_path)
+    results = [fc.scenes.run(scene, out=tmp_path / f"{n}", progress=False, workers=n) for n in (0, 2)]
+    same(*results)
+    same(*(fc.open(tmp_path / f"{n}" / "result.nc") for n in (0, 2)))
+
+
+def test_without_a_folder_the_result_has_maps_and_curves_have_their_own_scales(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4), "b.nc": (48, 2e-4)})
+    scene.write_text(f"{SCENE}figures = true\n", encoding="utf-8")
+    result = fc.scenes.run(scene, progress=False)
+    assert result["scans/b.nc/surfaces/height"].shape == (48, 48)
+    curves = result["dimensions/variogram"].to_dataset()
+    for name, size in (("a.nc", 32), ("b.nc", 48)):
+        surface = result[f"scans/{name}/surfaces/height"]
+        alone = fc.dimensions.variogram(surface)
+        count = alone.sizes["lag"]
+        assert count < size
+        for key in ("lag", "variogram"):
+            values = curves[key].sel(scan=name)
+            np.testing.assert_array_equal(values[:count], alone[key])
+            assert np.isnan(values[count:]).all()
+
+
+def test_pairs_are_matched_by_name_and_mismatches_listed(tmp_path):
+    write_scans(tmp_path, {f"{n}_{face}.nc": (32, 1e-4) for n in (1, 2) for face in "ab"})
+    for n in (1, 2):
+        lower = fc.open(tmp_path / "scans" / f"{n}_a.nc")
+        fc.save((lower + 1e-4).rename("height").assign_attrs(lower.attrs), tmp_path / "scans" / f"{n}_b.nc")
+    pair = '[joint]\nlower = "scans/*_a.nc"\nupper = "scans/*_b.nc"\nblock = 1e-3\nshear = [0.0, 1e-4]\n'
+    scene = tmp_path / "pairs.toml"
+    scene.write_text(pair + '[want]\njoints = ["rigid_dilatancy"]\n', encoding="utf-8")
+    result = fc.scenes.run(scene, progress=False)
+    assert list(result["overview/scan"].values) == ["1", "2"]
+    (tmp_path / "scans" / "2_b.nc").rename(tmp_path / "scans" / "3_b.nc")
+    with pytest.raises(InvalidInput, match="2_a.nc has no upper face; scans/3_b.nc has no lower face"):
+        fc.scenes.validate(scene)
+
+
+def test_a_scene_that_fits_no_scan_is_refused(tmp_path):
+    write_scans(tmp_path, {"a.nc": (32, 1e-4), "b.nc": (32, 1e-4)})
+    scene = tmp_path / "joint.toml"
+    text = (
+        SCENE.replace("domains = []", 'joints = ["rigid_dilatancy"]') + "[joint]\nblock = 1.0\nshear = 0.0\n"
+    )
+    scene.write_text(text, encoding="utf-8")
+    with pytest.raises(InvalidInput, match="block"):
+        fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
+
+
+def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_path):
+    write_scans(tmp_path)
+    files = [*(tmp_path / "scans" / name for name in GRIDS), tmp_path / "scans" / "bad.nc"]
+    files[-1].write_bytes(b"")
+    done = command("roughness", *files, "-o", tmp_path / "out", "--workers", 2)
+    assert done.returncode == 1, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 40
+    assert sum(line.startswith(tuple(GRIDS)) for line in lines) == len(GRIDS)
+    assert any(line.startswith("dimension D") for line in lines)
+    refused = command("joint", *files[:4], "--young", "30GPa", "-o", tmp_path / "joint")
+    assert refused.returncode == 2
+    assert "differ by the face alone" in refused.stderr
+
+
+def test_many_rows_are_cut_with_a_word(study):
+    overview = study[2]["overview"].to_dataset().isel(scan=[0, 1, 2, 3, 4] * 20)
+    overview["scan"] = [f"scan {n:03d}" for n in range(100)]
+    tree = xr.DataTree.from_dict({"/": study[2].to_dataset(), "/overview": overview})
+    text = fc.scenes.summary(tree)
+    assert len(text.splitlines()) <= 36
+    assert "of 100)" in text
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_stopped_study_resumes_from_its_finished_scans(tmp_path, number):
+    scene = write_scans(tmp_path)
+    whole = fc.scenes.run(scene, out=tmp_path / "whole", progress=False)
+    out = tmp_path / "out"
+    words = [sys.executable, "-m", "fractalcontact", "run", scene, "-o", out, "--workers", "2", "--quiet"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    while not list(out.glob("scans/*/report.html")) and process.poll() is None:
+        time.sleep(0.005)
+    process.send_signal(number)
+    _, message = process.communicate(timeout=120)
+    assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), message
+    finished = {path: path.stat().st_mtime_ns for path in out.glob("scans/*/report.html")}
+    assert finished
+    same(fc.scenes.run(scene, out=out, progress=False), whole)
+    assert {path: path.stat().st_mtime_ns for path in finished} == finished
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lost", ["worker", "scheduler"])
+def test_lost_process_of_dask_loses_no_finished_scan(tmp_path, lost):
+    distributed = pytest.importorskip("distributed")
+    scene, out = write_scans(tmp_path), tmp_path / "out"
+    whole = fc.scenes.run(scene, out=tmp_path / "whole", progress=False)
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+
+    def end_one():
+        while not list(out.glob("scans/*/report.html")):
+            time.sleep(0.005)
+        if lost == "worker":
+            os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
+        else:
+            cluster.close()
+
+    with cluster, distributed.Client(cluster) as client:
+        killer = threading.Thread(target=end_one, daemon=True)
+        killer.start()
+        if lost == "worker":
+            result = fc.scenes.run(scene, out=out, progress=False, client=client)
+        else:
+            with pytest.raises(FractalContactError, match="the same run resumes"):
+                fc.scenes.run(scene, out=out, progress=False, client=client)
+        killer.join(30)
+    finished = {path: path.stat().st_mtime_ns for path in out.glob("scans/*/report.html")}
+    if lost == "scheduler":
+        result = fc.scenes.run(scene, out=out, progress=False)
+        assert finished
+        assert {path: path.stat().st_mtime_ns for path in finished} == finished
+    same(result, whole)
