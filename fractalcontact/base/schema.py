@@ -515,6 +515,10 @@ QUANTITIES: dict[str, Quantity] = {
     **_with_ends("interval_coverage", "1", "share of the 95 % intervals that hold the true exponent"),
     "interval_share": Quantity("1", "share of the surfaces with an interval"),
     "caveats": Quantity(None, "what limits the results of the scan"),
+    "between_scans": Quantity("1", "standard deviation of the exponent between scans"),
+    "within_scans": Quantity("1", "standard error of the exponent of a scan, root mean square over scans"),
+    "heterogeneity": Quantity("1", "share of the scatter between scans in the mean square"),
+    "scan_count": Quantity("1", "number of scans"),
     "status": Quantity(None, "whether the study of the scan is done or failed"),
     "member_count": Quantity("1", "number of surfaces"),
 }

@@ -5,6 +5,7 @@ from ._estimate import estimate as estimate
 from ._exponent_by_scale import scaling as scaling
 from ._hurst_map import hurst_map as hurst_map
 from ._methods import methods as methods
+from ._pool import pool as pool
 from ._profile_lengths import divider as divider
 from ._profile_lengths import higuchi as higuchi
 from ._roughness_length import detrended_fluctuation as detrended_fluctuation
@@ -26,6 +27,7 @@ __all__ = [
     "higuchi",
     "hurst_map",
     "methods",
+    "pool",
     "roughness_length",
     "scaling",
     "spectrum",
