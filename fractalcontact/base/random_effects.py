@@ -47,7 +47,8 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
     if count < 2:
         mean = float(x[0]) if count else np.nan
         half = 1.959963984540054 * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan  # normal
-        return RandomEffects(mean, mean - half, mean + half, np.nan, np.nan, np.nan, count)
+        within = float(s[known].mean()) if count else np.nan
+        return RandomEffects(mean, mean - half, mean + half, np.nan, within, np.nan, count)
     tau2 = _between(x, variance)
     total = variance + tau2
     if not total.any():  # equal values without errors
