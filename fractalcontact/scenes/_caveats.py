@@ -36,13 +36,14 @@ def caveats(tree: xr.DataTree) -> list[str]:
     Returns
     -------
     list of str
-        One sentence each, the most important first: spikes of a scan, a tilted surface below a flat, islands
-        of too few cells, pressures and strengths beyond those of the material, slopes beyond small strains,
-        uplift that did not come to balance. Empty where the results have no such limit.
+        One sentence each, the most important first: a dimension without an interval, spikes of a scan, a
+        tilted surface below a flat, islands of too few cells, pressures and strengths beyond those of the
+        material, slopes beyond small strains, uplift that did not come to balance. Empty where the results
+        have no such limit.
     """
     if group_of(tree, "overview") is not None:  # of many scans: it has the caveats of each
         return []
-    lines = [*_spikes(tree), *_tilt(tree)]
+    lines = [*_no_interval(tree), *_spikes(tree), *_tilt(tree)]
     pressed = {path: group_of(tree, path) for path in PRESSED}
     known = {path: data for path, data in pressed.items() if data is not None and "contact_fraction" in data}
     for path, data in known.items():
@@ -53,6 +54,16 @@ def caveats(tree: xr.DataTree) -> list[str]:
     for path, data in known.items():
         lines += _slopes(path, data, PRESSED[path])
     return [*lines, *_uplift(tree)]
+
+
+def _no_interval(tree: xr.DataTree) -> Iterator[str]:
+    """Yield why the fractal dimension has no interval, each reason once."""
+    estimates = group_of(tree, "dimensions")
+    if estimates is None or "default" not in estimates["method"].values:
+        return
+    reasons = estimates["reason"].sel({"method": "default"}).values
+    for reason in dict.fromkeys(str(text) for text in np.atleast_1d(reasons) if text):
+        yield f"D has no interval: {reason}."
 
 
 def _spikes(tree: xr.DataTree) -> Iterator[str]:

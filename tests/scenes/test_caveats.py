@@ -131,3 +131,15 @@ def test_cells_per_island_are_plain_numbers():
     both = xr.concat([each.reset_coords("closure") for each in pressed], "shear", data_vars="all")
     words = text(study(both))
     assert re.search(r"\(median island 1 to 1[0-9]00 cells, ", words)
+
+
+def test_dimension_without_interval_has_its_reason():
+    surface = fc.surfaces.fbm((64, 64), 1e-5, hurst=0.6, rms_increment=1e-7, rng=4)
+    enlarged = surface.copy(data=np.repeat(surface.values[::2], 2, axis=0))
+    for heights, stated in ((enlarged, True), (surface, False)):
+        estimates = fc.dimensions.estimate(heights, ["default"])
+        reason = str(estimates.reason.values[0])
+        assert bool(reason) == stated
+        words = text(xr.DataTree.from_dict({"dimensions": estimates}))
+        assert (f"D has no interval: {' '.join(reason.split())}." in words) == stated
+        assert ("D has no interval" in words) == stated
