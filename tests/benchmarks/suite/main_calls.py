@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 import warnings
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -45,12 +46,14 @@ def periodic(n: int = 256) -> xr.DataArray:
     return fc.surfaces.spectral((n, n), SPACING, hurst=0.8, rms_height=1e-5, rng=4)
 
 
-def measured_map() -> xr.DataArray:
-    """Return a map of a white-light interferometer, where the folder of measured surfaces has it."""
+def measured_map(name: str) -> xr.DataArray:
+    """Return a measured map, where the folder of measured surfaces has it."""
     folder = os.environ.get("FRACTALCONTACT_DATA")
     if not folder:
         raise NotImplementedError("FRACTALCONTACT_DATA is not set")  # asv skips the benchmark
-    return fc.surfaces.from_array(np.load(Path(folder) / "wli_126um_opd1.npy").astype(float), 1e-6)
+    spacing = json.loads((Path(folder) / f"{name}.json").read_text(encoding="utf-8"))
+    heights = np.load(Path(folder) / f"{name}.npy").astype(float)
+    return fc.surfaces.from_array(heights, (spacing["dy"], spacing["dx"]))
 
 
 def shipped() -> xr.DataArray:
@@ -74,7 +77,8 @@ class Estimate(ProcessorTime):
         "gapped": gapped,
         "profile": profile,
         "shipped crack": shipped,
-        "interferometer": measured_map,
+        "interferometer": partial(measured_map, "wli_126um_opd1"),
+        "atomic force microscope": partial(measured_map, "afm_10um_di3"),
     }
     params = list(inputs)
     param_names = ("surface",)
