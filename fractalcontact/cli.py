@@ -33,6 +33,7 @@ from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
 SOFTEST = 1e4  # Pa: below the softest gels; a modulus below it is in another unit
+WEAKEST = 1e4  # Pa: below the weakest clays; a strength below it is in another unit
 QUESTIONS = {
     "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
     "contact": "contact of a scan with a flat under growing pressure",
@@ -288,6 +289,9 @@ def _answer(options: argparse.Namespace) -> int:
         arguments |= {"register": not options.as_scanned, "wall_strength": options.jcs}
     if arguments.get("young", SOFTEST) < SOFTEST:
         message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
+        warnings.warn(message, ScaleWarning, stacklevel=2)
+    if (arguments.get("wall_strength") or WEAKEST) < WEAKEST:
+        message = f"--jcs: {options.jcs:g} Pa is weaker than any rock; is it {options.jcs:g} MPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:

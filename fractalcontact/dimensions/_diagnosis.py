@@ -55,11 +55,16 @@ def diagnose(surface: Surface) -> str:
 
 
 def rounding_step(surface: Surface) -> float:
-    """Return the step to which scaled heights were rounded; 0 where none is seen in some of the rows."""
+    """Return the step to which scaled heights were rounded; 0 where none is seen in some of the rows.
+
+    Second differences are multiples of it, also once a plane was subtracted.
+    """
     rows = surface.heights[:: max(1, surface.shape[0] // _ROWS)]
-    sample = rows[:, :: -(-rows.size // _SAMPLE)]
-    observed = sample[np.isfinite(sample)]
+    bends = np.diff(rows[:, :: -(-rows.size // _SAMPLE)], 2, axis=1)
+    observed = bends[np.isfinite(bends)]
+    rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(rows), initial=0.0)))  # of the numbers themselves
     levels = np.unique(observed)
+    levels = levels[np.diff(levels, prepend=-np.inf) > rounding]
     if observed.size < 8 or not 2 <= levels.size <= _DISTINCT * observed.size:
         return 0.0
     gaps = np.diff(levels)
@@ -129,7 +134,8 @@ def _seams(heights: Array, step: float) -> str:
     for lines, name in ((heights, "rows"), (heights.T, "columns")):
         # spikes move no median; where heights were rounded, it would jump between a few numbers
         even = (np.arange(lines.shape[1]) * _GOLDEN) % 1.0 - 0.5
-        squares = np.median((np.diff(lines, axis=0) + step * even) ** 2, axis=1)
+        steps = np.diff(lines, axis=0)
+        squares = np.median((steps - np.median(steps) + step * even) ** 2, axis=1)
         if not squares.min() > 0.0:
             continue
         low, middle, high = np.quantile(np.log(squares), (0.25, 0.5, 0.75))

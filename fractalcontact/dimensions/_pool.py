@@ -17,6 +17,7 @@ SOURCE = (
     "Hartung and Knapp, Statistics in Medicine 20 (2001) 3875-3889; "
     "Sidik and Jonkman, Statistics in Medicine 21 (2002) 3153-3159"
 )
+FEWER = "fewer than two scans have an interval"
 NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_max")
 
 
@@ -27,13 +28,16 @@ def _check(problems: Problems, *, estimates: Any, method: Any) -> None:
     problems.require(bool(results), "estimates", expected, NONE)
     for each in results:
         is_result = (
-            isinstance(each, xr.Dataset) and set(NEEDED) <= set(each.variables) and "method" in each.dims
+            isinstance(each, xr.Dataset)
+            and set(NEEDED) <= set(each.variables)
+            and each.sizes.get("method", 0) > 0
         )
         got = Words(type(each).__name__)
         if not problems.require(is_result, "estimates", expected, got) or method is None:
             continue
         known = [str(name) for name in each["method"].values]
         problems.choice("method", method, known)
+    problems.require(method is None or isinstance(method, str), "method", "a name", method)
 
 
 def _is_mapping(estimates: Any) -> bool:
@@ -45,6 +49,7 @@ def _is_mapping(estimates: Any) -> bool:
     references=SOURCE,
     achieved_error="that of the interval",
     check=_check,
+    reasons=dict.fromkeys(("between_scans", "within_scans", "heterogeneity"), FEWER),
 )
 def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
     """Pool the exponents of several scans into one with a 95 % interval (random-effects meta-analysis).
@@ -102,8 +107,8 @@ def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
 
     hurst, error = values("hurst"), values("standard_error")
     found = random_effects(hurst, error)
-    whole = float(np.nanmedian(hurst + values("fractal_dimension")))  # 3, or 2 of profiles
     used = np.isfinite(hurst) & np.isfinite(error)
+    whole = float(np.median((hurst + values("fractal_dimension"))[used])) if used.any() else np.nan  # 3 or 2
     ends = (values("scale_min")[used], values("scale_max")[used])
     return xr.Dataset(
         {

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.robust import is_far
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import result_of
@@ -47,9 +48,12 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     'height Sq (µm)'
     """
     data = result_of(overview, "scans", (), (SCAN,), units)
-    names = [str(name) for name, values in data.data_vars.items() if values.dtype.kind == "f"]
+    columns = {str(name): values for name, values in data.data_vars.items() if values.dims == (SCAN,)}
+    names = [name for name, values in columns.items() if values.dtype.kind == "f"]
     names = [name for name in names if not name.endswith(NOT_SHOWN) and np.isfinite(data[name]).any()]
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
+    with Problems("fractalcontact.plotting.scans") as problems:
+        problems.require(bool(names), "overview", "numbers over scan", NONE)
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
     for ax, name in zip(shown, names, strict=False):
         _draw_distribution(ax, data, name)

@@ -114,8 +114,12 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
         values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
         pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
         if max(abs(after - before) for _, after, before in pairs) > SPIKED_JRC:
-            text = (f"{jrc_text(a, 0)}, not {jrc_text(b, 0)}, toward {name}" for name, a, b in pairs)
-            yield f"JRC is {', '.join(text)}"
+            words = [(name, jrc_text(after, 0), jrc_text(before, 0)) for name, after, before in pairs]
+            text = [
+                f"{after}, not {before}, toward {name}" for name, after, before in words if after != before
+            ]
+            if text:
+                yield f"JRC is {', '.join(text)}"
 
 
 def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:

@@ -78,6 +78,10 @@ def export(
         raise MissingExtra("VTK image data", "pyevtk", "vtk")
     if isinstance(result, xr.DataArray):
         result = result.to_dataset(name="values" if result.name is None else result.name)
+    if isinstance(result, xr.DataTree):
+        result = result.map_over_datasets(_ascending)
+    else:
+        result = _ascending(result)
     target = Path(folder)
     files = {target / file.name: file for group in groups_of(result) for file in FORMATS[to](*group)}
     with Problems(WHERE) as problems:
@@ -93,6 +97,11 @@ def export(
     return list(files)
 
 
+def _ascending(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose y and x ascend."""
+    return dataset.sortby([dim for dim in dataset.dims if dim in MAP_DIMS and dim in dataset.coords])
+
+
 class _File(NamedTuple):
     """The name of a file, and what writes it."""
 
@@ -104,7 +113,7 @@ def _maps(dataset: xr.Dataset) -> Iterator[tuple[tuple[str, ...], list[str]]]:
     """Yield the leading dims of the maps of numbers, each set once, with the names of its maps."""
     by_dims: dict[tuple[str, ...], list[str]] = {}
     for name, variable in dataset.data_vars.items():
-        if set(variable.dims) >= MAP_DIMS and variable.dtype.kind in "biuf":
+        if set(variable.dims) >= MAP_DIMS and variable.dtype.kind in "biuf" and variable.size:
             leading = tuple(str(dim) for dim in variable.dims if dim not in MAP_DIMS)
             by_dims.setdefault(leading, []).append(str(name))
     yield from by_dims.items()

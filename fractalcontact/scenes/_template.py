@@ -115,6 +115,9 @@ def template(
             problems.choice("turn_upper", turn_upper, ("x", "y"), optional=True)
             problems.number("friction_angle", friction_angle, at_least=0, below=90, optional=True)
             problems.number("wall_strength", wall_strength, above=0, optional=True)
+            needed = friction_angle is not None or wall_strength is None
+            expected = "a friction angle (--friction-angle) beside the strength of the walls (--jcs)"
+            problems.require(needed, "wall_strength", expected, wall_strength)
         if is_pressed:
             problems.number("young", young, above=0)
             problems.boolean("register", register)
@@ -135,12 +138,14 @@ def template(
             }
         tables.append(("upper", _file_table(upper or "", folder, options | prepared)))
     if is_pressed:
-        angle = {} if friction_angle is None else {"basic_friction_angle": float(friction_angle)}
         material = {"young": float(young or 0.0), "poisson": float(poisson)}
-        tables.append(("material", material | (angle if is_joint else {})))
+        if is_joint and friction_angle is not None:
+            material["basic_friction_angle"] = float(friction_angle)
+        if is_joint and wall_strength is not None:
+            material["yield_pressure"] = float(wall_strength)  # true pressures beyond it are named
+        tables.append(("material", material))
     if is_joint:
-        strength = wall_strength if friction_angle is not None else None
-        tables += _joint(facts, register, turn_upper, strength)
+        tables += _joint(facts, register, turn_upper, wall_strength)
     else:
         tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
     names = [_words(each) for each in ((scan, upper) if is_joint and upper else (scan,))]

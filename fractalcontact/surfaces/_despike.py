@@ -16,7 +16,11 @@ from fractalcontact.base.validation import NONE, Problems
 Array = np.ndarray[Any, np.dtype[Any]]
 
 PASSES = 20
-GAUSSIAN = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
+SHARE, GAUSSIAN = (
+    0.9,
+    0.6080,
+)  # quantile of the absolute residual, and standard deviation over it of a Gaussian:
+# the median called a third of a coin and of heights of a few steps spikes
 ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Association 88 (1993) 1273-1283"
 
 
@@ -115,7 +119,7 @@ def _spikes(heights: Array, window: int, threshold: float) -> tuple[Array, float
     for number in range(PASSES):
         residual = np.abs(heights - _medians(remaining, window))
         if number == 0:
-            deviation = GAUSSIAN * float(np.nanmedian(residual))
+            deviation = GAUSSIAN * float(np.nanquantile(residual, SHARE))
         new = (residual > threshold * deviation) & ~flagged
         if deviation == 0 or not new.any():
             break

@@ -279,3 +279,15 @@ def test_elongated_surfaces(shape, hurst):
         result = fc.dimensions.estimate(surface).isel(method=0)
         held.append(bool(float(result.ci_low) <= hurst <= float(result.ci_high)))
     assert sum(held) >= 5
+
+
+@pytest.mark.parametrize("steps", [17.0, 5.0, 3.0])
+def test_rounded_heights_keep_their_interval_when_levelled(steps):
+    surface = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    step = float(np.diff(surface.values, 2).std()) / steps
+    tilted = surface.values + 8e-6 * np.arange(256)
+    rounded = surface.copy(data=np.rint(tilted / step) * step)
+    found = [fc.dimensions.estimate(each).isel(method=0) for each in (rounded, fc.surfaces.level(rounded))]
+    assert [str(each.reason.values) for each in found] == ["", ""]
+    assert float(found[1].hurst) == pytest.approx(float(found[0].hurst), abs=1e-3)
+    assert float(found[1].ci_low) < 0.7 < float(found[1].ci_high)
