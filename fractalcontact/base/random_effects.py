@@ -51,8 +51,9 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
         return RandomEffects(mean, mean - half, mean + half, np.nan, within, np.nan, count)
     tau2 = _between(x, variance)
     total = variance + tau2
-    if not total.any():  # equal values without errors
-        return RandomEffects(float(x[0]), float(x[0]), float(x[0]), 0.0, 0.0, 0.0, count)
+    if not total.all():  # equal values, some without errors
+        within = float(np.sqrt(variance.mean()))
+        return RandomEffects(float(x[0]), float(x[0]), float(x[0]), 0.0, within, 0.0, count)
     weight = 1.0 / total
     mean = float(weight @ x / weight.sum())
     # the q of Hartung and Knapp, at least 1: otherwise values that agree by chance have too short an interval

@@ -107,17 +107,22 @@ def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
 
     hurst, error = values("hurst"), values("standard_error")
     found = random_effects(hurst, error)
+    low, high = np.clip((found.low, found.high), 0.0, 1.0)
     used = np.isfinite(hurst) & np.isfinite(error)
-    whole = float(np.median((hurst + values("fractal_dimension"))[used])) if used.any() else np.nan  # 3 or 2
+    wholes = np.unique(np.rint(hurst + values("fractal_dimension"))[used])  # 3 of surfaces, 2 of profiles
+    with Problems("fractalcontact.dimensions.pool") as problems:
+        expected = "those of surfaces or of profiles"
+        problems.require(wholes.size <= 1, "estimates", expected, Words("those of both"))
+    whole = float(wholes[0]) if wholes.size else np.nan
     ends = (values("scale_min")[used], values("scale_max")[used])
     return xr.Dataset(
         {
             "hurst": found.mean,
-            "ci_low": found.low,
-            "ci_high": found.high,
+            "ci_low": low,
+            "ci_high": high,
             "fractal_dimension": whole - found.mean,
-            "fractal_dimension_low": whole - found.high,
-            "fractal_dimension_high": whole - found.low,
+            "fractal_dimension_low": whole - high,
+            "fractal_dimension_high": whole - low,
             "between_scans": found.between,
             "within_scans": found.within,
             "heterogeneity": found.heterogeneity,

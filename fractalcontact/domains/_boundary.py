@@ -157,13 +157,14 @@ def has_interiors(cells: Array, valid: Array | None, grid: Grid, dimension: floa
 
 def cells_in_blocks(cells: Array, edge: int, periodic: Sequence[bool]) -> Array:
     """Mark the cells that lie in a block of `edge` x `edge` cells of the set (the opening by a square)."""
+    none = np.zeros_like(cells)
     for axis, wraps in enumerate(periodic):
         if wraps:
             widths = [(0, 0), (0, 0)]
             widths[axis] = (edge - 1, edge - 1)
             cells = np.pad(cells, widths, mode="wrap")
     if min(cells.shape) < edge:
-        return np.zeros_like(cells)
+        return none
     corners = cells
     for axis in (0, 1):
         corners = _combined(np.bitwise_and, corners, edge, axis)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.random_effects import random_effects
@@ -52,11 +53,15 @@ def pooled(overview: xr.Dataset) -> xr.Dataset:
             continue
         errors = overview[ERROR].values if key == "fractal_dimension" and ERROR in overview else 0.0
         found = random_effects(values.values, errors)
+        # D lies between two whole numbers; what is negative in no scan is so in no mean
+        is_dimension, smallest = key == "fractal_dimension", float(values.min())
+        least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
+        low, high = np.clip((found.low, found.high), least, least + 1.0 if is_dimension else np.inf)
         text = f"{values.attrs['long_name'].partition(':')[0]}: "
         facts = {
             "": (found.mean, f"mean over {found.count} scans (random effects)"),
-            "_low": (found.low, "lower end of the 95 % interval of the mean over scans"),
-            "_high": (found.high, "upper end of the 95 % interval of the mean over scans"),
+            "_low": (float(low), "lower end of the 95 % interval of the mean over scans"),
+            "_high": (float(high), "upper end of the 95 % interval of the mean over scans"),
             "_scatter": (found.between, "standard deviation between scans, without the error within each"),
         }
         for ending, (value, words) in facts.items():

@@ -193,7 +193,8 @@ def _run_scans(
             with netcdf.written_whole(folder / CSV) as temporary:
                 frame.to_csv(temporary, index=False)
             overview = xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
-            figures = _draw(overview, folder, progress) if scene.want.figures else []
+            has_numbers = not all(studies.reasons.values())
+            figures = _draw(overview, folder, progress) if scene.want.figures and has_numbers else []
             remove_old_figures(folder, figures)
             whole = summary_of(tree)
             write_report(tree, folder / REPORT, figures, whole)

@@ -47,7 +47,9 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
         for pair in pairs
     ]
     return {
-        name: replace(scene, name=name, tables={**scene.tables, "title": name, **own}, checked=None)
+        name: replace(
+            scene, name=name.replace("/", "_"), tables={**scene.tables, "title": name, **own}, checked=None
+        )
         for name, own in zip(names, tables, strict=True)
     }
 

@@ -98,3 +98,21 @@ def test_pooled_interval_covers_surfaces_whose_exponents_scatter():
         pooled = fc.dimensions.pool([fc.dimensions.estimate(scan, "increments") for scan in scans])
         held += bool(pooled.ci_low < 0.6 < pooled.ci_high)
     assert held >= 33  # 38 of 40 are expected; fewer than 33 have a chance below 0.002
+
+
+def test_ends_of_the_interval_are_possible():
+    pooled = fc.dimensions.pool(estimates_of([0.9, 0.99], [0.05, 0.05]))
+    assert 0.0 < float(pooled.ci_low) < float(pooled.ci_high) == 1.0
+    assert float(pooled.fractal_dimension_low) == 2.0
+
+
+def test_equal_exponents_of_which_one_has_no_error():
+    exact = fc.dimensions.pool(estimates_of([0.6, 0.6], [0.0, 0.1]))
+    assert [float(exact[name]) for name in ("hurst", "ci_low", "ci_high")] == [0.6, 0.6, 0.6]
+
+
+def test_surfaces_and_profiles_are_not_mixed():
+    profile = estimates_of([0.6], [0.1])
+    profile["fractal_dimension"] = 2.0 - profile["hurst"]
+    with pytest.raises(InvalidInput, match="those of both"):
+        fc.dimensions.pool([estimates_of([0.6], [0.1]), profile])

@@ -217,3 +217,11 @@ def test_unequal_spacings():
     mask = heights > float(heights.median())
     assert isinstance(mask, xr.DataArray)
     assert float(fc.domains.boundary_dimension(mask).boundary_dimension) == pytest.approx(1.5, abs=0.06)
+
+
+def test_surface_with_one_short_axis_beside_a_periodic_one():
+    heights = np.random.default_rng(1).random((8, 64))
+    mask = fc.surfaces.from_array(heights, 1.0, periodic=(False, True)) > 0.1
+    turned = fc.surfaces.from_array(heights.T.copy(), 1.0, periodic=(True, False)) > 0.1
+    one, other = (float(fc.domains.boundary_dimension(each).boundary_dimension) for each in (mask, turned))
+    assert one == pytest.approx(other, nan_ok=True)

@@ -89,7 +89,8 @@ def test_mean_has_the_interval_of_student_without_errors(study):
     heights = heights[np.isfinite(heights)]
     half = 2.776445105197793 * heights.std(ddof=1) / np.sqrt(5)  # t of 4 degrees of freedom
     mean, low, high = (float(result[f"rms_height{end}"]) for end in ("", "_low", "_high"))
-    np.testing.assert_allclose([mean, low, high], heights.mean() + half * np.array([0, -1, 1]), rtol=1e-9)
+    expected = np.maximum(heights.mean() + half * np.array([0, -1, 1]), 0.0)  # no mean height is negative
+    np.testing.assert_allclose([mean, low, high], expected, rtol=1e-9)
 
 
 def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
@@ -129,6 +130,27 @@ def test_without_a_folder_the_result_has_maps_and_curves_have_their_own_scales(t
             values = curves[key].sel(scan=name)
             np.testing.assert_array_equal(values[:count], alone[key])
             assert np.isnan(values[count:]).all()
+
+
+def test_scans_of_several_folders_keep_their_paths_as_names(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4)})
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "a.nc").write_bytes((tmp_path / "scans" / "a.nc").read_bytes())
+    text = SCENE.replace('"scans/*.nc"', '["scans/a.nc", "more/a.nc"]')
+    scene.write_text(text, encoding="utf-8")
+    result = fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert list(result["overview/scan"].values) == ["scans/a.nc", "more/a.nc"]
+    assert list(result["overview/status"].values) == ["done", "done"]
+
+
+def test_study_of_damaged_scans_alone_is_refused(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4), "b.nc": (32, 1e-4)})
+    for name in ("a.nc", "b.nc"):
+        (tmp_path / "scans" / name).write_bytes(b"no heights")
+    scene.write_text(SCENE + "figures = true\n", encoding="utf-8")
+    with pytest.raises(InvalidInput, match=r"a\.nc.*damaged"):
+        fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
 
 
 def test_pairs_are_matched_by_name_and_mismatches_listed(tmp_path):
