@@ -322,7 +322,9 @@ MASK_PROBES: dict[str, Probe] = {
 
 # powers of (length, modulus) in the units of results
 UNIT_POWERS = {"m": (1, 0), "Pa": (0, 1), "N": (2, 1), "J": (3, 1)}
-NOT_COMPARED = ("run_time", "iterations", "transforms")
+NOT_COMPARED = ("run_time", "iterations", "transforms", "residual")  # a residual is rounding over a tolerance
+# relative: last bits differ between processes (4e-14 of the closure of a strip of 1 : 1000, in one of three)
+LAST_BITS = 1e-12
 
 
 def _in_other_units(name: str, probe: Probe, case: Case, dataset: xr.Dataset) -> Result:
@@ -332,7 +334,7 @@ def _in_other_units(name: str, probe: Probe, case: Case, dataset: xr.Dataset) ->
     other = probe(surface, replace(case, modulus=case.modulus * 2.0**MODULI))
     error = _unit_error(dataset, other)
     seconds = time.perf_counter() - start
-    return Result(f"{name}.dependence_on_units", 0.0, error, error == 0, seconds, error)
+    return Result(f"{name}.dependence_on_units", 0.0, error, error <= LAST_BITS, seconds, error)
 
 
 def _scaled_surface(surface: xr.DataArray, power: int) -> xr.DataArray:
