@@ -38,7 +38,7 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
     Values without errors have the mean and the interval of Student. One value alone has the interval of its
     error, if it has one.
     """
-    from scipy.special import stdtrit
+    from scipy.special import ndtri, stdtrit
 
     x, s = np.broadcast_arrays(np.asarray(values, dtype=float), np.asarray(errors, dtype=float))
     known = np.isfinite(x) & np.isfinite(s)
@@ -46,20 +46,18 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
     count = x.size
     if count < 2:
         mean = float(x[0]) if count else np.nan
-        half = 1.959963984540054 * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan  # normal
+        half = ndtri(0.5 + LEVEL / 2) * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan
         within = float(s[known].mean()) if count else np.nan
         return RandomEffects(mean, mean - half, mean + half, np.nan, within, np.nan, count)
-    tau2 = _between(x, variance)
+    tau2, within = _between(x, variance), float(np.sqrt(variance.mean()))
     total = variance + tau2
     if not total.all():  # equal values, some without errors
-        within = float(np.sqrt(variance.mean()))
         return RandomEffects(float(x[0]), float(x[0]), float(x[0]), 0.0, within, 0.0, count)
     weight = 1.0 / total
     mean = float(weight @ x / weight.sum())
     # the q of Hartung and Knapp, at least 1: otherwise values that agree by chance have too short an interval
     q = max(1.0, float(weight @ (x - mean) ** 2) / (count - 1))
     half = float(stdtrit(count - 1, 0.5 + LEVEL / 2) * np.sqrt(q / weight.sum()))
-    within = float(np.sqrt(variance.mean()))
     return RandomEffects(
         mean, mean - half, mean + half, float(np.sqrt(tau2)), within, tau2 / (tau2 + within**2), count
     )
@@ -76,7 +74,7 @@ def _between(x: np.ndarray, variance: np.ndarray) -> float:
     spread = float(x.var(ddof=1))
     if spread == 0.0 or (variance.min() > 0 and excess(0.0) <= 0.0):
         return 0.0
-    # at the square of the range, no value can be as far from the mean as its weight asks
+    # with tau^2 of n times the variance of the values, their weighted squares add up to less than n - 1
     lowest = 0.0 if variance.min() > 0 else 1e-12 * spread
     highest = x.size * spread
     return float(brentq(excess, lowest, highest, xtol=1e-12 * spread)) if excess(lowest) > 0 else lowest

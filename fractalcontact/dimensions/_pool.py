@@ -33,10 +33,8 @@ def _check(problems: Problems, *, estimates: Any, method: Any) -> None:
             and each.sizes.get("method", 0) > 0
         )
         got = Words(type(each).__name__)
-        if not problems.require(is_result, "estimates", expected, got) or method is None:
-            continue
-        known = [str(name) for name in each["method"].values]
-        problems.choice("method", method, known)
+        if problems.require(is_result, "estimates", expected, got) and isinstance(method, str):
+            problems.choice("method", method, [str(name) for name in each["method"].values])
     problems.require(method is None or isinstance(method, str), "method", "a name", method)
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
+from fractalcontact.scenes._overview import OVERVIEW
 from fractalcontact.scenes._result_tables import group_of, length
 from fractalcontact.scenes._rows import aperture_as_placed
 
@@ -41,7 +42,7 @@ def caveats(tree: xr.DataTree) -> list[str]:
         material, slopes beyond small strains, uplift that did not come to balance. Empty where the results
         have no such limit.
     """
-    if group_of(tree, "overview") is not None:  # of many scans: it has the caveats of each
+    if group_of(tree, OVERVIEW) is not None:  # of many scans: it has the caveats of each
         return []
     lines = [*_no_interval(tree), *_spikes(tree), *_tilt(tree)]
     pressed = {path: group_of(tree, path) for path in PRESSED}

@@ -10,6 +10,7 @@ from typing import Any
 
 from fractalcontact.base.file_patterns import files_of, is_pattern
 from fractalcontact.base.validation import Problems, Words
+from fractalcontact.scenes._overview import folder_of
 from fractalcontact.scenes._scene import Scene
 
 
@@ -48,7 +49,7 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
     ]
     return {
         name: replace(
-            scene, name=name.replace("/", "_"), tables={**scene.tables, "title": name, **own}, checked=None
+            scene, name=folder_of(name), tables={**scene.tables, "title": name, **own}, checked=None
         )
         for name, own in zip(names, tables, strict=True)
     }

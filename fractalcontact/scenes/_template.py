@@ -169,10 +169,8 @@ def _names(scan: Files) -> list[str | os.PathLike[str]]:
 
 def _check_files(argument: str, scan: Any, problems: Problems) -> None:
     """Note files that do not exist."""
-    each_valid = [
-        problems.path(argument, each) for each in (scan if isinstance(scan, (list, tuple)) else [scan])
-    ]
-    if not all(each_valid):
+    valid = [problems.path(argument, each) for each in _names(scan)]
+    if not all(valid):
         return
     files = _files(scan)
     problems.require(bool(files), argument, "files", scan)

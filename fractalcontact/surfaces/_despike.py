@@ -16,11 +16,9 @@ from fractalcontact.base.validation import NONE, Problems
 Array = np.ndarray[Any, np.dtype[Any]]
 
 PASSES = 20
-SHARE, GAUSSIAN = (
-    0.9,
-    0.6080,
-)  # quantile of the absolute residual, and standard deviation over it of a Gaussian:
-# the median called a third of a coin and of heights of a few steps spikes
+# a quantile of the absolute residual, and the standard deviation of a Gaussian over it; the median called a
+# third of a coin and of heights of a few steps spikes
+SHARE, GAUSSIAN = 0.9, 0.6080
 ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Association 88 (1993) 1273-1283"
 
 
