@@ -63,39 +63,27 @@ MEASURED = (
 )
 
 
-def _check(
-    problems: Problems,
-    *,
-    hurst: Any,
-    sizes: Any,
-    families: Any,
-    methods: Any,
-    members: Any,
-    blur: Any,
-    noise: Any,
-    marks: Any,
-    keep: Any,
-    **_: Any,
-) -> None:
-    for name, value in {"blur": blur, "noise": noise, "marks": marks}.items():
+def _check(problems: Problems) -> None:
+    given = problems.given
+    for name, value in {"blur": given.blur, "noise": given.noise, "marks": given.marks}.items():
         problems.number(name, value, at_least=0.0)
-    problems.numbers("hurst", hurst, at_least=0.01, at_most=0.99)
-    has_sizes = problems.numbers("sizes", sizes, at_least=16, integral=True)
-    chosen = problems.choices("families", families, FAMILIES)
-    if methods is not None:
-        chosen = problems.choices("methods", methods, dimensions.methods()) and chosen
+    problems.numbers("hurst", at_least=0.01, at_most=0.99)
+    has_sizes = problems.numbers("sizes", at_least=16, integral=True)
+    chosen = problems.choices("families", among=FAMILIES)
+    if given.methods is not None:
+        chosen = problems.choices("methods", among=dimensions.methods()) and chosen
     if chosen:
-        some = bool(word_tuple(families)) and (methods is None or bool(word_tuple(methods)))
+        some = bool(word_tuple(given.families)) and (given.methods is None or bool(word_tuple(given.methods)))
         problems.require(some, "families / methods", "at least one of each", NONE)
-    has_members = problems.numbers("members", members, at_least=2, integral=True, optional=True)
-    if has_members and has_sizes and members is not None:
-        counts = float_array(members)
-        lengths = 1, len(np.unique(sizes))
+    has_members = problems.numbers("members", at_least=2, integral=True, optional=True)
+    if has_members and has_sizes and given.members is not None:
+        counts = float_array(given.members)
+        lengths = 1, len(np.unique(given.sizes))
         expected = f"one number, or one for each of the {lengths[1]} sizes"
-        problems.require(len(counts) in lengths, "members", expected, members)
-    if keep is not None:
-        named = isinstance(keep, (str, os.PathLike)) and Path(keep).suffix == ".nc"
-        problems.require(named, "keep", "a file name that ends in '.nc'", keep)
+        problems.require(len(counts) in lengths, "members", expected)
+    if given.keep is not None:
+        named = isinstance(given.keep, (str, os.PathLike)) and Path(given.keep).suffix == ".nc"
+        problems.require(named, "keep", "a file name that ends in '.nc'")
 
 
 @public_result(title=TITLE, references=REFERENCES, check=_check)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.numbers import is_real
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import GIVEN, Problems
 
 AZIMUTHS = {"E": 0.0, "NE": 45.0, "N": 90.0, "NW": 135.0, "W": 180.0, "SW": 225.0, "S": 270.0, "SE": 315.0}
 COMPASS = ("E", "N", "W", "S")
@@ -30,8 +30,9 @@ class Direction:
     unit: tuple[float, float]
 
 
-def check_direction(problems: Problems, value: Any) -> bool:
-    """Check for one compass word or azimuth in degrees."""
+def check_direction(problems: Problems, value: Any = GIVEN) -> bool:
+    """Check for one compass word or azimuth in degrees, by default that of the argument `direction`."""
+    value = problems.given.direction if value is GIVEN else value
     if isinstance(value, str):
         valid = WORDS.get(value, value) in AZIMUTHS
     else:
@@ -39,15 +40,11 @@ def check_direction(problems: Problems, value: Any) -> bool:
     return problems.require(valid, "direction", EXPECTED, value)
 
 
-def checked_direction(problems: Problems, value: Any) -> Any:
-    """Check a direction and return it; in place of a wrong one "E", to check the other arguments with."""
-    return value if check_direction(problems, value) else "E"
-
-
-def check_directions(problems: Problems, value: Any) -> bool:
-    """Check for one direction or a sequence of them, in which each occurs once."""
+def check_directions(problems: Problems) -> bool:
+    """Check the argument `direction` for one direction or a sequence of them, in which each occurs once."""
+    value = problems.given.direction
     if not is_single(value) and not isinstance(value, (list, tuple, np.ndarray)):
-        problems.add("direction", f"{EXPECTED}, or a list of them", value)
+        problems.add("direction", f"{EXPECTED}, or a list of them")
         return False
     values = [value] if is_single(value) else list(value)
     if not values:

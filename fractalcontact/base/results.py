@@ -1,7 +1,7 @@
 """Decorator of public functions: validation, run time, labels and provenance of their results.
 
-    def _check(problems, mask, *, connectivity, **_):
-        problems.integer("connectivity", connectivity, at_least=1, at_most=2)
+    def _check(problems):
+        problems.integer("connectivity", at_least=1, at_most=2)
 
     @public_result(title="Islands of contact", references="...", achieved_error="exact", check=_check)
     def islands(mask, *, connectivity=2):
@@ -76,7 +76,7 @@ def public_result(
     title: str,
     references: str = NO_REFERENCES,
     achieved_error: str | None = None,
-    check: Callable[..., None] | None = None,
+    check: Callable[[Problems], object] | None = None,
     error: type[InvalidInput] = InvalidInput,
     in_blocks: bool = False,
     memory: Estimate = ARRAYS,
@@ -93,9 +93,8 @@ def public_result(
     achieved_error : str, optional
         The error in words, for a result without a number for it.
     check : callable, optional
-        Called as ``check(problems, **arguments)`` with a `Problems` and every argument, defaults included,
-        before the function; its problems are raised together. Arguments declared as `bool` are checked
-        already, and left out unless it names them.
+        Called as ``check(problems)`` before the function, with a `Problems` that has every argument, defaults
+        included; its problems are raised together. Arguments declared as `bool` are checked already.
     error : type, default InvalidInput
         The exception that lists the problems.
     in_blocks : bool
@@ -110,9 +109,7 @@ def public_result(
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature = inspect.signature(function)
         name = public_name(function)
-        own_flags = set() if check is None else set(inspect.signature(check).parameters)
         flags = flags_of(signature)
-        checked_flags = set(flags) - own_flags
 
         def checked(*arguments: Any, **options: Any) -> inspect.BoundArguments:
             try:
@@ -128,12 +125,11 @@ def public_result(
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
             if not in_blocks and (loaded := loaded_bytes(bound.arguments)):
                 require_memory(name, loaded, _size_of(bound.arguments))
-            with Problems(name, error) as problems:
+            with Problems(name, error, bound.arguments) as problems:
                 for flag in flags:
-                    problems.boolean(flag, bound.arguments[flag])
+                    problems.boolean(flag)
                 if check is not None:
-                    given = bound.arguments.items()
-                    check(problems, **{key: value for key, value in given if key not in checked_flags})
+                    check(problems)
             needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
             if needed > NEGLIGIBLE:
                 require_memory(name, needed, _size_of(bound.arguments))

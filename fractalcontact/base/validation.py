@@ -9,18 +9,25 @@ problem; if there is none, all values are valid. A check that needs valid values
 
         if problems.surface("surface", surface) and problems.number("lag", lag, above=0):
             problems.require(lag < extent, "lag", f"less than {extent:g} m", lag)
+
+The check of a public function (see `base.results`) finds the arguments of the call in `problems.given`, and a
+check without a value takes that of the argument:
+
+    def _check(problems):
+        problems.number("contact_modulus", above=0)
+        problems.choice("method", among=("fast", "elimination"))
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from inspect import Signature
 from math import isfinite
 from os import R_OK, PathLike, access, fsencode, fspath
 from pathlib import Path
-from types import TracebackType
+from types import SimpleNamespace, TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -44,6 +51,7 @@ class Words(str):
 
 
 NONE = Words("none")  # where a value is missing
+GIVEN = Words("the argument of the call")  # in place of a value to check
 
 
 class Problems:
@@ -55,18 +63,25 @@ class Problems:
         Public name of the function that is called, or the file that is read.
     error : type, default InvalidInput
         The exception to raise.
+    arguments : mapping, optional
+        The arguments of the call, by name.
 
     Attributes
     ----------
+    given : namespace
+        The arguments of the call.
     messages : list of str
         One line for each problem, so far.
     arguments : list of str
         The arguments that `add` noted, so far.
     """
 
-    def __init__(self, where: str, error: type[InvalidInput] = InvalidInput) -> None:
+    def __init__(
+        self, where: str, error: type[InvalidInput] = InvalidInput, arguments: Mapping[str, Any] | None = None
+    ) -> None:
         self.where = where
         self.error = error
+        self.given = SimpleNamespace(**(arguments or {}))
         self.messages: list[str] = []
         self.arguments: list[str] = []
 
@@ -82,8 +97,9 @@ class Problems:
         if error_type is None and self.messages:
             raise self.error(self.where, self.messages)
 
-    def add(self, argument: str, expected: str, got: object) -> None:
+    def add(self, argument: str, expected: str, got: object = GIVEN) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
+        got = self._value(argument, got)
         self.note(argument, f"{argument}: expected {expected}, got {_shown(got)}")
 
     def note(self, argument: str, message: str) -> None:
@@ -114,7 +130,11 @@ class Problems:
     def _extend(self, lines: Iterable[str]) -> None:
         self.messages.extend(line for line in lines if line not in self.messages)
 
-    def require(self, condition: bool, argument: str, expected: str, got: object) -> bool:
+    def _value(self, argument: str, value: Any) -> Any:
+        """Return a value to check: that of the argument of the call unless there is another."""
+        return getattr(self.given, argument) if value is GIVEN else value
+
+    def require(self, condition: bool, argument: str, expected: str, got: object = GIVEN) -> bool:
         """Note a problem unless `condition` holds; return the condition."""
         if not condition:
             self.add(argument, expected, got)
@@ -123,7 +143,7 @@ class Problems:
     def number(
         self,
         argument: str,
-        value: Any,
+        value: Any = GIVEN,
         *,
         above: float | None = None,
         at_least: float | None = None,
@@ -132,6 +152,7 @@ class Problems:
         optional: bool = False,
     ) -> bool:
         """Check for one finite real number inside the bounds; `optional` allows None."""
+        value = self._value(argument, value)
         if value is None and optional:
             return True
         if type(value) is float and isfinite(value):  # as most are, and a tenth of the time
@@ -146,7 +167,7 @@ class Problems:
     def numbers(
         self,
         argument: str,
-        value: Any,
+        value: Any = GIVEN,
         *,
         above: float | None = None,
         at_least: float | None = None,
@@ -160,6 +181,7 @@ class Problems:
 
         With `integral` they must be integers, of any numeric type; `any_shape` allows several dims.
         """
+        value = self._value(argument, value)
         if value is None and optional:
             return True
         expected = _interval(above, at_least, below, at_most)
@@ -187,13 +209,14 @@ class Problems:
     def integer(
         self,
         argument: str,
-        value: Any,
+        value: Any = GIVEN,
         *,
         at_least: int | None = None,
         at_most: int | None = None,
         optional: bool = False,
     ) -> bool:
         """Check for one integer inside the bounds; `optional` allows None."""
+        value = self._value(argument, value)
         if value is None and optional:
             return True
         inside = False
@@ -204,22 +227,29 @@ class Problems:
             at_most = high if int(value) > high else at_most
         return self.require(inside, argument, _interval(None, at_least, None, at_most, "an integer"), value)
 
-    def boolean(self, argument: str, value: Any, *, optional: bool = False) -> bool:
+    def boolean(self, argument: str, value: Any = GIVEN, *, optional: bool = False) -> bool:
         """Check for True or False; `optional` allows None."""
+        value = self._value(argument, value)
         valid = isinstance(value, (bool, np.bool_)) or (optional and value is None)
         return self.require(valid, argument, "None, True or False" if optional else "True or False", value)
 
-    def choice(self, argument: str, value: Any, allowed: Iterable[str], *, optional: bool = False) -> bool:
+    def choice(
+        self, argument: str, value: Any = GIVEN, among: Iterable[str] = (), *, optional: bool = False
+    ) -> bool:
         """Check for one of the allowed words; `optional` allows None."""
-        words = tuple(allowed)
+        value, words = self._value(argument, value), tuple(among)
         valid = (isinstance(value, str) and value in words) or (optional and value is None)
         if valid:
             return True
         return self.require(False, argument, f"one of {_quoted(words)}{did_you_mean(value, words)}", value)
 
-    def choices(self, argument: str, value: Any, allowed: Iterable[str]) -> bool:
+    def choices(
+        self, argument: str, value: Any = GIVEN, among: Iterable[str] = (), *, optional: bool = False
+    ) -> bool:
         """Check for one word or a sequence of words, each of them allowed; `word_tuple` converts them."""
-        words = tuple(allowed)
+        value, words = self._value(argument, value), tuple(among)
+        if value is None and optional:
+            return True
         if not isinstance(value, (str, list, tuple)) and not (
             isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "UO"
         ):
@@ -244,8 +274,9 @@ class Problems:
         expected = "finite values" + (f" ({remedy})" if remedy else "")
         return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
 
-    def path(self, argument: str, value: Any, *, what: str = "the path of a file") -> bool:
+    def path(self, argument: str, value: Any = GIVEN, *, what: str = "the path of a file") -> bool:
         """Check for the path of a file: text or a `pathlib.Path` that a file system can hold."""
+        value = self._value(argument, value)
         text = fspath(value) if isinstance(value, PathLike) else value
         if not isinstance(text, str) or text == "" or "\0" in text:
             return self.require(False, argument, what, value)
@@ -257,8 +288,9 @@ class Problems:
         fits = longest <= LONGEST_NAME and len(name) < LONGEST_PATH
         return self.require(fits, argument, f"names of at most {LONGEST_NAME} bytes", f"{longest} bytes")
 
-    def file(self, argument: str, value: Any, *, what: str = "an existing file") -> bool:
+    def file(self, argument: str, value: Any = GIVEN, *, what: str = "an existing file") -> bool:
         """Check for the path of a regular file that may be read; a device or a pipe is none."""
+        value = self._value(argument, value)
         if not self.path(argument, value):
             return False
         try:
@@ -274,7 +306,7 @@ class Problems:
     def surface(
         self,
         argument: str,
-        value: Any,
+        value: Any = GIVEN,
         *,
         finite: bool = True,
         smallest: int = 3,
@@ -288,7 +320,7 @@ class Problems:
         ----------
         argument : str
             Name of the argument.
-        value : DataArray
+        value : DataArray, optional
             Dims (..., y, x), or (..., x) where `profile` allows one.
         finite : bool
             Refuse NaN and infinite heights.
@@ -304,7 +336,7 @@ class Problems:
         from fractalcontact.base.grid import DECADES, surface_faults  # loads xarray
 
         faults = surface_faults(
-            value,
+            self._value(argument, value),
             argument,
             finite=finite,
             smallest=smallest,
@@ -314,23 +346,23 @@ class Problems:
         )
         return self._add_all(faults)
 
-    def grid(self, argument: str, array: Any, *, dims: Sequence[str] = ("y", "x")) -> bool:
+    def grid(self, argument: str, value: Any = GIVEN, *, dims: Sequence[str] = ("y", "x")) -> bool:
         """Check that `dims` are the last dims of a DataArray and have uniform coordinates in metres."""
         from fractalcontact.base.grid import grid_faults  # loads xarray
 
-        return self._add_all(grid_faults(array, argument, dims))
+        return self._add_all(grid_faults(self._value(argument, value), argument, dims))
 
-    def tree(self, argument: str, value: Any) -> bool:
+    def tree(self, argument: str, value: Any = GIVEN) -> bool:
         """Check for the DataTree of a study."""
         from fractalcontact.base.labelled import tree_faults  # loads xarray
 
-        return self._add_all(tree_faults(value, argument))
+        return self._add_all(tree_faults(self._value(argument, value), argument))
 
-    def result(self, argument: str, data: Any) -> bool:
+    def result(self, argument: str, value: Any = GIVEN) -> bool:
         """Check that a labelled result has the dims, types and units of the schema."""
         from fractalcontact.base.labelled import result_faults  # loads xarray
 
-        return self._add_all(result_faults(data, argument))
+        return self._add_all(result_faults(self._value(argument, value), argument))
 
     def _add_all(self, faults: Iterable[tuple[str, str, object]]) -> bool:
         """Note every fault; return whether there is none."""
@@ -339,17 +371,18 @@ class Problems:
             self.add(*fault)
         return len(self.messages) == before
 
-    def periodic(self, argument: str, value: Any, grid: Grid) -> bool:
-        """Check a choice of periodicity (None, True, False); `base.grid.periodic_axes` then applies it.
+    def periodic(self, grid: Grid, value: Any = GIVEN) -> bool:
+        """Check the argument `periodic` (None, True, False); `base.grid.periodic_axes` then applies it.
 
         A periodic axis may be declared free, never the reverse; True therefore needs every axis to be
         periodic, except where the array has no coordinates.
         """
-        if not self.boolean(argument, value, optional=True):
+        value = self._value("periodic", value)
+        if not self.boolean("periodic", value, optional=True):
             return False
         allowed = not value or not grid.has_coordinates or all(grid.periodic)
         expected = "periodic axes (attribute `period` of x and y equal to n * spacing)"
-        return self.require(allowed, argument, expected, value)
+        return self.require(allowed, "periodic", expected, value)
 
 
 def flags_of(signature: Signature) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,11 @@ class ContactOptions:
         for name in ("hardness", "tolerance"):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else float(value))
+
+    @classmethod
+    def among(cls, arguments: Mapping[str, Any]) -> ContactOptions:
+        """Return the options among the arguments of a call; others keep their defaults."""
+        return cls(**{field.name: arguments[field.name] for field in fields(cls) if field.name in arguments})
 
     def references(self, grid: Grid) -> str:
         """Return the sources of the methods used on this grid."""
@@ -165,8 +171,9 @@ class LoadPath:
         object.__setattr__(self, "values", tuple(float_array(self.values).tolist()))
 
     @classmethod
-    def from_keywords(cls, **loads: Any) -> LoadPath:
-        """Return the path given by exactly one of the keywords; the others are None."""
+    def among(cls, arguments: Mapping[str, Any]) -> LoadPath:
+        """Return the path among the arguments of a call, of which exactly one load is not None."""
+        loads = {name: arguments[name] for name in CONTROLS if name in arguments}
         with Problems("fractalcontact.contact.LoadPath") as problems:
             problems.exactly_one(**loads)
         return cls(*given_option(**loads))
@@ -185,15 +192,17 @@ def is_periodic(boundary: str | None, wraps: bool) -> bool:
     return wraps if boundary is None else boundary == "periodic"
 
 
-def check_problem(
-    problems: Problems, surface: Any, contact_modulus: Any, *, leading: bool = False, **keywords: Any
-) -> LoadPath | None:
-    """Check surface, modulus, load and options of a contact problem; return the load unless it is wrong."""
-    loads = {name: keywords.pop(name) for name in CONTROLS}
-    surface_is_valid = problems.surface("surface", surface, leading=leading)
-    problems.number("contact_modulus", contact_modulus, above=0)
-    options = problems.construct(ContactOptions, **keywords)
-    load = problems.construct(LoadPath.from_keywords, **loads)
+def check_problem(problems: Problems, *, leading: bool = False, **replaced: Any) -> LoadPath | None:
+    """Check surface, modulus, load and options of a contact problem; return the load unless it is wrong.
+
+    They are the arguments of the call, or what replaces these.
+    """
+    arguments = vars(problems.given) | replaced
+    surface, contact_modulus = arguments["surface"], arguments["contact_modulus"]
+    surface_is_valid = problems.surface("surface", leading=leading)
+    problems.number("contact_modulus", above=0)
+    options = problems.construct(ContactOptions.among, arguments)
+    load = problems.construct(LoadPath.among, arguments)
     if not surface_is_valid or options is None:
         return load
     grid = read_grid(surface)

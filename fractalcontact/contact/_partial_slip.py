@@ -32,33 +32,24 @@ Array = np.ndarray[Any, np.dtype[Any]]
 GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
 
 
-def _check(
-    problems: Problems,
-    *,
-    surface: Any,
-    contact_modulus: Any,
-    poisson: Any,
-    friction_coefficient: Any,
-    tangential_force: Any,
-    direction: Any,
-    method: Any,
-    keep: Any,
-    **keywords: Any,
-) -> None:
-    problems.number("poisson", poisson, above=-1, at_most=0.5)
-    problems.number("friction_coefficient", friction_coefficient, above=0, at_most=GREATEST_FRICTION)
-    problems.numbers("tangential_force", tangential_force)
-    check_direction(problems, direction)
-    problems.choice("method", method, METHODS, optional=True)
-    problems.choices("keep", keep, SLIP_MAPS)
-    load = check_problem(problems, surface, contact_modulus, **keywords)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.number("poisson", above=-1, at_most=0.5)
+    problems.number("friction_coefficient", above=0, at_most=GREATEST_FRICTION)
+    problems.numbers("tangential_force")
+    check_direction(problems)
+    problems.choice("method", among=METHODS, optional=True)
+    problems.choices("keep", among=SLIP_MAPS)
+    load = check_problem(problems, method="fast")
     if load is None:
         return
     expected = "one number: the normal load is constant while the tangential force changes"
     problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
     if not problems.messages and load.control != "closure":  # under a closure the force is not known yet
-        normal = float(load.solver_values(read_grid(surface).nominal_area)[1][0])
-        path = _shear_path(tangential_force, direction, friction_coefficient, poisson, method)
+        normal = float(load.solver_values(read_grid(given.surface).nominal_area)[1][0])
+        path = _shear_path(
+            given.tangential_force, given.direction, given.friction_coefficient, given.poisson, given.method
+        )
         check_sliding(problems, path, normal)
 
 
@@ -169,8 +160,8 @@ def partial_slip(
     (0.63, 0.63)
     """
     options = ContactOptions(boundary, influence, disc_radius, None, tolerance, "fast")
-    load = LoadPath.from_keywords(
-        closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+    load = LoadPath.among(
+        {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     )
     grid = read_grid(surface)
     path = _shear_path(tangential_force, direction, friction_coefficient, poisson, method)

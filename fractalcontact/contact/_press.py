@@ -39,13 +39,10 @@ NO_STIFFNESS = (
 PERIODIC_BYTES, FREE_BYTES, YIELD_BYTES, PUNCH_BYTES = 80.0, 188.0, 48.0, 72.0
 
 
-def _check(
-    problems: Problems, *, surface: Any, contact_modulus: Any, keep: Any, include: Any, **keywords: Any
-) -> None:
-    if keep is not None:
-        problems.choices("keep", keep, CONTACT_MAPS)
-    problems.choices("include", include, INCLUDE)
-    check_problem(problems, surface, contact_modulus, leading=True, **keywords)
+def _check(problems: Problems) -> None:
+    problems.choices("keep", among=CONTACT_MAPS, optional=True)
+    problems.choices("include", among=INCLUDE)
+    check_problem(problems, leading=True)
 
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
@@ -157,8 +154,8 @@ def press(
     1.0
     """
     options = ContactOptions(boundary, influence, disc_radius, hardness, tolerance, method)
-    load = LoadPath.from_keywords(
-        closure=closure, normal_force=normal_force, nominal_pressure=nominal_pressure
+    load = LoadPath.among(
+        {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     )
     grid = read_grid(surface)
     heights = np.asarray(surface.values, dtype=np.float64)

@@ -52,17 +52,18 @@ REASONS = {
 FLAT = "NaN: the surface is flat, and no theory of roughness holds"
 
 
-def _check(
-    problems: Problems, *, surface: Any, contact_modulus: Any, nominal_pressure: Any, **_: Any
-) -> None:
+def _check(problems: Problems) -> None:
     """Collect what is wrong with a call of `theories`."""
-    surface_is_valid = problems.surface("surface", surface)
-    modulus_is_valid = problems.number("contact_modulus", contact_modulus, above=0)
-    load = problems.construct(LoadPath.from_keywords, nominal_pressure=nominal_pressure)
+    given = problems.given
+    surface_is_valid = problems.surface("surface")
+    modulus_is_valid = problems.number("contact_modulus", above=0)
+    load = problems.construct(LoadPath.among, vars(given))
     if surface_is_valid and modulus_is_valid and load is not None and not problems.messages:
-        height_range = float(surface.values.max()) - float(surface.values.min())
+        height_range = float(given.surface.values.max()) - float(given.surface.values.min())
         elastic = ContactOptions()
-        check_scale(problems, read_grid(surface), height_range, float(contact_modulus), elastic, load)
+        check_scale(
+            problems, read_grid(given.surface), height_range, float(given.contact_modulus), elastic, load
+        )
 
 
 @public_result(

@@ -17,15 +17,13 @@ from fractalcontact.dimensions._windows import running_range, square_windows
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(problems: Problems, *, surface: Any, vertical_scale: Any) -> None:
+def _check(problems: Problems) -> None:
+    given = problems.given
     check_surface(
-        problems,
-        surface,
-        squares=True,
-        reserved=("cube_count", "cube_size", "pair_count", "vertical_scale", *ALWAYS),
+        problems, squares=True, reserved=("cube_count", "cube_size", "pair_count", "vertical_scale", *ALWAYS)
     )
-    if not (isinstance(vertical_scale, str) and vertical_scale == "range"):
-        problems.number("vertical_scale", vertical_scale, above=0, at_least=1e-50, at_most=1e50)
+    if not (isinstance(given.vertical_scale, str) and given.vertical_scale == "range"):
+        problems.number("vertical_scale", above=0, at_least=1e-50, at_most=1e50)
 
 
 @public_result(
@@ -120,10 +118,10 @@ _NAMES = {2: "covering_area", 1: "covering_length"}  # by number of axes
 _STEEP = 2.0**300  # slope beyond which the area is proportional to the heights
 
 
-def _check_covering(problems: Problems, *, surface: Any, vertical_scale: Any) -> None:
+def _check_covering(problems: Problems) -> None:
     reserved = (*_NAMES.values(), "cube_size", "pair_count", "vertical_scale", *ALWAYS)
-    check_surface(problems, surface, squares=True, reserved=reserved)
-    problems.number("vertical_scale", vertical_scale, above=0, at_least=1e-50, at_most=1e50)
+    check_surface(problems, squares=True, reserved=reserved)
+    problems.number("vertical_scale", above=0, at_least=1e-50, at_most=1e50)
 
 
 @public_result(

@@ -99,9 +99,9 @@ def no_profile(surface: Surface) -> str:
 def surface_check(*names: str, smallest: int = 3) -> Callable[..., None]:
     """Return the check of a curve that takes a surface only; `names` are the variables of its result."""
 
-    def check(problems: Problems, *, surface: Any) -> None:
+    def check(problems: Problems) -> None:
         reserved = (*names, "pair_count", *ALWAYS)
-        check_surface(problems, surface, smallest=smallest, squares=True, reserved=reserved)
+        check_surface(problems, smallest=smallest, squares=True, reserved=reserved)
 
     return check
 

@@ -64,10 +64,10 @@ _NO_MODEL = "the surface does not fit the model, anisotropic fractional Brownian
 _FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
 
 
-def _check(problems: Problems, *, surface: Any, azimuth: Any, scales: Any) -> None:
-    problems.numbers("azimuth", azimuth, optional=True)
-    is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_NAMES)
-    check_scales(problems, scales, surface if is_valid else None)
+def _check(problems: Problems) -> None:
+    problems.numbers("azimuth", optional=True)
+    is_valid = check_surface(problems, smallest=SMALLEST, profile=False, reserved=_NAMES)
+    check_scales(problems, is_valid=is_valid)
 
 
 @public_result(

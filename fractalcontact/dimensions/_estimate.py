@@ -53,25 +53,25 @@ _NAMES = (
 IN_BLOCKS = ("increments", "spectrum", "variogram")  # methods that read dask arrays block by block
 
 
-def _check(problems: Problems, *, surface: Any, methods: Any, scales: Any, noise: Any, psf: Any) -> None:
+def _check(problems: Problems) -> None:
+    given = problems.given
     names = [DEFAULT]
-    if methods is not None and problems.choices("methods", methods, (*SYNONYMS, *METHODS)):
-        names = [_row(name) for name in word_tuple(methods)]
-        problems.require(bool(names), "methods", "at least one name", methods)
-    problems.number("noise", noise, at_least=0.0, optional=True)
-    is_number = psf is not None and problems.number("psf", psf, at_least=0.0)
+    if given.methods is not None and problems.choices("methods", among=(*SYNONYMS, *METHODS)):
+        names = [_row(name) for name in word_tuple(given.methods)]
+        problems.require(bool(names), "methods", "at least one name")
+    problems.number("noise", at_least=0.0, optional=True)
+    is_number = given.psf is not None and problems.number("psf", at_least=0.0)
     is_valid = check_surface(
         problems,
-        surface,
         smallest=max((METHODS[name].smallest for name in names), default=4),
         gaps=all(METHODS[name].gaps for name in names),
         points=True,
         reserved=_NAMES,
     )
     if is_valid and is_number:
-        extent = max(read_grid(surface, core_dims(surface)).extent)
-        problems.number("psf", psf, at_most=extent)
-    check_scales(problems, scales, surface if is_valid else None)
+        extent = max(read_grid(given.surface, core_dims(given.surface)).extent)
+        problems.number("psf", at_most=extent)
+    check_scales(problems, is_valid=is_valid)
 
 
 @public_result(

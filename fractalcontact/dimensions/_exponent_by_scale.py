@@ -40,8 +40,9 @@ _NAMES = (
 )
 
 
-def _check(problems: Problems, *, surface: Any) -> None:
-    is_valid = check_surface(problems, surface, smallest=16, squares=True, reserved=_NAMES)
+def _check(problems: Problems) -> None:
+    surface = problems.given.surface
+    is_valid = check_surface(problems, smallest=16, squares=True, reserved=_NAMES)
     if is_valid and not is_lazy(surface):
         most = float(surface.isnull().mean([dim for dim in ("y", "x") if dim in surface.dims]).max())
         problems.require(most <= _MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")

@@ -32,17 +32,18 @@ _BENT = 2.6  # |z| of the bend of all windows together: one exact surface in a h
 _FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
 
 
-def _check(problems: Problems, *, surface: Any, window: Any, step: Any, scales: Any) -> None:
-    is_valid = check_surface(problems, surface, smallest=SMALLEST, profile=False, reserved=_FIELDS)
-    is_number = problems.number("window", window, above=0.0)
-    problems.number("step", step, above=0.0, optional=True)
-    check_scales(problems, scales, surface if is_valid else None)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    is_valid = check_surface(problems, smallest=SMALLEST, profile=False, reserved=_FIELDS)
+    is_number = problems.number("window", above=0.0)
+    problems.number("step", above=0.0, optional=True)
+    check_scales(problems, is_valid=is_valid)
     if not (is_valid and is_number):
         return
-    grid = read_grid(surface)
+    grid = read_grid(given.surface)
     least, most = SMALLEST * max(grid.spacing), min(grid.extent)
     expected = f"a length from {least:g} m ({SMALLEST} points) to {most:g} m"
-    problems.require(least * (1 - 1e-9) <= window <= most * (1 + 1e-9), "window", expected, window)
+    problems.require(least * (1 - 1e-9) <= given.window <= most * (1 + 1e-9), "window", expected)
 
 
 @public_result(title="Map of the Hurst exponent", check=_check, in_blocks=True)

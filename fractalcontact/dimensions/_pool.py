@@ -21,8 +21,9 @@ FEWER = "fewer than two scans have an interval"
 NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_max")
 
 
-def _check(problems: Problems, *, estimates: Any, method: Any) -> None:
-    several = list(estimates.values()) if _is_mapping(estimates) else estimates
+def _check(problems: Problems) -> None:
+    given = problems.given
+    several = list(given.estimates.values()) if _is_mapping(given.estimates) else given.estimates
     results = several if isinstance(several, (list, tuple)) else [several]
     expected = "results of fractalcontact.dimensions.estimate, or one along `scan`"
     problems.require(bool(results), "estimates", expected, NONE)
@@ -33,9 +34,9 @@ def _check(problems: Problems, *, estimates: Any, method: Any) -> None:
             and each.sizes.get("method", 0) > 0
         )
         got = Words(type(each).__name__)
-        if problems.require(is_result, "estimates", expected, got) and isinstance(method, str):
-            problems.choice("method", method, [str(name) for name in each["method"].values])
-    problems.require(method is None or isinstance(method, str), "method", "a name", method)
+        if problems.require(is_result, "estimates", expected, got) and isinstance(given.method, str):
+            problems.choice("method", among=[str(name) for name in each["method"].values])
+    problems.require(given.method is None or isinstance(given.method, str), "method", "a name")
 
 
 def _is_mapping(estimates: Any) -> bool:

@@ -23,14 +23,15 @@ _ROUNDING = (
 _NAMES = {2: "power_spectral_density", 1: "profile_power_spectral_density"}  # by number of axes
 
 
-def _check(problems: Problems, *, surface: Any, window: Any, tile: Any) -> None:
+def _check(problems: Problems) -> None:
+    given = problems.given
     reserved = (*_NAMES.values(), "wavenumber", "wavelength", "mode_count", *ALWAYS)
-    is_valid = check_surface(problems, surface, smallest=4, gaps=False, squares=True, reserved=reserved)
-    if window is not None:
-        problems.choice("window", window, ("auto", "hann", "none"))
-    if problems.integer("tile", tile, at_least=8, optional=True) and is_valid and tile is not None:
-        shortest = min(surface.sizes[dim] for dim in ("y", "x") if dim in surface.dims)
-        problems.require(tile <= shortest, "tile", f"at most {shortest}", tile)
+    is_valid = check_surface(problems, smallest=4, gaps=False, squares=True, reserved=reserved)
+    if given.window is not None:
+        problems.choice("window", among=("auto", "hann", "none"))
+    if problems.integer("tile", at_least=8, optional=True) and is_valid and given.tile is not None:
+        shortest = min(given.surface.sizes[dim] for dim in ("y", "x") if dim in given.surface.dims)
+        problems.require(given.tile <= shortest, "tile", f"at most {shortest}")
 
 
 @public_result(

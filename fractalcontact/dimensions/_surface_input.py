@@ -240,7 +240,6 @@ def has_gaps(surface: Any) -> bool:
 
 def check_surface(
     problems: Problems,
-    surface: Any,
     *,
     smallest: int = 3,
     gaps: bool = True,
@@ -254,10 +253,10 @@ def check_surface(
     Parameters
     ----------
     problems : Problems
-    surface : DataArray
-        Dims (..., y, x), or (..., x) where `profile` allows one.
     smallest : int
         Smallest number of points along each axis.
+    profile : bool
+        Allow a profile, dims (..., x), beside planes, dims (..., y, x).
     gaps : bool
         Allow NaN.
     squares : bool
@@ -267,15 +266,9 @@ def check_surface(
     reserved : collection of str
         Names of the result, which no leading dim may have.
     """
-    before = len(problems.messages)
+    before, surface = len(problems.messages), problems.given.surface
     problems.surface(
-        "surface",
-        surface,
-        finite=False,
-        smallest=smallest,
-        leading=True,
-        profile=profile,
-        decades=DECADES,
+        "surface", finite=False, smallest=smallest, leading=True, profile=profile, decades=DECADES
     )
     check_leading(surface, reserved, problems)
     if len(problems.messages) > before or is_lazy(surface):
@@ -291,19 +284,20 @@ def check_surface(
     return len(problems.messages) == before
 
 
-def check_scales(problems: Problems, scales: Any, surface: xr.DataArray | None) -> None:
+def check_scales(problems: Problems, *, is_valid: bool) -> None:
     """Check a window of lengths (low, high) in m; it must overlap the lengths of a valid `surface`."""
-    if scales is None or not problems.numbers("scales", scales, above=0):
+    scales, surface = problems.given.scales, problems.given.surface
+    if scales is None or not problems.numbers("scales", above=0):
         return
     values = np.atleast_1d(np.asarray(scales, dtype=np.float64))
     if values.size != 2 or not values[0] < values[-1]:
-        problems.add("scales", "two ascending lengths in metres, (low, high)", scales)
-    elif surface is not None:
+        problems.add("scales", "two ascending lengths in metres, (low, high)")
+    elif is_valid:
         grid = read_grid(surface, _core_dims(surface))
         shortest, longest = min(grid.spacing), max(grid.extent)
         overlaps = values[0] < longest and values[1] > shortest
         expected = f"a window that meets the lengths of the surface, {shortest:g} m to {longest:g} m"
-        problems.require(bool(overlaps), "scales", expected, scales)
+        problems.require(bool(overlaps), "scales", expected)
 
 
 def read_surfaces(surface: xr.DataArray) -> list[Surface]:

@@ -18,22 +18,23 @@ from fractalcontact.dimensions._windows import edge_lengths, running_range, squa
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(problems: Problems, *, surface: Any, sizes: Any, windows: Any, mean: Any) -> None:
+def _check(problems: Problems) -> None:
+    given = problems.given
     is_valid = check_surface(
-        problems, surface, squares=True, reserved=("variation", "window_size", "pair_count", *ALWAYS)
+        problems, squares=True, reserved=("variation", "window_size", "pair_count", *ALWAYS)
     )
-    problems.choice("windows", windows, ("segments", "squares"))
-    problems.choice("mean", mean, ("arithmetic", "geometric"))
-    if sizes is not None and problems.numbers("sizes", sizes, above=0) and is_valid:
-        grid = read_grid(surface, core_dims(surface))
+    problems.choice("windows", among=("segments", "squares"))
+    problems.choice("mean", among=("arithmetic", "geometric"))
+    if given.sizes is not None and problems.numbers("sizes", above=0) and is_valid:
+        grid = read_grid(given.surface, core_dims(given.surface))
         shortest, longest = (
             max(grid.spacing),
             min(d * (n - 1) for d, n in zip(grid.spacing, grid.shape, strict=True)),
         )
-        values = np.atleast_1d(np.asarray(sizes, dtype=np.float64))
+        values = np.atleast_1d(np.asarray(given.sizes, dtype=np.float64))
         is_inside = values.min() >= shortest * (1 - 1e-9) and values.max() <= longest * (1 + 1e-9)
         expected = f"lengths from {shortest:.3g} m (a spacing) to {longest:.3g} m (the surface)"
-        problems.require(bool(is_inside), "sizes", expected, sizes)
+        problems.require(bool(is_inside), "sizes", expected)
 
 
 @public_result(
@@ -158,10 +159,10 @@ SOURCE = (
 )
 
 
-def _check_lacunarity(problems: Problems, *, surface: Any, mass: Any) -> None:
-    problems.choice("mass", mass, ("range", "sum"))
+def _check_lacunarity(problems: Problems) -> None:
+    problems.choice("mass", among=("range", "sum"))
     reserved = ("lacunarity", "window_size", "pair_count", *ALWAYS)
-    check_surface(problems, surface, squares=True, reserved=reserved)
+    check_surface(problems, squares=True, reserved=reserved)
 
 
 @public_result(

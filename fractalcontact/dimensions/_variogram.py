@@ -27,14 +27,15 @@ _SEPARATE = 4.5  # spacings up to which every distance is a point of the curve
 _NAMES = ("variogram", "madogram", "second_variogram", "lag", "pair_count", *ALWAYS)
 
 
-def _check(problems: Problems, *, surface: Any, increments: Any, max_lag: Any) -> None:
-    problems.choice("increments", increments, ("square", "absolute", "second"))
-    is_valid = check_surface(problems, surface, squares=True, reserved=_NAMES)
-    if problems.number("max_lag", max_lag, above=0, optional=True) and is_valid and max_lag is not None:
-        dims = ("y", "x") if "y" in surface.dims else ("x",)
-        shortest = min(read_grid(surface, dims).spacing)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.choice("increments", among=("square", "absolute", "second"))
+    is_valid = check_surface(problems, squares=True, reserved=_NAMES)
+    if problems.number("max_lag", above=0, optional=True) and is_valid and given.max_lag is not None:
+        dims = ("y", "x") if "y" in given.surface.dims else ("x",)
+        shortest = min(read_grid(given.surface, dims).spacing)
         expected = f"at least one spacing, {shortest:g} m"
-        problems.require(float(max_lag) >= shortest * (1 - 1e-9), "max_lag", expected, max_lag)
+        problems.require(float(given.max_lag) >= shortest * (1 - 1e-9), "max_lag", expected)
 
 
 @public_result(

@@ -38,8 +38,8 @@ _ON_COMB = 4.0  # power of such a multiple over the expected one: 2 % of the mod
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
-def _check(problems: Problems, *, surface: Any) -> None:
-    check_surface(problems, surface, smallest=SMALLEST, gaps=False, reserved=_NAMES)
+def _check(problems: Problems) -> None:
+    check_surface(problems, smallest=SMALLEST, gaps=False, reserved=_NAMES)
 
 
 @public_result(

@@ -33,13 +33,14 @@ EXPONENTS = np.linspace(0.5, 2.0, 61)  # between which that of the stationary co
 SHIFTS = 4  # of the grid of squares: four exponents are within .008 of those of 16, with one within .020
 
 
-def _check(problems: Problems, *, masks: Any) -> None:
-    is_list = isinstance(masks, (list, tuple)) and len(masks) > 1
-    if not problems.require(is_list, "masks", "a list of two masks or more", masks):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    is_list = isinstance(given.masks, (list, tuple)) and len(given.masks) > 1
+    if not problems.require(is_list, "masks", "a list of two masks or more"):
         return
-    are_valid = [check_mask(problems, mask, argument=f"masks[{k}]") for k, mask in enumerate(masks)]
+    are_valid = [check_mask(problems, mask, argument=f"masks[{k}]") for k, mask in enumerate(given.masks)]
     if all(are_valid):
-        _check_same_extent(problems, masks)
+        _check_same_extent(problems, given.masks)
 
 
 def _check_same_extent(problems: Problems, masks: Sequence[xr.DataArray]) -> None:

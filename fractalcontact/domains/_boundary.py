@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +11,6 @@ from scipy.special import stdtrit
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
 from fractalcontact.domains._mask_input import (
     Array,
     Planes,
@@ -38,11 +36,7 @@ ROUGH = 1.3, 1.85  # smoother islands may be that small, and rougher ones hold n
 SMOOTH, SMOOTH_FACTOR = 1.3, 2.0  # below this dimension blocks are not independent: the error grows
 
 
-def _check(problems: Problems, *, mask: Any, periodic: Any, valid: Any) -> None:
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-
-
-@public_result(title="Dimension of the boundary of a set", references=SOURCE, check=_check)
+@public_result(title="Dimension of the boundary of a set", references=SOURCE, check=check_mask)
 def boundary_dimension(
     mask: xr.DataArray, *, periodic: bool | None = None, valid: xr.DataArray | None = None
 ) -> xr.Dataset:

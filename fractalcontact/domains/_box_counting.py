@@ -51,30 +51,28 @@ NO_POWER_LAW = 0.15  # range of the local slopes in a window from which on there
 MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in the deviation of the null
 
 
-def _check_box_dimension(problems: Problems, *, window: Any, **arguments: Any) -> None:
-    _check_box_counts(problems, **arguments)
-    if window is None or (isinstance(window, str) and window == "each"):
-        return
-    is_alone = arguments["box_sizes"] is None
-    problems.require(is_alone, "window", "None beside `box_sizes`", window)
-    if isinstance(window, str):
-        problems.choice("window", window, ("each",))
-    else:
-        has_mask = not any(message.startswith(("mask", "valid")) for message in problems.messages)
-        check_window(problems, window, arguments["mask"] if has_mask else None)
-
-
-def _check_box_counts(
-    problems: Problems, *, mask: Any, box_sizes: Any, cover: Any, periodic: Any, valid: Any
-) -> None:
-    problems.choice("cover", cover, COVERS)
-    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
-    check_box_sizes(problems, "box_sizes", box_sizes, _longest_box(mask_sides(mask), cover))
+def _check_box_counts(problems: Problems) -> bool:
+    given = problems.given
+    problems.choice("cover", among=COVERS)
+    has_mask = check_mask(problems, profiles=True)
+    check_box_sizes(problems, _longest_box(mask_sides(given.mask), given.cover))
+    return has_mask
 
 
 def _longest_box(shape: Sequence[int], cover: Any) -> int:
     """Return the longest box of a cover: the mean needs boxes of at most half the shorter side."""
     return max(1, min(shape) // 2) if isinstance(cover, str) and cover == "mean" else 2 * max(shape)
+
+
+def _check_box_dimension(problems: Problems) -> None:
+    has_mask, window = _check_box_counts(problems), problems.given.window
+    if window is None or (isinstance(window, str) and window == "each"):
+        return
+    problems.require(problems.given.box_sizes is None, "window", "None beside `box_sizes`")
+    if isinstance(window, str):
+        problems.choice("window", among=("each",))
+    else:
+        check_window(problems, has_mask=has_mask)
 
 
 @public_result(title="Box dimension", references=SOURCE, check=_check_box_dimension)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -115,12 +114,10 @@ class Components:
         return bool(np.intersect1d(first, last).size)
 
 
-def check_connected(
-    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, profiles: bool = False
-) -> None:
+def check_connected(problems: Problems, *, profiles: bool = False) -> bool:
     """Check a mask, also of a profile where those are allowed, and the neighbours of its cells."""
-    problems.integer("connectivity", connectivity, at_least=1, at_most=2)
-    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=profiles)
+    is_number = problems.integer("connectivity", at_least=1, at_most=2)
+    return check_mask(problems, profiles=profiles) and is_number
 
 
 def label_planes(

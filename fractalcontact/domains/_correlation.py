@@ -32,10 +32,9 @@ SOURCE = (
 )
 
 
-def _check(problems: Problems, *, mask: Any, box_sizes: Any, periodic: Any, valid: Any) -> None:
-    check_mask(problems, mask, valid=valid, periodic=periodic, profiles=True)
-    shape = mask_sides(mask)
-    check_box_sizes(problems, "box_sizes", box_sizes, min(shape))
+def _check(problems: Problems) -> None:
+    check_mask(problems, profiles=True)
+    check_box_sizes(problems, min(mask_sides(problems.given.mask)))
 
 
 @public_result(title="Correlation dimension", references=SOURCE, check=_check)

@@ -59,10 +59,8 @@ def sources(measures: Sequence[str]) -> str:
     return joined_references(*(_SOURCES[name] for name in measures if name in _SOURCES))
 
 
-def _check(problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any) -> None:
-    check_connected(
-        problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid, profiles=True
-    )
+def _check(problems: Problems) -> None:
+    check_connected(problems, profiles=True)
 
 
 @public_result(title="Description of a set", references=sources(MEASURES), check=_check)

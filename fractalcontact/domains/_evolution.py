@@ -29,30 +29,10 @@ RETURN_NAMES = ("return_step", "hysteresis", "coverage_change")
 SAME_LOAD = 1e-6  # of the largest load: rounding of a path that comes back
 
 
-def _check(
-    problems: Problems,
-    *,
-    mask: Any,
-    include: Any,
-    along: Any,
-    window: Any,
-    frame: Any,
-    connectivity: Any,
-    periodic: Any,
-    valid: Any,
-) -> None:
-    problems.choices("include", include, MEASURES)
-    count = len(problems.messages)
-    check_path(
-        problems,
-        mask=mask,
-        along=along,
-        frame=frame,
-        connectivity=connectivity,
-        periodic=periodic,
-        valid=valid,
-    )
-    check_window(problems, window, mask if len(problems.messages) == count else None)
+def _check(problems: Problems) -> None:
+    check_path(problems)
+    check_window(problems, has_mask=not problems.messages)
+    problems.choices("include", among=MEASURES)
 
 
 @public_result(title="Evolution of a set", check=_check)

@@ -38,18 +38,17 @@ SQUARE = 1e-6  # largest difference of the two spacings of square cells, relativ
 EVEN_STEPS = 1.32471795724474602596 ** -np.array([1.0, 2.0])
 
 
-def _check(
-    problems: Problems, *, mask: Any, s: Any, coarsest: Any, shifts: Any, periodic: Any, valid: Any
-) -> None:
-    problems.numbers("s", s, at_least=0.0, at_most=2.0)
-    problems.integer("shifts", shifts, at_least=1)
-    is_length = problems.number("coarsest", coarsest, above=0.0, at_most=10.0**DECADES, optional=True)
-    if check_mask(problems, mask, valid=valid, periodic=periodic):
-        check_square_cells(problems, "mask", mask)
-        finest = min(mask_grid(mask).spacing)
-        if is_length and coarsest is not None:
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.numbers("s", at_least=0.0, at_most=2.0)
+    problems.integer("shifts", at_least=1)
+    is_length = problems.number("coarsest", above=0.0, at_most=10.0**DECADES, optional=True)
+    if check_mask(problems):
+        check_square_cells(problems, "mask", given.mask)
+        finest = min(mask_grid(given.mask).spacing)
+        if is_length and given.coarsest is not None:
             expected = f"at least the spacing, {finest:g} m"
-            problems.require(coarsest >= finest * (1 - 1e-9), "coarsest", expected, coarsest)
+            problems.require(given.coarsest >= finest * (1 - 1e-9), "coarsest", expected)
 
 
 def check_square_cells(problems: Problems, argument: str, mask: xr.DataArray) -> None:

@@ -26,16 +26,12 @@ from fractalcontact.domains._mask_input import Array, Planes, build_dataset, mas
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
 
-def _check(
-    problems: Problems, *, mask: Any, connectivity: Any, periodic: Any, valid: Any, keep: Any, include: Any
-) -> None:
-    problems.choices("keep", keep, ("label",))
-    if include is not None:
-        columns = PROFILE_COLUMNS if len(mask_sides(mask)) == 1 else (*COLUMNS, *SHAPE_COLUMNS)
-        problems.choices("include", include, columns)
-    check_connected(
-        problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid, profiles=True
-    )
+def _check(problems: Problems) -> None:
+    is_profile = len(mask_sides(problems.given.mask)) == 1
+    problems.choices("keep", among=("label",))
+    columns = PROFILE_COLUMNS if is_profile else (*COLUMNS, *SHAPE_COLUMNS)
+    problems.choices("include", among=columns, optional=True)
+    check_connected(problems, profiles=True)
 
 
 @public_result(title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check)

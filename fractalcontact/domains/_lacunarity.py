@@ -34,10 +34,10 @@ MANY_SIZES = 24  # above so many sizes one transform is cheaper than a sum for e
 BOXES = ("gliding", "fixed", "along_x", "along_y")
 
 
-def _check(problems: Problems, *, mask: Any, box_sizes: Any, boxes: Any, periodic: Any, valid: Any) -> None:
-    problems.choice("boxes", boxes, BOXES)
-    support = check_measure(problems, mask, valid=valid, periodic=periodic, profiles=True)
-    check_box_sizes(problems, "box_sizes", box_sizes, min(mask_sides(support)))
+def _check(problems: Problems) -> None:
+    problems.choice("boxes", among=BOXES)
+    support = check_measure(problems, profiles=True)
+    check_box_sizes(problems, min(mask_sides(support)))
 
 
 @public_result(title="Lacunarity", references=SOURCE, achieved_error="exact to rounding", check=_check)

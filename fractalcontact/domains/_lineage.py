@@ -27,31 +27,23 @@ CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flag
 FRAMES = {"upper": 0.0, "middle": 0.5, "lower": 1.0}  # share of the travel by which the later state is moved
 
 
-def check_path(
-    problems: Problems,
-    *,
-    mask: Any,
-    along: Any = None,
-    frame: Any = "upper",
-    connectivity: Any,
-    periodic: Any,
-    valid: Any,
-) -> None:
+def check_path(problems: Problems) -> None:
     """Check a mask with a leading dim along which its states follow each other."""
-    check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
-    is_frame = problems.choice("frame", frame, FRAMES)
-    is_along = check_along(problems, along, mask)
-    if not isinstance(mask, xr.DataArray) or plane_shape(mask)[0] > mask.size:
+    given = problems.given
+    check_connected(problems)
+    is_frame = problems.choice("frame", among=FRAMES)
+    is_along = check_along(problems)
+    if not isinstance(given.mask, xr.DataArray) or plane_shape(given.mask)[0] > given.mask.size:
         return
     expected = "at least one leading dim for the path, as in (step, y, x)"
-    if not problems.require(mask.ndim > 2, "mask.dims", expected, "(y, x)"):
+    if not problems.require(given.mask.ndim > 2, "mask.dims", expected, "(y, x)"):
         return
     if not is_along:
         return
-    dims = tuple(str(dim) for dim in mask.dims[:-2])
-    if is_frame and frame != "upper":
-        has_travel = (along or dims[-1]) == "shear" and "shear" in mask.coords
-        problems.require(has_travel, "frame", "'upper', or a path along shear displacements in m", frame)
+    dims = tuple(str(dim) for dim in given.mask.dims[:-2])
+    if is_frame and given.frame != "upper":
+        has_travel = (given.along or dims[-1]) == "shear" and "shear" in given.mask.coords
+        problems.require(has_travel, "frame", "'upper', or a path along shear displacements in m")
 
 
 @public_result(title="Lineage of islands", references=SOURCE, achieved_error="exact", check=check_path)

@@ -22,7 +22,7 @@ from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, in_cells
 from fractalcontact.base.threads import thread_count
-from fractalcontact.base.validation import LARGEST_INTEGER, Problems
+from fractalcontact.base.validation import GIVEN, LARGEST_INTEGER, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 S = TypeVar("S")
@@ -110,47 +110,39 @@ class Planes:
 
 
 def check_mask(
-    problems: Problems,
-    mask: Any,
-    *,
-    valid: Any = None,
-    periodic: Any = None,
-    argument: str = "mask",
-    profiles: bool = False,
+    problems: Problems, mask: Any = GIVEN, *, argument: str = "mask", profiles: bool = False
 ) -> bool:
-    """Check a mask, its observed cells and the choice of periodicity; `read_planes` then reads them.
+    """Check a mask, and beside it the arguments `valid` and `periodic`; `read_planes` then reads them.
 
     `profiles` allows masks of profiles, with dims (..., x).
     """
+    given = problems.given
+    mask = given.mask if mask is GIVEN else mask
+    valid, periodic = getattr(given, "valid", None), getattr(given, "periodic", None)
     is_choice = problems.boolean("periodic", periodic, optional=True)
     is_mask = _check_cells(problems, mask, argument, profiles=profiles)
     is_valid = valid is None or _check_valid(problems, valid, mask if is_mask else None)
     if is_mask and any(dim in mask.coords for dim in mask_dims(mask)):
         is_mask = problems.grid(argument, mask, dims=mask_dims(mask))
     if is_mask and is_choice and periodic is not None:
-        is_choice = problems.periodic("periodic", periodic, mask_grid(mask))
+        is_choice = problems.periodic(mask_grid(mask))
     return is_mask and is_valid and is_choice
 
 
-def check_measure(
-    problems: Problems, mask: Any, *, valid: Any = None, periodic: Any = None, profiles: bool = False
-) -> Any:
+def check_measure(problems: Problems, *, profiles: bool = False) -> Any:
     """Check a mask, or a measure of finite numbers, none negative; return its support."""
-    if isinstance(mask, xr.DataArray) and mask.dtype.kind == "f":
+    mask = problems.given.mask
+    if not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biuf":
+        problems.add("mask", EXPECTED_MEASURE)
+        mask = None
+    elif mask.dtype.kind == "f":
         values = mask.values
         wrong = values.size - int(np.count_nonzero(np.isfinite(values) & (values >= 0)))
         got = f"{wrong} of {values.size} NaN, infinite or negative"
         problems.require(wrong == 0, "mask", EXPECTED_MEASURE, got)
-    elif not isinstance(mask, xr.DataArray) or mask.dtype.kind not in "biu":
-        problems.add("mask", EXPECTED_MEASURE, mask)
-        mask = None
     support = support_of(mask)
     if support is not None:
-        check_mask(problems, support, valid=valid, periodic=periodic, profiles=profiles)
-    else:
-        problems.boolean("periodic", periodic, optional=True)
-        if valid is not None:
-            _check_valid(problems, valid, None)
+        check_mask(problems, support, profiles=profiles)
     return support
 
 
@@ -358,32 +350,34 @@ def parallel_map(function: Callable[[S], R], items: Iterable[S], cells: int) -> 
         return [result for chunk in results for result in chunk]
 
 
-def check_box_sizes(problems: Problems, argument: str, sizes: Any, longest: int) -> bool:
+def check_box_sizes(problems: Problems, longest: int) -> bool:
     """Check edges of boxes in cells: None, or integers from 1 to `longest`."""
-    return problems.numbers(argument, sizes, at_least=1, at_most=longest, integral=True, optional=True)
+    return problems.numbers("box_sizes", at_least=1, at_most=longest, integral=True, optional=True)
 
 
-def check_along(problems: Problems, along: Any, mask: Any) -> bool:
+def check_along(problems: Problems) -> bool:
     """Check the leading dim that is the path, or None; of what is no mask, that it is a word."""
+    mask, along = problems.given.mask, problems.given.along
     if along is None:
         return True
     if plane_shape(mask)[0] == LARGEST_INTEGER:
-        return problems.require(isinstance(along, str), "along", "a leading dim of the mask", along)
-    return problems.choice("along", along, tuple(str(dim) for dim in mask.dims[:-2]))
+        return problems.require(isinstance(along, str), "along", "a leading dim of the mask")
+    return problems.choice("along", among=[str(dim) for dim in mask.dims[:-2]])
 
 
-def check_window(problems: Problems, window: Any, mask: Any) -> None:
-    """Check a window, (low, high) in metres, of which the longest box must fit into half the mask."""
-    if window is None or not problems.numbers("window", window, above=0.0):
+def check_window(problems: Problems, *, has_mask: bool) -> None:
+    """Check a window, (low, high) in metres, of which the longest box must fit into half a valid mask."""
+    window = problems.given.window
+    if window is None or not problems.numbers("window", above=0.0):
         return
     values = float_array(window)
     is_pair = values.shape == (2,) and values[0] < values[-1]
-    if problems.require(is_pair, "window", "two lengths, (low, high)", window) and mask is not None:
-        grid = mask_grid(mask)
+    if problems.require(is_pair, "window", "two lengths, (low, high)") and has_mask:
+        grid = mask_grid(problems.given.mask)
         longest = min(grid.extent) / 2.0
         expected = f"from a cell, {max(grid.spacing):g} m, to half the extent, {longest:g} m"
         inside = max(grid.spacing) * (1 - 1e-9) <= values[0] and values[1] <= longest * (1 + 1e-9)
-        problems.require(inside, "window", expected, window)
+        problems.require(inside, "window", expected)
 
 
 def read_box_sizes(sizes: Any, default: Array) -> Array:

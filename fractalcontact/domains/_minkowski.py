@@ -30,10 +30,10 @@ SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (Minkowski content); Felzensz
 SHORT_REACH = 2**14  # cells; distances up to it are kept as int16
 
 
-def _check(problems: Problems, *, mask: Any, radii: Any, periodic: Any, valid: Any) -> None:
-    check_mask(problems, mask, valid=valid, periodic=periodic)
-    shape = plane_shape(mask)
-    problems.numbers("radii", radii, at_least=0.5, at_most=float(max(shape)), optional=True)
+def _check(problems: Problems) -> None:
+    check_mask(problems)
+    shape = plane_shape(problems.given.mask)
+    problems.numbers("radii", at_least=0.5, at_most=float(max(shape)), optional=True)
 
 
 @public_result(title="Minkowski dimension", references=SOURCE, check=_check)

@@ -37,10 +37,9 @@ SOURCE = (
 )
 
 
-def _check(problems: Problems, *, mask: Any, q: Any, box_sizes: Any, valid: Any) -> None:
-    problems.numbers("q", q, at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
-    support = check_measure(problems, mask, valid=valid)
-    check_box_sizes(problems, "box_sizes", box_sizes, max(plane_shape(support)))
+def _check(problems: Problems) -> None:
+    problems.numbers("q", at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
+    check_box_sizes(problems, max(plane_shape(check_measure(problems))))
 
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)

@@ -20,12 +20,13 @@ from fractalcontact.base.validation import Problems, reading
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(problems: Problems, *, path: Any, spacing: Any, threshold: Any) -> None:
-    problems.file("path", path)
-    if problems.numbers("spacing", spacing, above=0, at_most=10.0**DECADES):
-        size = float_array(spacing).size
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.file("path")
+    if problems.numbers("spacing", above=0, at_most=10.0**DECADES):
+        size = float_array(given.spacing).size
         problems.require(size in (1, 2), "spacing", "one number or (y, x)", f"{size} numbers")
-    problems.number("threshold", threshold, optional=True)
+    problems.number("threshold", optional=True)
 
 
 @public_result(

@@ -65,14 +65,9 @@ CHANGES = {
 }
 
 
-def _check(
-    problems: Problems, *, mask: Any, window: Any, along: Any, connectivity: Any, periodic: Any, valid: Any
-) -> None:
-    count = len(problems.messages)
-    check_connected(problems, mask=mask, connectivity=connectivity, periodic=periodic, valid=valid)
-    has_mask = len(problems.messages) == count
-    check_window(problems, window, mask if has_mask else None)
-    check_along(problems, along, mask)
+def _check(problems: Problems) -> None:
+    check_window(problems, has_mask=check_connected(problems))
+    check_along(problems)
 
 
 @public_result(title="Signature of a contact domain", references=SOURCE, check=_check)

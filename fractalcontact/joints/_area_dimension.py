@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
@@ -32,14 +32,11 @@ FEWEST_CELLS = 8  # along an edge of the block, at the coarsest of the default s
 DEFAULT_FACTORS = 3  # of them, the finest ones
 
 
-def _check(
-    problems: Problems, *, crack: Any, shear: Any, direction: Any, factors: Any, **pressing: Any
-) -> None:
-    direction = checked_direction(problems, direction)
-    check_sliding(problems, crack, shear, direction)
-    check_pressing(problems, crack, **pressing)
-    are_numbers = factors is None or problems.numbers("factors", factors, at_least=1)
-    if are_numbers and isinstance(crack, Crack):
+def _check(problems: Problems) -> None:
+    crack, factors = problems.given.crack, problems.given.factors
+    check_sliding(problems, single=True)
+    check_pressing(problems)
+    if problems.numbers("factors", at_least=1, optional=True) and isinstance(crack, Crack):
         _check_factors(problems, crack.layout.cells, factors)
 
 

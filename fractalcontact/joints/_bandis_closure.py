@@ -18,26 +18,19 @@ from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quanti
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(
-    problems: Problems,
-    *,
-    nominal_pressure: Any,
-    aperture: Any,
-    compressive_strength: Any,
-    cycle: Any,
-    **joint: Any,
-) -> None:
-    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE | {"at_least": 0})
-    check_quantities(problems, **joint)
-    optional = {"aperture": aperture, "compressive_strength": compressive_strength}
-    check_quantities(problems, optional=True, **optional)
-    problems.integer("cycle", cycle, at_least=1, at_most=len(CLOSURE_FITS))
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.numbers("nominal_pressure", **POSITIVE | {"at_least": 0})
+    check_quantities(problems, "roughness_coefficient", "wall_strength")
+    check_quantities(problems, "aperture", "compressive_strength", optional=True)
+    problems.integer("cycle", at_least=1, at_most=len(CLOSURE_FITS))
     if problems.messages:
         return
-    if compressive_strength is not None:
-        weakest = float(joint["wall_strength"]) <= float(compressive_strength)
-        problems.require(weakest, "wall_strength", "at most compressive_strength", joint["wall_strength"])
-    opening, stiffness, closure = _constants(cycle=cycle, **joint, **optional)
+    if given.compressive_strength is not None:
+        weakest = float(given.wall_strength) <= float(given.compressive_strength)
+        problems.require(weakest, "wall_strength", "at most compressive_strength")
+    joint = {name: value for name, value in vars(given).items() if name != "nominal_pressure"}
+    opening, stiffness, closure = _constants(**joint)
     problems.require(
         stiffness > 0 and 0 < closure <= opening,
         "roughness_coefficient, wall_strength, aperture",

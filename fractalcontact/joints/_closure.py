@@ -11,11 +11,12 @@ import xarray as xr
 from fractalcontact.base.compass import is_single, read_directions
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import interpolation_errors
 from fractalcontact.joints._sheared_contact import (
+    BULK,
     PRESSING_BYTES,
     Pressing,
     check_pressing,
@@ -33,9 +34,11 @@ UNDETERMINED = (
 )
 
 
-def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, **pressing: Any) -> None:
-    check_sliding(problems, crack, shear, direction)
-    check_pressing(problems, crack, **pressing)
+def _check(problems: Problems) -> None:
+    check_sliding(problems)
+    check_pressing(problems)
+    problems.choice("bulk", among=BULK)
+    problems.choices("keep", among=CONTACT_MAPS, optional=True)
 
 
 @public_result(title="closure of a sheared crack", check=_check, memory=PRESSING_BYTES)

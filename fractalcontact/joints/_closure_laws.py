@@ -65,13 +65,18 @@ PREFERENCE = (
 )
 
 
-def _check(problems: Problems, *, closure: Any, seating_pressure: Any) -> None:
-    problems.number("seating_pressure", seating_pressure, above=0, at_most=1e100, optional=True)
-    if not problems.result("closure", closure):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.number("seating_pressure", above=0, at_most=1e100, optional=True)
+    if not problems.result("closure"):
         return
     expected = "the Dataset of fractalcontact.joints.closure"
     names = ("interface_closure", "nominal_pressure")
-    absent = [name for name in names if name not in closure.variables or "step" not in closure[name].dims]
+    absent = [
+        name
+        for name in names
+        if name not in given.closure.variables or "step" not in given.closure[name].dims
+    ]
     problems.require(not absent, "closure", expected, f"no {', '.join(absent)} over step")
 
 

@@ -323,12 +323,11 @@ def _check_upper(problems: Problems, upper: xr.DataArray, lower: xr.DataArray, l
         _check_heights(problems, "upper", upper, layout)
 
 
-def check_crack(problems: Problems, crack: Any) -> bool:
-    """Check for a `Crack`."""
-    expected = "a fractalcontact.joints.Crack"
-    return problems.require(
-        isinstance(crack, Crack), "crack", expected, f"an object of type {type(crack).__name__}"
-    )
+def check_crack(problems: Problems) -> bool:
+    """Check the argument `crack`."""
+    crack = problems.given.crack
+    got = f"an object of type {type(crack).__name__}"
+    return problems.require(isinstance(crack, Crack), "crack", "a fractalcontact.joints.Crack", got)
 
 
 def check_elastic(problems: Problems, crack: Crack) -> bool:
@@ -340,12 +339,16 @@ def check_elastic(problems: Problems, crack: Crack) -> bool:
     return all(given)
 
 
-def check_sliding(problems: Problems, crack: Any, shear: Any, direction: Any) -> bool:
-    """Check crack, shears (m, each once) and directions, and that the block stays on its face."""
+def check_sliding(problems: Problems, *, single: bool = False) -> bool:
+    """Check crack, shears (m, each once) and directions, and that the block stays on its face.
+
+    With `single` there is one direction, not a sequence of them.
+    """
+    crack, shear, direction = problems.given.crack, problems.given.shear, problems.given.direction
     valid = [
-        check_crack(problems, crack),
-        check_directions(problems, direction),
-        problems.numbers("shear", shear, at_least=0),
+        check_crack(problems),
+        check_direction(problems) if single else check_directions(problems),
+        problems.numbers("shear", at_least=0),
     ]
     if not valid[2]:
         return False

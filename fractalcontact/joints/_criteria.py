@@ -51,10 +51,10 @@ MOBILISED = np.array(
 )
 
 
-def check_quantities(problems: Problems, *, optional: bool = False, **given: Any) -> None:
-    """Check numbers of a joint against `BOUNDS`; `optional` allows None."""
-    for name, value in given.items():
-        problems.number(name, value, **BOUNDS[name], optional=optional)
+def check_quantities(problems: Problems, *names: str, optional: bool = False) -> None:
+    """Check arguments against `BOUNDS`; `optional` allows None."""
+    for name in names:
+        problems.number(name, **BOUNDS[name], optional=optional)
 
 
 @dataclass(frozen=True)

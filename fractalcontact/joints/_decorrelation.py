@@ -42,19 +42,20 @@ QUANTILE = 2.776  # of Student's t for 4 degrees of freedom: checked to cover 95
 ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a smaller residual from the mean plane is rounding
 
 
-def _check(problems: Problems, *, crack: Any, direction: Any, shear: Any) -> None:
-    if shear is not None:
-        check_sliding(problems, crack, shear, direction)
-        if problems.numbers("shear", shear, at_least=0):
-            shears = float_array(shear)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    if given.shear is not None:
+        check_sliding(problems)
+        if problems.numbers("shear", at_least=0):
+            shears = float_array(given.shear)
             ascending = shears[0] == 0 and shears.size > 1 and bool((np.diff(shears) > 0).all())
-            problems.require(ascending, "shear", "at least two shears, ascending from 0", shear)
+            problems.require(ascending, "shear", "at least two shears, ascending from 0")
         return
-    valid = [check_crack(problems, crack), check_directions(problems, direction)]
+    valid = [check_crack(problems), check_directions(problems)]
     if all(valid):
-        slides = _whole_cell_shears(crack, read_directions(direction)).size > 1
+        slides = _whole_cell_shears(given.crack, read_directions(given.direction)).size > 1
         expected = "a block smaller than its face, or periodic faces"
-        problems.require(slides, "crack", expected, crack.layout.cells)
+        problems.require(slides, "crack", expected, given.crack.layout.cells)
 
 
 @public_result(

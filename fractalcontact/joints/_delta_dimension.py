@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.compass import read_direction
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import float_array
@@ -33,15 +33,15 @@ DIFFERENCE_QUOTIENT = (
 )
 
 
-def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any, window: Any) -> None:
-    direction = checked_direction(problems, direction)
-    check_sliding(problems, crack, shear, direction)
-    if window is not None and problems.numbers("window", window, above=0):
-        ends = float_array(window)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    check_sliding(problems, single=True)
+    if problems.numbers("window", above=0, optional=True) and given.window is not None:
+        ends = float_array(given.window)
         ascending = ends.size == 2 and ends[0] < ends[-1]
-        problems.require(ascending, "window", "(least, greatest) scale in metres", window)
-    if isinstance(crack, Crack):
-        dy, dx = crack.layout.spacing
+        problems.require(ascending, "window", "(least, greatest) scale in metres")
+    if isinstance(given.crack, Crack):
+        dy, dx = given.crack.layout.spacing
         problems.require(abs(dy - dx) <= UNIFORM * dx, "crack", "equal spacings along x and y", (dy, dx))
 
 

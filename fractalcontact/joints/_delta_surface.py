@@ -33,8 +33,8 @@ SPLINE_REACH = 48  # cells beyond which a height no longer changes a quintic spl
 ERROR_LINES, SHORTEST_LINE, ERROR_MARGIN = 256, 40, 2
 
 
-def _check(problems: Problems, *, crack: Any, shear: Any, direction: Any) -> None:
-    check_sliding(problems, crack, shear, direction)
+def _check(problems: Problems) -> None:
+    check_sliding(problems)
 
 
 @public_result(title="delta-surface of a sheared crack", references=PAPER, check=_check)

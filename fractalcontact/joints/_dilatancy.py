@@ -14,11 +14,14 @@ from fractalcontact.base.numbers import float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
+    BULK,
     PRESSING_BYTES,
+    SOLVER,
     Pressing,
     check_pressed,
     check_pressing,
@@ -32,37 +35,30 @@ Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.joints.dilatancy"
 
 
-def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    shear: Any,
-    direction: Any,
-    normal_force: Any,
-    normal_stiffness: Any,
-    pressed: Any,
-    **pressing: Any,
-) -> None:
-    check_sliding(problems, crack, shear, direction)
-    if normal_force is None:
-        _check_defaults(problems, normal_stiffness=normal_stiffness, pressed=pressed, **pressing)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    check_sliding(problems)
+    if given.normal_force is None:
+        _check_defaults(problems)
         return
-    check_pressed(problems, crack, pressed, **pressing)
-    one_of = normal_stiffness is None or pressed is None
-    problems.require(one_of, "pressed", "nothing beside `normal_stiffness`", pressed)
-    problems.number("normal_stiffness", normal_stiffness, above=0, optional=True)
-    check_pressing(problems, crack, normal_force=normal_force, **pressing)
+    check_pressed(problems)
+    one_of = given.normal_stiffness is None or given.pressed is None
+    problems.require(one_of, "pressed", "nothing beside `normal_stiffness`")
+    problems.number("normal_stiffness", above=0, optional=True)
+    check_pressing(problems)
+    problems.choice("bulk", among=BULK)
+    problems.choices("keep", among=CONTACT_MAPS, optional=True)
 
 
-def _check_defaults(problems: Problems, **options: Any) -> None:
+def _check_defaults(problems: Problems) -> None:
     """Check that the options of a press have their defaults, where nothing is pressed."""
     parameters = inspect.signature(dilatancy).parameters
-    for name, value in options.items():
-        default = parameters[name].default
+    for name in ("normal_stiffness", "pressed", "bulk", "keep", *SOLVER):
+        value, default = getattr(problems.given, name), parameters[name].default
         unused = value is default or (isinstance(value, type(default)) and value == default)
         if name == "keep":
             unused = value is None or number_of_entries(value) == 0
-        problems.require(unused, name, "nothing without a force: rigid faces are not pressed", value)
+        problems.require(unused, name, "nothing without a force: rigid faces are not pressed")
 
 
 @public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)

@@ -33,36 +33,24 @@ LARGEST_STEP = 8  # cells along an axis in which the block comes back onto the g
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
 
 
-def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    path: Any,
-    nominal_pressure: Any,
-    hardness: Any,
-    direction: Any,
-    normal_stiffness: Any,
-    shear_stiffness: Any,
-    distance: Any,
-    keep: Any,
-    **solver: Any,
-) -> None:
-    problems.number("normal_stiffness", normal_stiffness, **POSITIVE, optional=True)
-    problems.number("shear_stiffness", shear_stiffness, **POSITIVE, optional=True)
-    problems.number("distance", distance, above=0, optional=True)
-    if keep is not None:
-        problems.choices("keep", keep, MAPS)
-    hardness_is_valid = problems.number("hardness", hardness, **POSITIVE)
-    has_load = problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.number("normal_stiffness", **POSITIVE, optional=True)
+    problems.number("shear_stiffness", **POSITIVE, optional=True)
+    problems.number("distance", above=0, optional=True)
+    problems.choices("keep", among=MAPS, optional=True)
+    hardness_is_valid = problems.number("hardness", **POSITIVE)
+    has_load = problems.numbers("nominal_pressure", **POSITIVE)
     if has_load and hardness_is_valid:
-        greatest = float(float_array(nominal_pressure).max())
-        problems.require(greatest < float(hardness), "nominal_pressure", "less than the hardness", greatest)
-    check_crack(problems, crack)
-    solver["hardness"] = hardness if hardness_is_valid else None
-    check_pressing(problems, crack, nominal_pressure=nominal_pressure if has_load else 0.0, **solver)
-    path_is_valid = problems.numbers("path", path, at_least=-POSITIVE["at_most"], at_most=POSITIVE["at_most"])
-    if check_direction(problems, direction) and path_is_valid and isinstance(crack, Crack):
-        _check_path(problems, crack, _turning_points(path), read_direction(direction))
+        greatest = float(float_array(given.nominal_pressure).max())
+        bounded = greatest < float(given.hardness)
+        problems.require(bounded, "nominal_pressure", "less than the hardness", greatest)
+    check_crack(problems)
+    hardness = given.hardness if hardness_is_valid else None  # what is wrong has been noted
+    check_pressing(problems, hardness=hardness, nominal_pressure=given.nominal_pressure if has_load else 0.0)
+    path_is_valid = problems.numbers("path", at_least=-POSITIVE["at_most"], at_most=POSITIVE["at_most"])
+    if check_direction(problems) and path_is_valid and isinstance(given.crack, Crack):
+        _check_path(problems, given.crack, _turning_points(given.path), read_direction(given.direction))
 
 
 def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards: Direction) -> None:

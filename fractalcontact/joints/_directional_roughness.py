@@ -30,10 +30,11 @@ REFERENCES = (
 )
 
 
-def _check(problems: Problems, *, surface: Any, direction: Any) -> None:
-    check_directions(problems, direction)
-    if problems.surface("surface", surface, finite=False):
-        complete = np.isfinite(surface.values)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    check_directions(problems)
+    if problems.surface("surface", finite=False):
+        complete = np.isfinite(given.surface.values)
         complete = complete[1:, 1:] & complete[1:, :-1] & complete[:-1, 1:] & complete[:-1, :-1]
         problems.require(bool(complete.any()), "surface", "four neighbouring heights", "none")
 

@@ -43,46 +43,38 @@ HALVINGS = 20  # of the distance, and doublings: a factor of a million, more tha
 NEGLIGIBLE = 1.0  # degree; change of the peak when the distance is halved
 
 
-def _check(
-    problems: Problems,
-    *,
-    dilatancy: Any,
-    basic_friction_angle: Any,
-    form: Any,
-    smoothing: Any,
-    distance: Any,
-    nominal_pressure: Any,
-) -> None:
-    is_form = problems.choice("form", form, FORMS)
-    problems.number("smoothing", smoothing, above=0, optional=True)
-    bounded = problems.number("distance", distance, above=0, optional=True)
-    problems.numbers("nominal_pressure", nominal_pressure, at_least=0, optional=True)
-    problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
-    if not problems.result("dilatancy", dilatancy):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    is_form = problems.choice("form", among=FORMS)
+    problems.number("smoothing", above=0, optional=True)
+    bounded = problems.number("distance", above=0, optional=True)
+    problems.numbers("nominal_pressure", at_least=0, optional=True)
+    problems.number("basic_friction_angle", at_least=0, below=90, optional=True)
+    if not problems.result("dilatancy"):
         return
     expected = "the Dataset of fractalcontact.joints.dilatancy"
-    name = _dilatancy_name(dilatancy)
+    name = _dilatancy_name(given.dilatancy)
     needed = [name, "shear"] + (["nominal_pressure"] if name == "dilatancy" else [])
-    if is_form and form == "energy":
+    if is_form and given.form == "energy":
         expected_form = "'kinematic' for a dilatancy without forces, and where faces yield"
-        is_elastic = name == "dilatancy" and "plastic_work" not in dilatancy
-        problems.require(is_elastic, "form", expected_form, form)
+        is_elastic = name == "dilatancy" and "plastic_work" not in given.dilatancy
+        problems.require(is_elastic, "form", expected_form)
         needed += ENERGIES if is_elastic else []
-    absent = [variable for variable in needed if variable not in dilatancy.variables]
-    if absent or "shear" not in dilatancy[name].dims:
+    absent = [variable for variable in needed if variable not in given.dilatancy.variables]
+    if absent or "shear" not in given.dilatancy[name].dims:
         problems.add("dilatancy", expected, f"no {', '.join(absent) or 'dim shear'}")
         return
     if name == "dilatancy":
         expected = "None where the dilatancy is that under forces"
-        problems.require(nominal_pressure is None, "nominal_pressure", expected, nominal_pressure)
-    basic_angle = _basic_angle(dilatancy, basic_friction_angle)
+        problems.require(given.nominal_pressure is None, "nominal_pressure", expected)
+    basic_angle = _basic_angle(given.dilatancy, given.basic_friction_angle)
     problems.number("basic_friction_angle", basic_angle, at_least=0, below=90)
-    shears = _shears(dilatancy)
+    shears = _shears(given.dilatancy)
     ascending = shears.size > 1 and bool((np.diff(shears) > 0).all())
     if problems.require(ascending, "dilatancy.shear", "at least two shears, ascending", shears):
         reach = float(np.ptp(shears))
-        short = not bounded or distance is None or float(distance) <= reach * WINDOW_ROUNDING
-        problems.require(short, "distance", f"at most the {reach:g} m that the shears cover", distance)
+        short = not bounded or given.distance is None or float(given.distance) <= reach * WINDOW_ROUNDING
+        problems.require(short, "distance", f"at most the {reach:g} m that the shears cover")
 
 
 @public_result(

@@ -29,23 +29,25 @@ BOUNDS: dict[str, dict[str, Any]] = {
 }
 
 
-def _check(problems: Problems, *, aperture: Any, model: Any, **given: Any) -> None:
-    for name, value in ({"aperture": aperture} | given).items():
-        options = BOUNDS[name] | {"optional": name in given, "any_shape": isinstance(value, xr.DataArray)}
-        problems.numbers(name, value, **options)
-    if problems.choice("model", model, HYDRAULIC_APERTURE):
-        for name, value in given.items():
-            if name in HYDRAULIC_APERTURE[model].needs:
-                problems.require(value is not None, name, f"a value for {model!r}", None)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    others = {name: getattr(given, name) for name in BOUNDS if name != "aperture"}
+    for name, bounds in BOUNDS.items():
+        any_shape = isinstance(getattr(given, name), xr.DataArray)
+        problems.numbers(name, **bounds, optional=name in others, any_shape=any_shape)
+    if problems.choice("model", among=HYDRAULIC_APERTURE):
+        for name, value in others.items():
+            if name in HYDRAULIC_APERTURE[given.model].needs:
+                problems.require(value is not None, name, f"a value for {given.model!r}")
             else:
-                problems.require(value is None, name, f"nothing with {model!r}", value)
+                problems.require(value is None, name, f"nothing with {given.model!r}")
     if problems.messages:
         return
-    arrays = [_labelled(value) for value in (aperture, *given.values()) if value is not None]
+    arrays = [_labelled(value) for value in (given.aperture, *others.values()) if value is not None]
     lengths = {array.size for array in arrays if array.dims == ("point",)}
     if problems.require(len(lengths) < 2, "aperture", "arrays of one shape, or numbers", sorted(lengths)):
-        spread = given["spread"] if model == "zimmerman_bodvarsson" else 0.0
-        variation = float((_labelled(spread) / _labelled(aperture)).max())
+        spread = given.spread if given.model == "zimmerman_bodvarsson" else 0.0
+        variation = float((_labelled(spread) / _labelled(given.aperture)).max())
         expected = f"at most {GREATEST_VARIATION:g} of the aperture"
         problems.require(variation <= GREATEST_VARIATION, "spread", expected, f"{variation:.3g} of it")
 

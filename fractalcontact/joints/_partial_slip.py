@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
@@ -32,37 +32,29 @@ RIGID = "NaN where the interface is rigid: the faces are mated, or all of them t
 BLOCK_ROUNDING = 1e-3  # above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same
 
 
-def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    shear: Any,
-    direction: Any,
-    tangential_force: Any,
-    friction_coefficient: Any,
-    method: Any,
-    keep: Any,
-    **pressing: Any,
-) -> None:
+def _check(problems: Problems) -> None:
     from fractalcontact.contact import solver as contact_solver
 
-    direction = checked_direction(problems, direction)
-    check_sliding(problems, crack, shear, direction)
-    problems.number("friction_coefficient", friction_coefficient, above=0, at_most=1e3, optional=True)
-    problems.numbers("tangential_force", tangential_force)
-    problems.choice("method", method, contact_solver.METHODS, optional=True)
-    problems.choices("keep", keep, SLIP_MAPS)
-    load = check_pressing(problems, crack, **pressing)
+    given = problems.given
+    check_sliding(problems, single=True)
+    problems.number("friction_coefficient", above=0, at_most=1e3, optional=True)
+    problems.numbers("tangential_force")
+    problems.choice("method", among=contact_solver.METHODS, optional=True)
+    problems.choices("keep", among=SLIP_MAPS)
+    load = check_pressing(problems, method="fast")
     if load is None:
         return
     expected = "one number: the normal load is constant while the tangential force changes"
     problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
     if problems.messages or load.control == "closure":  # under a closure the force is not known yet
         return
-    path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
+    path = _shear_path(
+        given.crack, given.tangential_force, given.direction, given.friction_coefficient, given.method
+    )
     expected = "above 0, or a friction_coefficient"
     if problems.require(path.friction > 0, "basic_friction_angle", expected, 0.0):
-        contact_solver.check_sliding(problems, path, float(load.solver_values(crack.nominal_area)[1][0]))
+        force = float(load.solver_values(given.crack.nominal_area)[1][0])
+        contact_solver.check_sliding(problems, path, force)
 
 
 def _shear_path(

@@ -48,26 +48,27 @@ OVERLAPPING = 0.5
 TURNS = {"x": 0, "y": 1}  # axis of the array that is reversed where a body is turned over about x or y
 
 
-def _check(problems: Problems, *, lower: Any, upper: Any, rotation: Any, turn_upper: Any) -> None:
-    problems.choice("turn_upper", turn_upper, TURNS, optional=True)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.choice("turn_upper", among=TURNS, optional=True)
     valid = [
         problems.surface(name, face, finite=False, smallest=SMALLEST)
-        for name, face in (("lower", lower), ("upper", upper))
+        for name, face in (("lower", given.lower), ("upper", given.upper))
     ]
     if not all(valid):
         return
-    grid, other = read_grid(lower), read_grid(upper)
+    grid, other = read_grid(given.lower), read_grid(given.upper)
     for axis, name in enumerate(("y", "x")):
         step, step_upper = grid.spacing[axis], other.spacing[axis]
         if abs(step_upper - step) * other.shape[axis] > UNIFORM * step * 100:
             problems.add(f"upper.{name}", f"the spacing of lower, {step:g} m", f"{step_upper:g} m")
-    for argument, face in (("lower", lower), ("upper", upper)):
+    for argument, face in (("lower", given.lower), ("upper", given.upper)):
         values = np.asarray(face.values, dtype=np.float64)
         problems.require(not np.isinf(values).any(), argument, "no infinite heights", "some")
         problems.require(bool(np.isfinite(values).any()), argument, "heights", NONE)
     ratio = grid.spacing[0] / grid.spacing[1]
     # a rotation in cells is one in the plane only where the cells are square
-    square = rotation is not True or abs(ratio - 1.0) <= UNIFORM
+    square = given.rotation is not True or abs(ratio - 1.0) <= UNIFORM
     problems.require(square, "rotation", "False where spacings differ", f"a ratio of {ratio:g}")
 
 

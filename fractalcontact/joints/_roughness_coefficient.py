@@ -55,22 +55,21 @@ REFERENCES = (
 )
 
 
-def _check(
-    problems: Problems, *, surface: Any, direction: Any, regression: Any, lag: Any, length: Any
-) -> None:
-    directions_are_valid = direction is None or check_directions(problems, direction)
-    lag_is_valid = problems.number("lag", lag, above=0, at_most=1e100, optional=True)
-    lag_is_valid = problems.choice("regression", regression, REGRESSIONS) and lag_is_valid
-    problems.number("length", length, at_least=SAMPLE_LENGTH, at_most=1e100, optional=True)
-    if not problems.surface("surface", surface, finite=False, profile=True):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    directions_are_valid = given.direction is None or check_directions(problems)
+    lag_is_valid = problems.number("lag", above=0, at_most=1e100, optional=True)
+    lag_is_valid = problems.choice("regression", among=REGRESSIONS) and lag_is_valid
+    problems.number("length", at_least=SAMPLE_LENGTH, at_most=1e100, optional=True)
+    if not problems.surface("surface", finite=False, profile=True):
         return
-    is_observed = bool(np.isfinite(surface.values).any())
+    is_observed = bool(np.isfinite(given.surface.values).any())
     problems.require(is_observed, "surface", "observed heights", Words("nothing but NaN"))
     if not (directions_are_valid and lag_is_valid):
         return
-    grid = read_grid(surface, core_dims(surface))
-    interval = _lag_or_default(lag, regression)
-    for towards in read_directions(_direction_or_default(direction, surface)):
+    grid = read_grid(given.surface, core_dims(given.surface))
+    interval = _lag_or_default(given.lag, given.regression)
+    for towards in read_directions(_direction_or_default(given.direction, given.surface)):
         if len(grid.shape) == 1 and towards.unit[0] != 0.0:
             problems.add("direction", "E or W for a profile", towards.name)
             continue

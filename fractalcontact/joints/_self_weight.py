@@ -28,29 +28,22 @@ RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
 
 
-def _check(
-    problems: Problems,
-    *,
-    crack: Any,
-    structure_size: Any,
-    unit_weight: Any,
-    shear: Any,
-    direction: Any,
-    **solver: Any,
-) -> None:
-    weight = problems.number("unit_weight", unit_weight, **POSITIVE)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    weight = problems.number("unit_weight", **POSITIVE)
     # any shear and force, to check the other arguments as well
-    shear = shear if problems.numbers("shear", shear, above=0) else 0.0
+    shear = given.shear if problems.numbers("shear", above=0) else 0.0
     force: Any = 1.0
-    if problems.numbers("structure_size", structure_size, **POSITIVE):
-        sizes = float_array(structure_size)
+    if problems.numbers("structure_size", **POSITIVE):
+        sizes = float_array(given.structure_size)
         ascending = bool((np.diff(sizes) > 0).all())
-        problems.require(ascending, "structure_size", "ascending sizes, each once", structure_size)
-        if weight and isinstance(crack, Crack):
-            force = (float(unit_weight) * sizes * crack.nominal_area).tolist()
-    loads = {} if _is_rigid(crack) else {"normal_force": force}
+        problems.require(ascending, "structure_size", "ascending sizes, each once")
+        if weight and isinstance(given.crack, Crack):
+            force = (float(given.unit_weight) * sizes * given.crack.nominal_area).tolist()
+    loads = {} if _is_rigid(given.crack) else {"normal_force": force}
+    solver = {name: getattr(given, name) for name in ("influence", "hardness", "tolerance")}
     with problems.collect():
-        dilatancy.validate(crack, shear=shear, direction=direction, **loads, **solver)
+        dilatancy.validate(given.crack, shear=shear, direction=given.direction, **loads, **solver)
 
 
 @public_result(

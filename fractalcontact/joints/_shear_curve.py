@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import checked_direction, read_direction
+from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -34,35 +34,24 @@ FEWEST_STEPS = 200
 SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
 
 
-def _check(
-    problems: Problems,
-    *,
-    surface: Any,
-    displacement: Any,
-    nominal_pressure: Any,
-    direction: Any,
-    roughness_coefficient: Any,
-    damage_coefficient: Any,
-    normal_stiffness: Any,
-    **joint: Any,
-) -> None:
-    if problems.numbers("displacement", displacement, at_least=0, at_most=POSITIVE["at_most"]):
-        ascending = bool((np.diff(float_array(displacement)) > 0).all())
-        problems.require(ascending, "displacement", "ascending values", displacement)
-    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
-    residual = joint.pop("residual_friction_angle")
-    problems.number("residual_friction_angle", residual, above=0, below=LARGEST_ANGLE)
-    check_quantities(problems, **joint)
-    check_quantities(problems, optional=True, roughness_coefficient=roughness_coefficient)
-    problems.number("damage_coefficient", damage_coefficient, at_least=1, at_most=2, optional=True)
-    problems.number("normal_stiffness", normal_stiffness, **POSITIVE, optional=True)
-    direction = checked_direction(problems, direction)
-    if surface is None:
+def _check(problems: Problems) -> None:
+    given = problems.given
+    if problems.numbers("displacement", at_least=0, at_most=POSITIVE["at_most"]):
+        ascending = bool((np.diff(float_array(given.displacement)) > 0).all())
+        problems.require(ascending, "displacement", "ascending values")
+    problems.numbers("nominal_pressure", **POSITIVE)
+    problems.number("residual_friction_angle", above=0, below=LARGEST_ANGLE)
+    check_quantities(problems, "wall_strength", "length")
+    check_quantities(problems, "roughness_coefficient", optional=True)
+    problems.number("damage_coefficient", at_least=1, at_most=2, optional=True)
+    problems.number("normal_stiffness", **POSITIVE, optional=True)
+    has_direction = check_direction(problems)
+    if given.surface is None:
         expected = "heights, or a roughness_coefficient in their place"
-        problems.require(roughness_coefficient is not None, "surface", expected, None)
+        problems.require(given.roughness_coefficient is not None, "surface", expected, None)
     else:
         with problems.collect():
-            measured_coefficient.validate(surface, direction=direction)
+            measured_coefficient.validate(given.surface, direction=given.direction if has_direction else "E")
 
 
 @public_result(

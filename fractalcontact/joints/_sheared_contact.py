@@ -28,7 +28,6 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import content, plain
 from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.results import provenance_of
-from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
@@ -51,6 +50,7 @@ BULK = {
     ),
 }
 LOADS = ("closure", "normal_force", "nominal_pressure")
+SOLVER = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
 PRESSING_BYTES = 228.0
 FORCE_ERROR = 1e-7  # relative error of the force that balances a spring; 1e-5 takes a tenth less time
@@ -90,7 +90,7 @@ class Pressing:
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
         options = ContactOptions(_boundary(crack), *solver)
-        return cls(crack, where, LoadPath.from_keywords(**loads), options, bulk, word_tuple(keep))
+        return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
     def references(self) -> str:
@@ -119,18 +119,16 @@ class Pressing:
         return solver.block_stiffness(self.grid, self.modulus, self.options, BULK[self.bulk][0])
 
 
-def check_pressing(
-    problems: Problems, crack: Any, *, bulk: Any = "flat_block", keep: Any = (), **keywords: Any
-) -> LoadPath | None:
-    """Check load and options of the solver, as their arguments; return the load unless it is wrong."""
+def check_pressing(problems: Problems, **replaced: Any) -> LoadPath | None:
+    """Check load and options of the solver; return the load unless it is wrong.
+
+    They are the arguments of the call, or what replaces these.
+    """
     from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-    loads = {name: keywords.pop(name) for name in LOADS if name in keywords}
-    load = problems.construct(LoadPath.from_keywords, **loads)
-    if keep is not None:
-        problems.choices("keep", keep, CONTACT_MAPS)
-    problems.choice("bulk", bulk, BULK)
-    options = problems.construct(ContactOptions, **keywords)
+    arguments, crack = vars(problems.given) | replaced, problems.given.crack
+    load = problems.construct(LoadPath.among, arguments)
+    options = problems.construct(ContactOptions.among, arguments)
     if options is None or not isinstance(crack, Crack):
         return load
     layout = crack.layout
@@ -301,18 +299,20 @@ def _press_balanced(contact: ShearedContact, initial: float, opening: float, sti
     return press(float(force), contact.pressing.keep)
 
 
-def check_pressed(problems: Problems, crack: Any, pressed: Any, *, keep: Any, **pressing: Any) -> None:
-    """Check that a result of `closure` is that of this crack, pressed in this way; None passes."""
-    if pressed is None or not isinstance(crack, Crack):
+def check_pressed(problems: Problems) -> None:
+    """Check that `pressed`, if any, is a result of `closure` for this crack, pressed in this way."""
+    given = problems.given
+    if given.pressed is None or not isinstance(given.crack, Crack):
         return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
-    entry = provenance_of(pressed) if isinstance(pressed, xr.Dataset) else {}
-    stated, wanted = entry.get("parameters", {}), {"crack": crack, **pressing}
+    entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
+    stated = entry.get("parameters", {})
+    wanted = {name: getattr(given, name) for name in ("crack", "bulk", *SOLVER)}
     differing = [name for name in wanted if content(stated.get(name)) != content(plain(wanted[name]))]
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
-    if problems.require(is_closure, "pressed", expected, pressed):
+    if problems.require(is_closure, "pressed", expected):
         problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
-    problems.require(number_of_entries(keep) == 0, "pressed", "nothing beside `keep`", pressed)
+    problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 
 
 def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:

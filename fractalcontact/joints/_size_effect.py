@@ -16,11 +16,12 @@ from fractalcontact.joints._criteria import POSITIVE
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(problems: Problems, *, size_ratio: Any, contact_dimension: Any, roughness_dimension: Any) -> None:
-    problems.numbers("size_ratio", size_ratio, **POSITIVE)
-    is_number = problems.number("contact_dimension", contact_dimension, at_least=0, at_most=2)
-    lowest = float(contact_dimension) if is_number else 0.0
-    problems.number("roughness_dimension", roughness_dimension, at_least=lowest, at_most=2)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.numbers("size_ratio", **POSITIVE)
+    is_number = problems.number("contact_dimension", at_least=0, at_most=2)
+    lowest = float(given.contact_dimension) if is_number else 0.0
+    problems.number("roughness_dimension", at_least=lowest, at_most=2)
 
 
 @public_result(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,54 +29,45 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.strength_envelope"
 STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray 1981)
+OPTIONAL = (
+    "residual_friction_angle", "roughness_coefficient", "asperity_angle", "tensile_strength", "cohesion",
+    "length",
+)  # fmt: skip
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
 OUTSIDE = "outside the range of the criterion where in_range is False"
 
 
-def _check(
-    problems: Problems,
-    *,
-    surface: Any,
-    nominal_pressure: Any,
-    wall_strength: Any,
-    basic_friction_angle: Any,
-    criterion: Any,
-    direction: Any,
-    **needed: Any,
-) -> None:
-    problems.numbers("nominal_pressure", nominal_pressure, **POSITIVE)
-    check_quantities(problems, wall_strength=wall_strength, basic_friction_angle=basic_friction_angle)
-    check_quantities(problems, optional=True, **needed)
-    if criterion is None:
-        usable = _usable(surface, needed)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.numbers("nominal_pressure", **POSITIVE)
+    check_quantities(problems, "wall_strength", "basic_friction_angle")
+    check_quantities(problems, *OPTIONAL, optional=True)
+    if given.criterion is None:
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"
-        problems.require(bool(usable), "surface", expected, surface)
-    elif problems.choices("criterion", criterion, STRENGTH):
-        problems.require(len(word_tuple(criterion)) > 0, "criterion", "at least one", "an empty sequence")
-        for name in word_tuple(criterion):
-            for need in _missing(name, surface, needed):
-                problems.add(need, f"a value, for criterion {name!r}", None)
-    has_direction = check_direction(problems, direction)
-    if surface is not None:
-        options = {"direction": direction} if has_direction else {}
+        problems.require(bool(_usable(vars(given))), "surface", expected)
+    elif problems.choices("criterion", among=STRENGTH):
+        names = word_tuple(given.criterion)
+        problems.require(len(names) > 0, "criterion", "at least one", "an empty sequence")
+        for name in names:
+            for need in _missing(name, vars(given)):
+                problems.add(need, f"a value, for criterion {name!r}")
+    has_direction = check_direction(problems)
+    if given.surface is not None:
+        options = {"direction": given.direction} if has_direction else {}
         for check in (measured_coefficient.validate, directional_roughness.validate):
             with problems.collect():
-                check(surface, **options)
+                check(given.surface, **options)
 
 
-def _missing(criterion: str, surface: Any, needed: dict[str, Any]) -> list[str]:
+def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
     """Return the arguments that a criterion needs and that are not given."""
-    given = needed | {"surface": surface}
-    return [
-        need
-        for need in STRENGTH[criterion].needs
-        if given[need] is None and not (need in MEASURED and surface is not None)
-    ]
+    measured = () if given["surface"] is None else MEASURED
+    return [need for need in STRENGTH[criterion].needs if given[need] is None and need not in measured]
 
 
-def _usable(surface: Any, needed: dict[str, Any]) -> tuple[str, ...]:
-    return tuple(name for name in STRENGTH if not _missing(name, surface, needed))
+def _usable(given: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(name for name in STRENGTH if not _missing(name, given))
 
 
 @public_result(
@@ -174,14 +165,15 @@ def strength_envelope(
     1.0
     """
     pressure = float_array(nominal_pressure)
-    needed = {
+    given = {
+        "surface": surface,
         "residual_friction_angle": residual_friction_angle,
         "roughness_coefficient": roughness_coefficient,
         "asperity_angle": asperity_angle,
         "cohesion": cohesion,
         "length": length,
     }
-    chosen = _usable(surface, needed) if criterion is None else word_tuple(criterion)
+    chosen = _usable(given) if criterion is None else word_tuple(criterion)
     measured = _measured(surface, direction)
     jrc = measured.pop("roughness_coefficient", xr.DataArray(math.nan))
     dip = measured.pop("mean_dip", xr.DataArray(math.nan))

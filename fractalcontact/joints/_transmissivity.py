@@ -37,14 +37,15 @@ MAPS = {"pressure": ("relative_pressure",), "flux": ("flux_x", "flux_y")}  # tha
 ROUNDING = 1e-9  # relative to the largest opening: a smaller overlap is rounding
 
 
-def _check(problems: Problems, *, gap: Any, axis: Any, viscosity: Any, periodic: Any, keep: Any) -> None:
-    if problems.choices("axis", axis, ("x", "y")):
-        problems.require(len(word_tuple(axis)) > 0, "axis", "at least one of 'x', 'y'", axis)
-    problems.number("viscosity", viscosity, above=0, optional=True)
-    problems.boolean("periodic", periodic, optional=True)
-    problems.choices("keep", keep, MAPS)
-    if _flow_network.check_gap(problems, gap, RESULTS):
-        problems.periodic("periodic", periodic, read_grid(gap))
+def _check(problems: Problems) -> None:
+    given = problems.given
+    if problems.choices("axis", among=("x", "y")):
+        problems.require(len(word_tuple(given.axis)) > 0, "axis", "at least one of 'x', 'y'")
+    problems.number("viscosity", above=0, optional=True)
+    problems.boolean("periodic", optional=True)
+    problems.choices("keep", among=MAPS)
+    if _flow_network.check_gap(problems, given.gap, RESULTS):
+        problems.periodic(read_grid(given.gap), given.periodic)
 
 
 @public_result(

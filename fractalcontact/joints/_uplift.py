@@ -53,31 +53,32 @@ OFF_THE_PATH = (
 )
 
 
-def _check(
-    problems: Problems, *, gap: Any, upstream: Any, downstream: Any, drains: Any, **numbers: Any
-) -> None:
-    valid = {name: problems.number(name, value, **BOUNDS[name]) for name, value in numbers.items()}
-    high, low = numbers["upstream_pressure"], numbers["downstream_pressure"]
+def _check(problems: Problems) -> None:
+    given = problems.given
+    valid = {name: problems.number(name, **bounds) for name, bounds in BOUNDS.items()}
     if valid["upstream_pressure"] and valid["downstream_pressure"]:
-        problems.require(low < high, "downstream_pressure", "less than upstream_pressure", low)
-    total_stress = numbers["total_stress"]
-    both = numbers["normal_stiffness"] is not None and total_stress is not None
+        falls = given.downstream_pressure < given.upstream_pressure
+        problems.require(falls, "downstream_pressure", "less than upstream_pressure")
+    both = given.normal_stiffness is not None and given.total_stress is not None
     problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
-    has_gap = _flow_network.check_gap(problems, gap, RESULTS)
-    plane = gap if has_gap else None
-    sides = [_check_side(problems, "upstream", upstream, plane)]
-    sides += [_check_side(problems, "downstream", downstream, plane)] if downstream is not None else []
-    has_drains = drains is not None and problems.numbers("drains", drains, any_shape=True)
+    has_gap = _flow_network.check_gap(problems, given.gap, RESULTS)
+    plane = given.gap if has_gap else None
+    sides = [
+        _check_side(problems, name, getattr(given, name), plane)
+        for name in ("upstream", "downstream")
+        if name == "upstream" or given.downstream is not None
+    ]
+    has_drains = given.drains is not None and problems.numbers("drains", any_shape=True)
     if not has_gap:
         return
     if all(sides):
-        high_side, low_side = _sides(upstream, downstream, gap)
+        high_side, low_side = _sides(given.upstream, given.downstream, given.gap)
         differ = high_side.axis != low_side.axis or high_side.place != low_side.place
-        problems.require(differ, "downstream", "another edge or line than upstream", downstream)
+        problems.require(differ, "downstream", "another edge or line than upstream")
     if has_drains:
-        _check_drains(problems, drains, gap)
-    if total_stress is not None:
-        _check_path(problems, gap)
+        _check_drains(problems, given.drains, given.gap)
+    if given.total_stress is not None:
+        _check_path(problems, given.gap)
 
 
 def _check_side(problems: Problems, name: str, value: Any, gap: xr.DataArray | None) -> bool:

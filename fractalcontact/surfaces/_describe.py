@@ -33,12 +33,13 @@ HEIGHT_STATISTICS = (
 )
 
 
-def _check(problems: Problems, *, surface: Any) -> None:
-    valid = problems.surface("surface", surface, finite=False, leading=True, profile=True)
-    if isinstance(surface, xr.DataArray):
-        check_leading(surface, _result_names(len(core_dims(surface))), problems)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    valid = problems.surface("surface", finite=False, leading=True, profile=True)
+    if isinstance(given.surface, xr.DataArray):
+        check_leading(given.surface, _result_names(len(core_dims(given.surface))), problems)
     if valid:
-        infinite = int(np.count_nonzero(np.isinf(surface.values)))
+        infinite = int(np.count_nonzero(np.isinf(given.surface.values)))
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
 

@@ -22,16 +22,17 @@ SHARE, GAUSSIAN = 0.9, 0.6080
 ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Association 88 (1993) 1273-1283"
 
 
-def _check(problems: Problems, *, surface: Any, threshold: Any, window: Any) -> None:
-    problems.number("threshold", threshold, above=0)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.number("threshold", above=0)
     largest = None
-    if problems.surface("surface", surface, finite=False):
-        largest = min(read_grid(surface).shape)
-        infinite = int(np.count_nonzero(np.isinf(surface.values)))
+    if problems.surface("surface", finite=False):
+        largest = min(read_grid(given.surface).shape)
+        infinite = int(np.count_nonzero(np.isinf(given.surface.values)))
         problems.require(infinite == 0, "surface", "no infinite heights", f"{infinite}")
-        problems.require(bool(np.isfinite(surface.values).any()), "surface", "heights", NONE)
-    if problems.integer("window", window, at_least=3, at_most=largest):
-        problems.require(window % 2 == 1, "window", "an odd number of cells", window)
+        problems.require(bool(np.isfinite(given.surface.values).any()), "surface", "heights", NONE)
+    if problems.integer("window", at_least=3, at_most=largest):
+        problems.require(given.window % 2 == 1, "window", "an odd number of cells")
 
 
 @public_result(

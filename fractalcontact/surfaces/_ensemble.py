@@ -15,11 +15,11 @@ from fractalcontact.surfaces._grid_input import surface_array
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def check_ensemble(problems: Problems, members: Any, rng: Any) -> None:
+def check_ensemble(problems: Problems) -> None:
     """Check the number of members and the random stream."""
-    problems.integer("members", members, at_least=1, optional=True)
+    problems.integer("members", at_least=1, optional=True)
     with problems.collect():
-        streams.generator(rng)
+        streams.generator(problems.given.rng)
 
 
 def draw_ensemble(

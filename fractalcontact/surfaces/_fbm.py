@@ -23,22 +23,12 @@ STEIN = (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(
-    problems: Problems,
-    *,
-    shape: Any,
-    spacing: Any,
-    hurst: Any,
-    rms_increment: Any,
-    lag: Any,
-    members: Any,
-    rng: Any,
-) -> None:
-    check_plane(problems, shape, spacing)
-    problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
-    check_length(problems, "rms_increment", rms_increment)
-    check_length(problems, "lag", lag, optional=True)
-    check_ensemble(problems, members, rng)
+def _check(problems: Problems) -> None:
+    check_plane(problems)
+    problems.number("hurst", at_least=0.01, at_most=0.99)
+    check_length(problems, "rms_increment")
+    check_length(problems, "lag", optional=True)
+    check_ensemble(problems)
 
 
 # the torus of the covariance has 3.9 times as many points an edge as the surface; 2.5 times below H = 0.8

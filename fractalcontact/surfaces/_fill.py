@@ -20,15 +20,16 @@ Array = np.ndarray[Any, np.dtype[Any]]
 BRIGGS = "Briggs, Machine contouring using minimum curvature, Geophysics 39 (1974) 39-48"
 
 
-def _check(problems: Problems, *, surface: Any, at_most: Any) -> None:
-    valid = check_planes(problems, surface)
-    if not (problems.number("at_most", at_most, at_least=0, at_most=1) and valid):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    valid = check_planes(problems)
+    if not (problems.number("at_most", at_least=0, at_most=1) and valid):
         return
-    observed = ~np.isnan(height_planes(surface))
+    observed = ~np.isnan(height_planes(given.surface))
     size = observed[0].size
     most = max(size - int(np.count_nonzero(plane)) for plane in observed)
-    expected = f"at most {100 * float(at_most):g} % missing points (see `at_most`)"
-    if problems.require(most <= at_most * size, "surface", expected, f"{most} of {size} NaN"):
+    expected = f"at most {100 * float(given.at_most):g} % missing points (see `at_most`)"
+    if problems.require(most <= given.at_most * size, "surface", expected, f"{most} of {size} NaN"):
         spans = all(_spans_plane(plane) for plane in observed if not plane.all())
         problems.require(spans, "surface", "observed points that span a plane", "too few of them")
 

@@ -23,11 +23,11 @@ KEEP_FRAME = ("surfaces.fill", "surfaces.despike")  # functions whose result is 
 LARGEST = 1e100  # m: squares of it can be represented
 
 
-def check_points(problems: Problems, points: Any) -> bool:
+def check_points(problems: Problems) -> bool:
     """Check for coordinates of points, shape (n, 3) or (n, 2); rows with a missing number do not count."""
-    values = point_array(points)
+    values = point_array(problems.given.points)
     if values is None or values.ndim != 2 or values.shape[-1] not in (2, 3):
-        problems.add("points", "real numbers of shape (n, 3), or (n, 2) for a profile", points)
+        problems.add("points", "real numbers of shape (n, 3), or (n, 2) for a profile")
         return False
     finite = values[np.isfinite(values).all(axis=1)]
     least = values.shape[1] + 1
@@ -57,15 +57,16 @@ def finite_points(points: Any, units: str) -> Array:
     return np.asarray(metres[np.isfinite(metres).all(axis=1)])
 
 
-def check_frame(problems: Problems, plane: Any, axes: int | None = None) -> None:
+def check_frame(problems: Problems, axes: int | None = None) -> None:
     """Check for a word, a result of `fit_plane`, or a surface gridded in such a plane."""
+    plane = problems.given.plane
     if isinstance(plane, (xr.Dataset, xr.DataArray)):
         frame = frame_of(plane)
         fits = frame is not None and (axes is None or axes == frame[1].size)
         expected = "a result of fractalcontact.surfaces.fit_plane, or a surface gridded above such a plane"
-        problems.require(fits, "plane", f"{expected}, for points of as many coordinates", plane)
+        problems.require(fits, "plane", f"{expected}, for points of as many coordinates")
     else:
-        problems.choice("plane", plane, PLANES, optional=True)
+        problems.choice("plane", among=PLANES, optional=True)
 
 
 def frame_of(plane: xr.Dataset | xr.DataArray) -> tuple[Array, Array] | None:
@@ -83,9 +84,9 @@ def frame_of(plane: xr.Dataset | xr.DataArray) -> tuple[Array, Array] | None:
     return (rotation, centre) if rotation.shape == (centre.size, centre.size) else None
 
 
-def _check(problems: Problems, *, points: Any, units: Any) -> None:
-    check_points(problems, points)
-    problems.choice("units", units, UNITS)
+def _check(problems: Problems) -> None:
+    check_points(problems)
+    problems.choice("units", among=UNITS)
 
 
 @public_result(

@@ -12,15 +12,16 @@ from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import GIVEN, Problems
 from fractalcontact.surfaces._grid_input import axis_spacing, check_memory, check_spacing, surface_array
 
 
-def check_heights(problems: Problems, heights: Any) -> int | None:
+def check_heights(problems: Problems, heights: Any = GIVEN) -> int | None:
     """Check for heights of planes or profiles; return 2 or 1, the axes of a plane, or None if they are wrong.
 
     A DataArray ends in dims (y, x) or (x,), and its leading dims have names of `base.schema`.
     """
+    heights = problems.given.heights if heights is GIVEN else heights
     values = _real_array(heights)
     if values is None:
         problems.add("heights", "an array of real numbers", heights)
@@ -53,14 +54,15 @@ def check_heights(problems: Problems, heights: Any) -> int | None:
     return axes if len(problems.messages) == before else None
 
 
-def _check(problems: Problems, *, heights: Any, spacing: Any, periodic: Any, units: Any) -> None:
-    axes = check_heights(problems, heights)
-    check_spacing(problems, spacing, axes)
-    problems.choice("units", units, UNITS)
-    flags = as_array(periodic)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    axes = check_heights(problems)
+    check_spacing(problems, axes)
+    problems.choice("units", among=UNITS)
+    flags = as_array(given.periodic)
     valid = flags is not None and flags.dtype == np.bool_ and flags.shape in ((), (axes or 2,))
     expected = "True or False" + (", or (y, x)" if axes != 1 else "")
-    problems.require(valid, "periodic", expected, periodic)
+    problems.require(valid, "periodic", expected)
 
 
 @public_result(

@@ -40,24 +40,16 @@ OCCUPIED = 0.5  # least share of the nodes of a uniform grid that have a point
 MOST_CELLS = 1 << 28
 
 
-def _check(
-    problems: Problems,
-    *,
-    points: Any,
-    spacing: Any,
-    triangles: Any,
-    units: Any,
-    plane: Any,
-    largest_gap: Any,
-) -> None:
-    is_valid = check_points(problems, points)
-    check_length(problems, "spacing", spacing, optional=True)
-    check_length(problems, "largest_gap", largest_gap, optional=True)
-    problems.choice("units", units, UNITS)
-    values = point_array(points) if is_valid else None
+def _check(problems: Problems) -> None:
+    given = problems.given
+    is_valid = check_points(problems)
+    check_length(problems, "spacing", optional=True)
+    check_length(problems, "largest_gap", optional=True)
+    problems.choice("units", among=UNITS)
+    values = point_array(given.points) if is_valid else None
     shape = (0, 3) if values is None else values.shape
-    check_frame(problems, plane, None if values is None else shape[1])
-    triangles = _triangles(points, triangles)
+    check_frame(problems, None if values is None else shape[1])
+    triangles = _triangles(given.points, given.triangles)
     if triangles is not None:
         faces = as_array(triangles)
         is_table = faces is not None and faces.dtype.kind in "iu" and faces.ndim == 2

@@ -22,15 +22,16 @@ _SPREAD = math.sqrt(math.log(2.0) / 2.0) / math.pi  # standard deviation over th
 _REACH = 1.0  # of the cutoff: the kernel has fallen to 1e-6 there
 
 
-def _check(problems: Problems, *, surface: Any, cutoff: Any, keep: Any) -> None:
-    is_valid = check_planes(problems, surface)
-    problems.choice("keep", keep, ("long", "short"))
-    if problems.number("cutoff", cutoff, above=0) and is_valid:
-        grid = read_grid(surface, core_dims(surface))
+def _check(problems: Problems) -> None:
+    given = problems.given
+    is_valid = check_planes(problems)
+    problems.choice("keep", among=("long", "short"))
+    if problems.number("cutoff", above=0) and is_valid:
+        grid = read_grid(given.surface, core_dims(given.surface))
         least, most = LEAST_SPACINGS * max(grid.spacing), max(grid.extent)
         expected = f"{least:.3g} m (four spacings) to {most:.3g} m (the extent)"
-        is_inside = least * (1 - 1e-9) <= float(cutoff) <= most * (1 + 1e-9)
-        problems.require(is_inside, "cutoff", expected, cutoff)
+        is_inside = least * (1 - 1e-9) <= float(given.cutoff) <= most * (1 + 1e-9)
+        problems.require(is_inside, "cutoff", expected)
 
 
 @public_result(

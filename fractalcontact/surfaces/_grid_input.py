@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import GIVEN, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -36,24 +36,25 @@ def axis_sizes(shape: Any) -> tuple[int, ...]:
     return tuple(int(size) for size in np.atleast_1d(shape))
 
 
-def check_length(problems: Problems, argument: str, value: Any, *, optional: bool = False) -> bool:
+def check_length(problems: Problems, argument: str, *, optional: bool = False) -> bool:
     """Check for a length in metres."""
-    return problems.number(argument, value, at_least=SHORTEST, at_most=LONGEST, optional=optional)
+    return problems.number(argument, at_least=SHORTEST, at_most=LONGEST, optional=optional)
 
 
-def check_spacing(problems: Problems, spacing: Any, axes: int | None = None) -> bool:
+def check_spacing(problems: Problems, axes: int | None = None, spacing: Any = GIVEN) -> bool:
     """Check for the spacing in metres: one length, or one for each axis, y first; None allows 1 or 2 axes."""
+    spacing = problems.given.spacing if spacing is GIVEN else spacing
     if not problems.numbers("spacing", spacing, at_least=SHORTEST, at_most=LONGEST):
         return False
     expected = "one length in metres" + (" or (y, x)" if axes != 1 else "")
     return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)
 
 
-def check_plane(problems: Problems, shape: Any, spacing: Any, *, profile: bool = True) -> bool:
+def check_plane(problems: Problems, *, profile: bool = True) -> bool:
     """Check shape and spacing of new surfaces together."""
+    shape = problems.given.shape
     valid_shape = check_shape(problems, shape, profile=profile)
-    axes = np.size(shape) if valid_shape else None
-    return check_spacing(problems, spacing, axes) and valid_shape
+    return check_spacing(problems, np.size(shape) if valid_shape else None) and valid_shape
 
 
 def check_memory(where: str, sizes: Sequence[int]) -> None:

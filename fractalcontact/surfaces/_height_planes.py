@@ -13,11 +13,11 @@ from fractalcontact.base.validation import Problems
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def check_planes(problems: Problems, surface: Any) -> bool:
+def check_planes(problems: Problems) -> bool:
     """Check for planes or profiles of heights that may have gaps (NaN) but no infinite values."""
-    if not problems.surface("surface", surface, finite=False, smallest=2, leading=True, profile=True):
+    if not problems.surface("surface", finite=False, smallest=2, leading=True, profile=True):
         return False
-    infinite = int(np.count_nonzero(np.isinf(surface.values)))
+    infinite = int(np.count_nonzero(np.isinf(problems.given.surface.values)))
     expected = "finite heights, or NaN where missing"
     return problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
@@ -17,9 +15,9 @@ from fractalcontact.surfaces._height_planes import check_planes, height_planes
 POLYNOMIALS = ("mean", "plane", "quadric")
 
 
-def _check(problems: Problems, *, surface: Any, order: Any) -> None:
-    check_planes(problems, surface)
-    problems.integer("order", order, at_least=0, at_most=2)
+def _check(problems: Problems) -> None:
+    check_planes(problems)
+    problems.integer("order", at_least=0, at_most=2)
 
 
 @public_result(title="Levelled surface", achieved_error="exact to rounding", check=_check, memory=34.0)

@@ -26,20 +26,11 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Points = Sequence[tuple[float, float]]
 
 
-def _check(
-    problems: Problems,
-    *,
-    shape: Any,
-    spacing: Any,
-    hurst: Any,
-    rms_increment: Any,
-    members: Any,
-    rng: Any,
-) -> None:
-    check_plane(problems, shape, spacing, profile=False)
-    problems.number("hurst", hurst, at_least=0.01, at_most=0.99)
-    check_length(problems, "rms_increment", rms_increment)
-    check_ensemble(problems, members, rng)
+def _check(problems: Problems) -> None:
+    check_plane(problems, profile=False)
+    problems.number("hurst", at_least=0.01, at_most=0.99)
+    check_length(problems, "rms_increment")
+    check_ensemble(problems)
 
 
 @public_result(

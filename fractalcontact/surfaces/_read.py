@@ -76,34 +76,27 @@ GRIDDING = (
 WIDEST = 1.0  # m: wider than the field of any microscope
 
 
-def _check(
-    problems: Problems,
-    *,
-    path: Any,
-    channel: Any,
-    units: Any,
-    spacing: Any,
-    first_row: Any,
-    columns: Any,
-    plane: Any,
-) -> None:
-    check_columns(problems, columns)
-    check_frame(problems, plane)
-    if spacing is not None:
-        check_spacing(problems, spacing)
-    problems.choice("units", units, UNITS, optional=True)
-    is_row = problems.choice("first_row", first_row, ("bottom", "top"), optional=True)
-    is_number = is_real(channel) and isinstance(channel, (int, np.integer))
-    is_channel = channel is None or isinstance(channel, str) or is_number
-    problems.require(is_channel, "channel", "the name or the number of a channel", channel)
-    if not problems.file("path", path):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    check_columns(problems)
+    check_frame(problems)
+    if given.spacing is not None:
+        check_spacing(problems)
+    problems.choice("units", among=UNITS, optional=True)
+    is_row = problems.choice("first_row", among=("bottom", "top"), optional=True)
+    is_number = is_real(given.channel) and isinstance(given.channel, (int, np.integer))
+    is_channel = given.channel is None or isinstance(given.channel, str) or is_number
+    problems.require(is_channel, "channel", "the name or the number of a channel")
+    if not problems.file("path"):
         return
-    source = Path(path)
+    source = Path(given.path)
     if is_row and file_suffix(source) in NETCDF:
         expected = "'bottom' for a NetCDF file, which has its y"
-        problems.require(first_row in (None, "bottom"), "first_row", expected, first_row)
+        problems.require(given.first_row in (None, "bottom"), "first_row", expected)
         problems.require(
-            channel is None or isinstance(channel, str), "channel", "the name of a variable", channel
+            given.channel is None or isinstance(given.channel, str),
+            "channel",
+            "the name of a variable",
         )
 
 
@@ -348,7 +341,7 @@ def _heights_content(values: Array, request: Request) -> FileContent:
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
         if not problems.messages:
-            check_spacing(problems, spacing, check_heights(problems, values))
+            check_spacing(problems, check_heights(problems, values), spacing)
     heights = labelled_heights(from_bottom(values, request.first_row), spacing, units=request.units or "m")
     return FileContent(heights, {"stated_unit": None})
 
@@ -373,7 +366,7 @@ def _netcdf_content(request: Request) -> FileContent:
             problems.require(is_unit, f"{name}.units", expected, NONE if stated is None else stated)
             array = usual_form(WHERE, array.assign_attrs(units=unit))[0].astype(np.float64)
             array.attrs["units"] = "m"
-            if spacing is not None and check_spacing(problems, spacing, len(core_dims(array))):
+            if spacing is not None and check_spacing(problems, len(core_dims(array)), spacing):
                 array = _with_spacing(array, spacing)
             problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = stated if stated is None else str(stated)

@@ -69,8 +69,9 @@ class Points:
     entries: dict[str, Any] = field(default_factory=dict)
 
 
-def check_columns(problems: Problems, columns: Any) -> None:
+def check_columns(problems: Problems) -> None:
     """Check for the names or numbers of the columns of x, y, z or x, z."""
+    columns = problems.given.columns
     if columns is None:
         return
     is_list = (
@@ -84,13 +85,14 @@ def check_columns(problems: Problems, columns: Any) -> None:
     problems.require(valid, "columns", "names or numbers (from 0) of x, y, z or of x, z", columns)
 
 
-def _check(problems: Problems, *, path: Any, units: Any, columns: Any) -> None:
-    problems.choice("units", units, UNITS, optional=True)
-    check_columns(problems, columns)
-    if not problems.path("path", path):
+def _check(problems: Problems) -> None:
+    given = problems.given
+    problems.choice("units", among=UNITS, optional=True)
+    check_columns(problems)
+    if not problems.path("path"):
         return
-    source = Path(path)
-    problems.file("path", path)
+    source = Path(given.path)
+    problems.file("path")
     suffixes = (*MESHES, *CLOUDS, *LISTS)
     known = file_suffix(source) in suffixes
     problems.require(known, "path", f"a file of points: {', '.join(suffixes)}", source.name)

@@ -66,8 +66,8 @@ MEASURED = {
 NAMES = ("concrete_crack", "jacksboro_fault_dem", *MEASURED)
 
 
-def _check(problems: Problems, *, name: Any) -> None:
-    problems.choice("name", name, NAMES)
+def _check(problems: Problems) -> None:
+    problems.choice("name", among=NAMES)
 
 
 @public_result(title="Sample surface", achieved_error="exact: heights as the file states them", check=_check)

@@ -34,70 +34,49 @@ BLOCK = 1 << 15  # modes processed at a time, so that they stay in the processor
 EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as inside
 
 
-def _check(
-    problems: Problems,
-    *,
-    shape: Any,
-    spacing: Any,
-    hurst: Any,
-    rms_height: Any,
-    rms_slope: Any,
-    long_cutoff: Any,
-    rolloff: Any,
-    short_cutoff: Any,
-    normalise: Any,
-    anisotropy_ratio: Any,
-    azimuth: Any,
-    members: Any,
-    rng: Any,
-) -> None:
-    before = len(problems.messages)
-    valid_plane = check_plane(problems, shape, spacing)
-    axes = np.size(shape) if valid_plane else 2
-    valid_hurst = problems.numbers("hurst", hurst, at_least=0.01, at_most=1.0) and problems.require(
-        np.size(hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else ""), hurst
+def _check(problems: Problems) -> None:
+    given = problems.given
+    valid_plane = check_plane(problems)
+    axes = np.size(given.shape) if valid_plane else 2
+    valid_hurst = problems.numbers("hurst", at_least=0.01, at_most=1.0) and problems.require(
+        np.size(given.hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else "")
     )
-    problems.exactly_one(rms_height=rms_height, rms_slope=rms_slope)
-    check_length(problems, "rms_height", rms_height, optional=True)
-    check_length(problems, "rms_slope", rms_slope, optional=True)
-    cutoffs = {"long_cutoff": long_cutoff, "rolloff": rolloff, "short_cutoff": short_cutoff}
-    valid_cutoffs = [check_length(problems, name, length, optional=True) for name, length in cutoffs.items()]
+    problems.exactly_one(rms_height=given.rms_height, rms_slope=given.rms_slope)
+    check_length(problems, "rms_height", optional=True)
+    check_length(problems, "rms_slope", optional=True)
+    cutoffs = {name: getattr(given, name) for name in ("long_cutoff", "rolloff", "short_cutoff")}
+    valid_cutoffs = [check_length(problems, name, optional=True) for name in cutoffs]
     if valid_plane and all(valid_cutoffs):
-        _check_order(problems, shape, spacing, **cutoffs)
-    problems.choice("normalise", normalise, ("realisation", "expectation"))
-    problems.number("azimuth", azimuth)
-    if problems.number("anisotropy_ratio", anisotropy_ratio, at_least=1e-6, at_most=1e6):
-        one_exponent = not valid_hurst or len(set(float_array(hurst))) == 1
-        isotropic = float(anisotropy_ratio) == 1.0
-        problems.require(
-            isotropic or one_exponent, "anisotropy_ratio", "1 with two Hurst exponents", anisotropy_ratio
+        _check_order(problems)
+    problems.choice("normalise", among=("realisation", "expectation"))
+    problems.number("azimuth")
+    if problems.number("anisotropy_ratio", at_least=1e-6, at_most=1e6):
+        one_exponent = not valid_hurst or len(set(float_array(given.hurst))) == 1
+        isotropic = float(given.anisotropy_ratio) == 1.0
+        problems.require(isotropic or one_exponent, "anisotropy_ratio", "1 with two Hurst exponents")
+        problems.require(isotropic or axes == 2, "anisotropy_ratio", "1 for a profile")
+    check_ensemble(problems)
+    if not problems.messages:
+        sizes = axis_sizes(given.shape)
+        check_memory(problems.where, (given.members or 1, *sizes))  # before a look at all the modes
+        band = _Band.of(
+            given.shape, given.spacing, given.hurst, cutoffs, given.anisotropy_ratio, given.azimuth
         )
-        problems.require(isotropic or axes == 2, "anisotropy_ratio", "1 for a profile", anisotropy_ratio)
-    check_ensemble(problems, members, rng)
-    if len(problems.messages) == before:
-        check_memory(problems.where, (members or 1, *axis_sizes(shape)))  # before a look at all the modes
-        _check_modes(
-            problems, _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, azimuth), shape, spacing
-        )
+        _check_modes(problems, band, given.shape, given.spacing)
 
 
-def _check_order(
-    problems: Problems,
-    shape: Any,
-    spacing: Any,
-    *,
-    long_cutoff: float | None,
-    rolloff: float | None,
-    short_cutoff: float | None,
-) -> None:
+def _check_order(problems: Problems) -> None:
     """Check that short_cutoff <= rolloff <= long_cutoff and that the grid resolves the short cut-off."""
-    steps = axis_spacing(spacing, np.size(shape))
-    longest, corner, shortest = _wavelengths(axis_sizes(shape), steps, long_cutoff, rolloff, short_cutoff)
-    if short_cutoff is not None:
+    given = problems.given
+    steps, sizes = axis_spacing(given.spacing, np.size(given.shape)), axis_sizes(given.shape)
+    longest, corner, shortest = _wavelengths(
+        sizes, steps, given.long_cutoff, given.rolloff, given.short_cutoff
+    )
+    if given.short_cutoff is not None:
         least = 2.0 * min(steps)
         expected = f"at least two spacings, {least:g} m"
         problems.require(shortest >= least * (1.0 - 1e-9), "short_cutoff", expected, shortest)
-    if rolloff is not None:
+    if given.rolloff is not None:
         expected = f"at most long_cutoff, {longest:g} m"
         problems.require(corner <= longest * (1.0 + 1e-9), "rolloff", expected, corner)
     expected = f"at most the roll-off, {corner:g} m"

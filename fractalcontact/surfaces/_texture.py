@@ -34,9 +34,10 @@ _CORE = (
 )
 
 
-def _check(problems: Problems, *, surface: Any) -> None:
-    if check_planes(problems, surface):
-        check_leading(surface, (*_CORRELATION, *_CORE, "run_time"), problems)
+def _check(problems: Problems) -> None:
+    given = problems.given
+    if check_planes(problems):
+        check_leading(given.surface, (*_CORRELATION, *_CORE, "run_time"), problems)
 
 
 @public_result(

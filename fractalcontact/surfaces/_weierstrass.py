@@ -22,24 +22,13 @@ AUSLOOS = (
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def _check(
-    problems: Problems,
-    *,
-    shape: Any,
-    spacing: Any,
-    hurst: Any,
-    rms_height: Any,
-    ratio: Any,
-    ridges: Any,
-    members: Any,
-    rng: Any,
-) -> None:
-    check_plane(problems, shape, spacing)
-    problems.number("hurst", hurst, above=0, below=1)
-    check_length(problems, "rms_height", rms_height)
-    problems.number("ratio", ratio, above=1)
-    problems.integer("ridges", ridges, at_least=1)
-    check_ensemble(problems, members, rng)
+def _check(problems: Problems) -> None:
+    check_plane(problems)
+    problems.number("hurst", above=0, below=1)
+    check_length(problems, "rms_height")
+    problems.number("ratio", above=1)
+    problems.integer("ridges", at_least=1)
+    check_ensemble(problems)
 
 
 @public_result(
