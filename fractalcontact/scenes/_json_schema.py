@@ -4,55 +4,25 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import fields
-from typing import Any
+from collections.abc import Mapping
 
-from fractalcontact.base.units import PRESSURE
-from fractalcontact.scenes._functions import arguments_of, public_function
-from fractalcontact.scenes._scene import PLANES, WANT_KEYS, MaterialTable
-from fractalcontact.scenes._scene_file import (
-    COMPASS,
+from fractalcontact.scenes._functions import public_function
+from fractalcontact.scenes._scene_keys import (
     EVEN,
-    GENERATORS,
     LOGARITHMIC,
     LONGEST_RANGE,
-    NUMBERS,
-    ONE_NUMBER,
-    PAIRS,
-    PRESSURES,
-    READING,
-    SAMPLES,
-    SPELLINGS,
-    joint_keys,
+    OF_JOINT,
+    TITLE,
+    Keys,
+    Schema,
+    keys_of,
+    keys_of_stage,
+    number,
+    surface_forms,
 )
-from fractalcontact.scenes._stages import (
-    DOMAIN_STAGES,
-    JOINT_STAGES,
-    PARTIAL_SLIP,
-    STAGES,
-    WANTED,
-)
-
-Schema = dict[str, Any]
+from fractalcontact.scenes._stage_type import StageType
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
-FLAG = {"type": "boolean"}
-BOUNDS = {
-    "above": "exclusiveMinimum",
-    "at_least": "minimum",
-    "below": "exclusiveMaximum",
-    "at_most": "maximum",
-}
-WITH_UNIT = {"type": "string", "pattern": PRESSURE.pattern}
-RANGES = [{"$ref": "#/definitions/even_range"}, {"$ref": "#/definitions/logarithmic_range"}]
-FILES = {
-    "anyOf": [
-        {"type": "string", "minLength": 1},
-        {"type": "array", "minItems": 1, "items": {"type": "string", "minLength": 1}},
-    ]
-}
-OF_JOINT = ("block", "register", "turn_upper", "lower", "upper")
 PURPOSES = {
     "surface": "The lower face, or the only surface: one of read, sample, generate.",
     "upper": "The upper face of a joint; without it the two faces match.",
@@ -63,6 +33,7 @@ PURPOSES = {
     "domains": "The analysis of the set of true contacts, one table for each function.",
     "want": "The wanted results; only what they need is computed.",
 }
+FUNCTIONS = {"contact": "contact.press", "dimensions": "dimensions.estimate"}  # whose arguments a table has
 OWN = {
     "title": "Title of the study.",
     "read": "A file, relative to the scene, of every format of fractalcontact.surfaces.read; of many scans a "
@@ -118,24 +89,14 @@ def json_schema() -> Schema:
     "Young's modulus, Pa."
     """
     tables = {
-        "surface": _surface("surface"),
-        "upper": _surface("upper"),
-        "material": _table(_material(), OWN),
-        "contact": _with_stages(
-            "contact", arguments_of("contact.press")[0], "contact.press", (PARTIAL_SLIP,)
-        ),
-        "joint": _with_stages("joint", joint_keys(), "", JOINT_STAGES),
-        "dimensions": _arguments("dimensions.estimate", leave_out=("methods",)),
-        "domains": _with_stages("domains", (), "", DOMAIN_STAGES),
-        "want": _want(),
+        name: _surface(name) if name in ("surface", "upper") else _with_stages(name) for name in PURPOSES
     }
     for name, purpose in PURPOSES.items():
         tables[name]["description"] = purpose
-    settings = {"title": {"type": "string"}}
     return {
         "$schema": DRAFT,
         "title": "Scene of fractalcontact",
-        **_table(_described(settings, OWN) | tables, {}),
+        **_table(_described({"title": TITLE.schema}, OWN) | tables, {}),
         "required": ["want"],
         "anyOf": [{"required": ["surface"]}, {"required": ["joint"]}],
         "definitions": dict(zip(("even_range", "logarithmic_range"), _ranges(), strict=True)),
@@ -154,123 +115,53 @@ def _described(properties: Mapping[str, Schema], texts: Mapping[str, str]) -> di
     }
 
 
-def _number(bounds: Mapping[str, float], key: str = "") -> Schema:
-    """Return one number; a pressure may have its unit."""
-    number = {"type": "number"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
-    return {"anyOf": [number, WITH_UNIT]} if key in PRESSURES else number
-
-
-def _numbers(bounds: Mapping[str, float], most: int | None = None, key: str = "") -> Schema:
-    """Return one number, a list of them, or a range."""
-    one = _number(bounds, key)
-    several = {"type": "array", "minItems": 1, "items": one}
-    alternatives = one.get("anyOf", [one])
-    return {"anyOf": [*alternatives, several | ({"maxItems": most} if most else {}), *RANGES]}
-
-
 def _ranges() -> list[Schema]:
-    even, logarithmic = ({word: {"type": "number"} for word in words} for words in (EVEN, LOGARITHMIC))
-    even |= {"step": _number({"above": 0.0})}
-    logarithmic |= {"first": _number({"above": 0.0}), "last": _number({"above": 0.0})}
-    logarithmic |= {"count": _number({"at_least": 1, "below": LONGEST_RANGE}) | {"multipleOf": 1}}
+    even, logarithmic = ({word: number().schema for word in words} for words in (EVEN, LOGARITHMIC))
+    positive = number(above=0.0).schema
+    even |= {"step": positive}
+    count = number(at_least=1, below=LONGEST_RANGE).schema | {"multipleOf": 1}
+    logarithmic |= {"first": positive, "last": positive, "count": count}
     return [_table(words, {}) | {"required": list(words)} for words in (even, logarithmic)]
-
-
-def _words(allowed: Iterable[str]) -> Schema:
-    """Return one word or a list of words."""
-    word = {"enum": list(allowed)}
-    return {"anyOf": [word, {"type": "array", "items": word}]}
-
-
-def _value(key: str) -> Schema:
-    """Return what `load` accepts for an argument that several functions share; anything for others."""
-    if key in ONE_NUMBER:
-        return _number(ONE_NUMBER[key], key)
-    if key in NUMBERS:
-        return _numbers(NUMBERS[key], key=key)
-    if key == "direction":
-        direction = {
-            "anyOf": [{"enum": [*COMPASS, *SPELLINGS["direction"]]}, _number({"above": -1e9, "below": 1e9})]
-        }
-        return {"anyOf": [direction, {"type": "array", "items": direction}]}
-    return {}
-
-
-def _arguments(function: str, keys: Iterable[str] | None = None, leave_out: Iterable[str] = ()) -> Schema:
-    """Return a table with arguments of a public function, described by its docstring."""
-    allowed = arguments_of(function)[0] if keys is None else keys
-    chosen = [key for key in allowed if key not in leave_out]
-    texts = {"block": OWN["block"]} | parameter_texts(function)
-    return _table({key: _value(key) for key in chosen}, texts)
 
 
 def _surface(place: str) -> Schema:
     """Return the table of a surface: one form for files, one for samples, one for each generator."""
-    level = {"type": "integer", "minimum": 0}
-    common = {key: _value(key) for key in READING if key not in ("read", "sample")}
-    common |= {"level": level, "despike": FLAG, "fill": FLAG}
-    planes = {"plane": {"enum": list(PLANES[place])}}
-    texts = parameter_texts("surfaces.read") | OWN
-    forms = [
-        _table({"read": FILES} | common | planes, texts) | {"required": ["read"]},
-        _table({"sample": {"enum": list(SAMPLES)}} | common, texts) | {"required": ["sample"]},
-    ]
-    for name in GENERATORS:
-        keys, required = arguments_of(f"surfaces.{name}")
-        own = {key: _value(key) for key in keys} | {"generate": {"const": name}, "level": level}
-        own["shape"] = {"type": "array", "minItems": 2, "maxItems": 2}
-        if "members" in own:
-            own["members"] = {"type": "integer", "minimum": 1, "maximum": LONGEST_RANGE}
-        table = _table(
-            own, parameter_texts(f"surfaces.{name}") | {k: texts[k] for k in ("generate", "level")}
-        )
-        forms.append(table | {"required": ["generate", *sorted(required)]})
-    return {"type": "object", "oneOf": forms}
+    tables = []
+    for form, keys in surface_forms(place).items():
+        if form in ("read", "sample"):
+            texts = parameter_texts("surfaces.read") | OWN
+        else:
+            texts = parameter_texts(f"surfaces.{form}") | {key: OWN[key] for key in ("generate", "level")}
+        tables.append(_of_keys(keys, texts) | {"required": list(keys.required)})
+    return {"type": "object", "oneOf": tables}
 
 
-def _material() -> dict[str, Schema]:
-    properties = {}
-    for entry in fields(MaterialTable):
-        bounds = entry.metadata["bounds"]
-        is_pair = entry.name in PAIRS
-        several = is_pair or entry.name == "yield_pressure"
-        properties[entry.name] = (
-            _numbers(bounds, 2 if is_pair else None, entry.name) if several else _number(bounds, entry.name)
-        )
-    return properties
+def _of_keys(keys: Keys, texts: Mapping[str, str]) -> Schema:
+    return _table({key: kind.schema for key, kind in keys.kinds.items()}, texts)
 
 
-def _with_stages(name: str, common: Iterable[str], function: str, stages: Iterable[str]) -> Schema:
-    """Return a table with arguments of its own and a table for each of its stages."""
-    texts = parameter_texts(function) if function else _shared_texts(stages)
-    properties = {key: _value(key) for key in common}
-    if "register" in properties:
-        properties |= {"register": FLAG, "turn_upper": {"enum": ["x", "y"]}, "lower": FILES, "upper": FILES}
-    subpackage = "joints" if name == "joint" else name
-    for word in stages:
-        row = STAGES[word if name == "contact" else f"{subpackage}/{word}"]
-        table = _arguments(row.function, row.arguments())
+def _with_stages(name: str) -> Schema:
+    """Return a table with keys of its own and a table for each of its stages."""
+    keys = keys_of(name)
+    properties = {key: kind.schema for key, kind in keys.kinds.items()}
+    for word, row in keys.stages.items():
+        table = _of_keys(keys_of_stage(row), {"block": OWN["block"]} | parameter_texts(row.function))
         table["description"] = f"Arguments of fractalcontact.{row.function}."
         own = properties.get(word)  # [joint.closure] is a stage, closure = 1e-6 a load
         properties[word] = table if own is None else {"anyOf": [*own.get("anyOf", [own]), table]}
-    return _table(properties, texts | {key: OWN[key] for key in OF_JOINT})
+    return _table(properties, _texts(name, keys.stages)) | ({"minProperties": 1} if name == "want" else {})
 
 
-def _shared_texts(stages: Iterable[str]) -> dict[str, str]:
-    """Return the descriptions of the arguments that the stages of the joint share."""
-    texts: dict[str, str] = {}
-    for word in stages:
-        row = STAGES.get(f"joints/{word}")
-        texts = (parameter_texts(row.function) if row else {}) | texts
-    return texts
-
-
-def _want() -> Schema:
-    from fractalcontact import dimensions  # only here: it imports the estimators
-
-    words = dict(WANTED) | {"dimensions": ("default", *dimensions.methods(), *SPELLINGS["dimensions"])}
-    properties = {key: _words(words[key]) if key in words else FLAG for key in WANT_KEYS}
-    return _table(properties, OWN) | {"minProperties": 1}
+def _texts(name: str, stages: Mapping[str, StageType]) -> dict[str, str]:
+    """Return the descriptions of the keys of a table itself."""
+    if name in ("material", "want"):
+        return OWN
+    if name == "joint":  # arguments that several stages share: the first words about each
+        shared: dict[str, str] = {}
+        for row in stages.values():
+            shared = parameter_texts(row.function) | shared
+        return shared | {key: OWN[key] for key in ("block", *OF_JOINT)}
+    return parameter_texts(FUNCTIONS[name]) if name in FUNCTIONS else {}
 
 
 def parameter_texts(function: str) -> dict[str, str]:

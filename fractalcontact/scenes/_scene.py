@@ -13,7 +13,6 @@ from fractalcontact.base.tables import html_table
 Table = Mapping[str, Any]
 SHOWN = 6  # values of a list that are shown in full
 OF_SURFACE = "surface"  # plane of an upper face: plane and cells of the table [surface]
-PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 LOADS = ("closure", "normal_force", "nominal_pressure")
 PRESS = "press"
 # what the datasheet of a joint shows at least
@@ -21,11 +20,6 @@ DATASHEET = (
     "roughness_coefficient", "directional_roughness", "strength_envelope", "closure", "closure_laws",
     "transmissivity",
 )  # fmt: skip
-
-
-def _number(**bounds: float) -> Any:
-    """Return a field for a number inside bounds (`above`, `at_least`, `below`)."""
-    return field(default=None, metadata={"bounds": bounds})
 
 
 @dataclass(frozen=True)
@@ -63,11 +57,11 @@ class MaterialTable:
     `yield_pressure` (Pa, one value or a range) changes no result: true pressures are compared with it.
     """
 
-    young: float | Sequence[float] | None = _number(above=0.0)
-    poisson: float | Sequence[float] | None = _number(above=-1.0, at_most=0.5)
-    basic_friction_angle: float | None = _number(at_least=0.0, below=90.0)
-    hardness: float | None = _number(above=0.0)
-    yield_pressure: float | Sequence[float] | None = _number(above=0.0)
+    young: float | Sequence[float] | None = None
+    poisson: float | Sequence[float] | None = None
+    basic_friction_angle: float | None = None
+    hardness: float | None = None
+    yield_pressure: float | Sequence[float] | None = None
 
 
 @dataclass(frozen=True)

@@ -5,81 +5,42 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Iterable
 from copy import deepcopy
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.compass import AZIMUTHS
-from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.units import pascals
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
-from fractalcontact.scenes._functions import arguments_of
 from fractalcontact.scenes._plan import check_needs, stages_of
-from fractalcontact.scenes._scene import (
-    LOADS,
-    MATERIAL_KEYS,
-    PLANES,
-    WANT_KEYS,
-    MaterialTable,
-    Scene,
-    Table,
+from fractalcontact.scenes._scene import MATERIAL_KEYS, Scene, Table
+from fractalcontact.scenes._scene_keys import (
+    ANYTHING,
+    EVEN,
+    GENERATORS,
+    LOGARITHMIC,
+    LONGEST_RANGE,
+    PRESSURES,
+    SPELLINGS,
+    TABLES,
+    TITLE,
+    Keys,
+    keys_of,
+    keys_of_stage,
+    surface_forms,
 )
-from fractalcontact.scenes._stages import (
-    DOMAIN_STAGES,
-    JOINT_STAGES,
-    PARTIAL_SLIP,
-    STAGES,
-    WANTED,
-)
+from fractalcontact.scenes._stages import PARTIAL_SLIP, STAGES
 
-GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
-SAMPLES = (
-    "concrete_crack", "jacksboro_fault_dem", "freiberg_gneiss_side_a", "freiberg_gneiss_side_b",
-    "afm_10um_di3", "wli_126um_opd1",
-)  # fmt: skip
-READING = (
-    "read", "sample", "channel", "units", "spacing", "first_row", "columns", "plane", "level", "despike",
-    "fill",
-)  # fmt: skip
-SETTINGS = ("title",)
-TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
-EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
-LONGEST_RANGE = 1_000_000
 LARGEST_FILE = 1 << 20  # bytes
 LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
 NOT_IN_KEYS = re.compile(r"[^\w\s.\"'-]")
 KEY_PART = re.compile(r"[\w\"']\s*\.")
 DEEPEST = 8  # levels of tables and lists; a scene has four
 TOO_DEEP = "tables or lists are nested too deeply: expected a table, its sub-tables and lists in them"
-COMPASS = tuple(AZIMUTHS)
-
-# bounds of the arguments that several stages share: one number, or one or several
-ONE_NUMBER: dict[str, dict[str, Any]] = {
-    "contact_modulus": {"above": 0.0},
-    "tolerance": {"above": 0.0, "below": 1.0},
-    "smoothing": {"above": 0.0},
-    "distance": {"above": 0.0},
-    "viscosity": {"above": 0.0},
-    "hardness": {"above": 0.0},
-    "unit_weight": {"above": 0.0},
-    "seating_pressure": {"above": 0.0},
-}
-NUMBERS: dict[str, dict[str, Any]] = {
-    "block": {"above": 0.0},
-    "spacing": {"above": 0.0},
-    "shear": {"at_least": 0.0},
-    "structure_size": {"above": 0.0},
-    **{load: {"at_least": 0.0} for load in LOADS},
-}
-
-
 # keys that people write as the symbol of the field
 SYMBOLS = {
     "jcs": "wall_strength",
@@ -90,14 +51,6 @@ SYMBOLS = {
     "nu": "poisson",
     "h": "hurst",
 }
-# arguments in Pa, which may have their unit, and words for others
-PRESSURES = (
-    "young", "hardness", "yield_pressure", "contact_modulus", "nominal_pressure", "seating_pressure",
-    "wall_strength", "tensile_strength", "upstream_pressure", "downstream_pressure", "drain_pressure",
-    "total_stress",
-)  # fmt: skip
-SPELLINGS: dict[str, dict[str, str]] = {"direction": AZIMUTH_WORDS, "dimensions": {"psd": "spectrum"}}
-PAIRS = ("young", "poisson")  # one value, or that of each body
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
@@ -182,8 +135,6 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
             tables[name] = {}
     scene = replace(scene, tables=tables)
     _check(scene, problems)
-    if not any(argument.startswith("want") for argument in problems.arguments):
-        check_needs(scene, problems)
     problems.messages.sort(
         key=lambda message: "an unknown key" not in message
     )  # other problems follow from it
@@ -269,126 +220,53 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
 
 
 def _check(scene: Scene, problems: Problems) -> None:
-    _check_keys(scene.tables, (*SETTINGS, *TABLES), "", problems)
-    _check_settings(scene.tables, problems)
-    _check_surface(scene.table("surface"), "surface", problems)
-    if "upper" in scene.tables:
-        _check_surface(scene.table("upper"), "upper", problems)
-    _check_material(scene.table("material"), problems)
-    if "contact" in scene.tables:
-        own = arguments_of("contact.press")[0]
-        _check_stages(scene.table("contact"), "contact", own, (PARTIAL_SLIP,), problems)
-    if "dimensions" in scene.tables:
-        keys = [key for key in arguments_of("dimensions.estimate")[0] if key != "methods"]  # from [want]
-        _check_keys(scene.table("dimensions"), keys, "dimensions", problems)
-        _check_values(scene.table("dimensions"), "dimensions", problems)
-    if "joint" in scene.tables:
-        problems.boolean("joint.register", scene.table("joint").get("register", False))
-        problems.choice("joint.turn_upper", scene.table("joint").get("turn_upper"), ("x", "y"), optional=True)
-        _check_stages(scene.table("joint"), "joint", joint_keys(), JOINT_STAGES, problems)
-    if "domains" in scene.tables:
-        _check_stages(scene.table("domains"), "domains", (), DOMAIN_STAGES, problems)
-    _check_want(scene, problems)
-
-
-def _check_settings(tables: Table, problems: Problems) -> None:
-    title = tables.get("title", "")
-    problems.require(isinstance(title, str), "title", "words", title)
+    """Check all tables; the keys of one are looked up, which imports functions, only where there is one."""
+    _check_table(scene.tables, Keys({"title": TITLE} | dict.fromkeys(TABLES, ANYTHING)), "", problems)
+    for name in TABLES:
+        if name == "surface" or (name == "upper" and name in scene.tables):
+            _check_surface(scene.table(name), name, problems)
+        elif name in scene.tables:
+            table = scene.table(name)
+            _check_table(table, keys_of(name, table), name, problems)
+    if not scene.table("want"):
+        problems.add("want", "a table that names at least one result", NONE)
+    if not any(argument.startswith("want") for argument in problems.arguments):
+        _check_needed_tables(scene, problems)
+        check_needs(scene, problems)
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
+    forms = surface_forms(name)
     sources = [source for source in ("read", "sample", "generate") if source in table]
-    if len(sources) != 1:
+    form = sources[0] if len(sources) == 1 else ""
+    if not form:
         problems.add(name, "one of `read`, `sample` or `generate`", sources or NONE)
-    elif sources == ["generate"]:
-        if problems.choice(f"{name}.generate", table["generate"], GENERATORS):
-            generator = table["generate"]
-            keys, required = arguments_of(f"surfaces.{generator}")
-            _check_keys(table, (*keys, "generate", "level"), name, problems)
-            for key in sorted(required - set(table)):
-                problems.add(f"{name}.{key}", f"a value for {generator}", NONE)
-        if "shape" in table:  # one number would make a profile, and studies are of surfaces
-            shape = table["shape"]
-            is_pair = isinstance(shape, list) and len(shape) == 2
-            problems.require(is_pair, f"{name}.shape", "[ny, nx]", shape)
-        if "members" in table:
-            problems.integer(f"{name}.members", table["members"], at_least=1, at_most=LONGEST_RANGE)
-    else:
-        _check_keys(table, READING, name, problems)
-        problems.choice(f"{name}.units", table.get("units"), UNITS, optional=True)
-        if sources == ["read"]:
-            reads = table["read"] if isinstance(table["read"], list) else [table["read"]]
-            for read in reads:
-                problems.path(f"{name}.read", read)
-            problems.require(bool(reads), f"{name}.read", "a file, a pattern or a list of files", reads)
-            problems.choice(f"{name}.plane", table.get("plane"), PLANES[name], optional=True)
+    elif form == "generate":
+        is_known = problems.choice(f"{name}.generate", table["generate"], GENERATORS)
+        form = table["generate"] if is_known else ""
+    if form:
+        _check_table(table, forms[form], name, problems)
+    else:  # all keys have a meaning that one of the forms gives them
+        kinds = {key: kind for each in forms.values() for key, kind in each.kinds.items()}
+        known = {key: value for key, value in table.items() if key in kinds}
+        _check_table(known, Keys(kinds), name, problems)
+
+
+def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> None:
+    """Check the keys and values of a table, and of the tables of stages in it."""
+    for key, value in table.items():
+        place = f"{name}.{key}" if name else key
+        if isinstance(value, dict) and key in keys.stages:
+            _check_table(value, keys_of_stage(keys.stages[key]), place, problems)
+        elif key in keys.kinds:
+            keys.kinds[key].check(problems, place, value)
         else:
-            problems.choice(f"{name}.sample", table["sample"], SAMPLES)
-    for flag in ("despike", "fill"):
-        problems.boolean(f"{name}.{flag}", table.get(flag, False))
-    problems.integer(f"{name}.level", table.get("level"), at_least=0, optional=True)
-    _check_numbers(table, name, problems)
-
-
-def _check_material(table: Table, problems: Problems) -> None:
-    _check_keys(table, MATERIAL_KEYS, "material", problems)
-    for entry in fields(MaterialTable):
-        if entry.name in table:
-            several = entry.name in (*PAIRS, "yield_pressure")
-            check = problems.numbers if several else problems.number
-            check(f"material.{entry.name}", table[entry.name], **entry.metadata["bounds"])
-    for name in PAIRS:
-        value = table.get(name)
-        if isinstance(value, list):
-            expected = "one value, or [lower, upper]"
-            problems.require(len(value) in (1, 2), f"material.{name}", expected, value)
-
-
-def joint_keys() -> tuple[str, ...]:
-    """Return the keys of `[joint]`: the block, `register`, `turn_upper`, and the arguments of all stages."""
-    stages = (STAGES[f"joints/{name}"] for name in JOINT_STAGES)
-    return tuple(
-        dict.fromkeys(
-            ["block", "register", "turn_upper", *(key for row in stages for key in row.arguments())]
-        )
-    )
-
-
-def _check_stages(
-    table: Table, name: str, common: tuple[str, ...], stages: tuple[str, ...], problems: Problems
-) -> None:
-    """Check a table whose sub-tables are the arguments of single stages."""
-    own = {key: value for key, value in table.items() if isinstance(value, dict) and key in stages}
-    rest = {key: value for key, value in table.items() if key not in own}
-    _check_keys(rest, common, name, problems, similar=stages)
-    _check_numbers(rest, name, problems)
-    _check_values(rest, name, problems)
-    subpackage = "joints" if name == "joint" else name
-    for stage, options in own.items():
-        row = STAGES[stage if name == "contact" else f"{subpackage}/{stage}"]
-        _check_keys(options, row.arguments(), f"{name}.{stage}", problems)
-        _check_numbers(options, f"{name}.{stage}", problems)
-
-
-def _check_want(scene: Scene, problems: Problems) -> None:
-    table = scene.table("want")
-    if not table:
-        problems.add("want", "a table that names at least one result", NONE)
-    _check_keys(table, WANT_KEYS, "want", problems)
-    valid = [
-        problems.choices(f"want.{name}", table[name], words)
-        for name, words in WANTED.items()
-        if name in table
-    ]
-    if "dimensions" in table:
-        from fractalcontact import dimensions  # only here: it imports the estimators
-
-        names = ("default", *dimensions.methods())
-        valid.append(problems.choices("want.dimensions", table["dimensions"], names))
-    for key in ("figures", "datasheet"):
-        problems.boolean(f"want.{key}", table.get(key, False))
-    if all(valid):
-        _check_needed_tables(scene, problems)
+            hint = did_you_mean(key, (*keys.kinds, *keys.stages)) or _home_of(key)
+            expected = f"one of the keys {', '.join(keys.kinds) or 'none'}"
+            problems.add(place, expected, Words(f"an unknown key{hint}"))
+    for key in keys.required:
+        source = table.get("generate", "the surface")
+        problems.require(key in table, f"{name}.{key}", f"a value for {source}", NONE)
 
 
 def _check_needed_tables(scene: Scene, problems: Problems) -> None:
@@ -404,45 +282,6 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     if slips:
         expected = "no hardness: partial slip is that of elastic bodies"
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
-
-
-def _check_numbers(table: Table, name: str, problems: Problems) -> None:
-    for key, bounds in ONE_NUMBER.items():
-        if key in table:
-            problems.number(f"{name}.{key}", table[key], **bounds)
-    for key, bounds in NUMBERS.items():
-        if key in table:
-            problems.numbers(f"{name}.{key}", table[key], **bounds)
-    if "direction" in table:
-        _check_direction(table["direction"], f"{name}.direction", problems)
-
-
-def _check_values(table: Table, name: str, problems: Problems) -> None:
-    """Check that no argument is a table, which would be taken for that of a stage and left out."""
-    for key, value in table.items():
-        place = f"{name}.{key}"
-        is_told = any(f"{argument}.".startswith(f"{place}.") for argument in problems.arguments)
-        if isinstance(value, dict) and not is_told:
-            problems.add(place, "a value, not a table", value)
-
-
-def _check_direction(value: Any, place: str, problems: Problems) -> None:
-    for direction in value if isinstance(value, list) else [value]:
-        azimuth = isinstance(direction, (int, float)) and not isinstance(direction, bool)
-        valid = direction in COMPASS or (azimuth and abs(direction) < 1e9)
-        problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", direction)
-
-
-def _check_keys(
-    table: Table, allowed: Iterable[str], name: str, problems: Problems, similar: Iterable[str] = ()
-) -> None:
-    words = tuple(allowed)
-    for key in table:
-        if key not in words:
-            place = f"{name}.{key}" if name else key
-            hint = did_you_mean(key, (*words, *similar)) or _home_of(key)
-            got = Words(f"an unknown key{hint}")
-            problems.add(place, f"one of the keys {', '.join(words) or 'none'}", got)
 
 
 def _home_of(key: str) -> str:

@@ -35,7 +35,8 @@ from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
-from fractalcontact.scenes._scene_file import GENERATORS, check_tables, parse
+from fractalcontact.scenes._scene_file import check_tables, parse
+from fractalcontact.scenes._scene_keys import GENERATORS
 from fractalcontact.scenes._stage_type import StageType
 from fractalcontact.scenes._stages import (
     DOMAIN_STAGES,

@@ -1,0 +1,229 @@
+"""The keys of a scene, declared once: `load` checks their values, and editors get the JSON schema of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from fractalcontact.base.compass import AZIMUTHS
+from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
+from fractalcontact.base.lengths import UNITS
+from fractalcontact.base.units import PRESSURE
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._functions import arguments_of
+from fractalcontact.scenes._scene import LOADS, OF_SURFACE, WANT_KEYS, Table
+from fractalcontact.scenes._stage_type import StageType
+from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, PARTIAL_SLIP, STAGES, WANTED
+
+Schema = dict[str, Any]
+
+GENERATORS = ("fbm", "spectral", "midpoint", "weierstrass")
+SAMPLES = (
+    "concrete_crack", "jacksboro_fault_dem", "freiberg_gneiss_side_a", "freiberg_gneiss_side_b",
+    "afm_10um_di3", "wli_126um_opd1",
+)  # fmt: skip
+TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
+EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
+LONGEST_RANGE = 1_000_000  # entries, and members of an ensemble: more do not fit into memory as results
+LARGEST_AZIMUTH = 1e9  # degree; beyond it a double has no digits left below 360
+# arguments in Pa, which may have their unit, and words for others
+PRESSURES = (
+    "young", "hardness", "yield_pressure", "contact_modulus", "nominal_pressure", "seating_pressure",
+    "wall_strength", "tensile_strength", "upstream_pressure", "downstream_pressure", "drain_pressure",
+    "total_stress",
+)  # fmt: skip
+SPELLINGS: dict[str, dict[str, str]] = {"direction": AZIMUTH_WORDS, "dimensions": {"psd": "spectrum"}}
+BOUNDS = {
+    "above": "exclusiveMinimum",
+    "at_least": "minimum",
+    "below": "exclusiveMaximum",
+    "at_most": "maximum",
+}
+WITH_UNIT = {"type": "string", "pattern": PRESSURE.pattern}
+RANGES = [{"$ref": "#/definitions/even_range"}, {"$ref": "#/definitions/logarithmic_range"}]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the value of a key may be: its check, called with problems, place and value, and its schema."""
+
+    check: Callable[[Problems, str, Any], object]
+    schema: Schema = field(default_factory=dict)
+
+
+def number(unit: bool = False, **bounds: Any) -> Kind:
+    """Return the kind of one number inside bounds, with `unit` a pressure that may have its unit."""
+    schema = {"type": "number"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
+    return Kind(partial(_check_number, bounds), {"anyOf": [schema, WITH_UNIT]} if unit else schema)
+
+
+def _check_number(bounds: Mapping[str, Any], problems: Problems, place: str, value: Any) -> None:
+    problems.number(place, value, **bounds)
+
+
+def _numbers(unit: bool = False, pair: bool = False, **bounds: Any) -> Kind:
+    """Return the kind of one number, a list or a range of them; with `pair` one for each body at most."""
+    one = number(unit, **bounds).schema
+    several = {"type": "array", "minItems": 1, "items": one} | ({"maxItems": 2} if pair else {})
+
+    def check(problems: Problems, place: str, value: Any) -> None:
+        problems.numbers(place, value, **bounds)
+        fits = not (pair and isinstance(value, list)) or len(value) in (1, 2)
+        problems.require(fits, place, "one value, or [lower, upper]", value)
+
+    return Kind(check, {"anyOf": [*one.get("anyOf", [one]), several, *RANGES]})
+
+
+def _integer(**bounds: Any) -> Kind:
+    schema = {"type": "integer"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
+    return Kind(lambda problems, place, value: problems.integer(place, value, **bounds), schema)
+
+
+def _choice(words: Iterable[str]) -> Kind:
+    allowed = list(words)
+    return Kind(lambda problems, place, value: problems.choice(place, value, allowed), {"enum": allowed})
+
+
+def _choices(words: Iterable[str]) -> Kind:
+    """Return the kind of one word or a list of words."""
+    allowed = list(words)
+    schema = {"anyOf": [{"enum": allowed}, {"type": "array", "items": {"enum": allowed}}]}
+    return Kind(lambda problems, place, value: problems.choices(place, value, allowed), schema)
+
+
+def _check_files(problems: Problems, place: str, value: Any) -> None:
+    files = value if isinstance(value, list) else [value]
+    for file in files:
+        problems.path(place, file)
+    problems.require(bool(files), place, "a file, a pattern or a list of files", files)
+
+
+def _check_direction(problems: Problems, place: str, value: Any) -> None:
+    for direction in value if isinstance(value, list) else [value]:
+        is_azimuth = isinstance(direction, (int, float)) and not isinstance(direction, bool)
+        valid = direction in COMPASS or (is_azimuth and abs(direction) < LARGEST_AZIMUTH)
+        problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", direction)
+
+
+def _check_value(problems: Problems, place: str, value: Any) -> None:
+    """Check that an argument is no table, which would be taken for that of a stage and left out."""
+    is_told = any(f"{argument}.".startswith(f"{place}.") for argument in problems.arguments)
+    if isinstance(value, dict) and not is_told:
+        problems.add(place, "a value, not a table", value)
+
+
+def _check_shape(problems: Problems, place: str, value: Any) -> None:
+    """Check for the shape of a surface: one number would make a profile."""
+    problems.require(isinstance(value, list) and len(value) == 2, place, "[ny, nx]", value)
+
+
+def _unchecked(problems: Problems, place: str, value: Any) -> None:
+    """Leave the check to the function that takes the value."""
+
+
+COMPASS = tuple(AZIMUTHS)
+_AZIMUTH = number(above=-LARGEST_AZIMUTH, below=LARGEST_AZIMUTH).schema
+_DIRECTION = {"anyOf": [{"enum": [*COMPASS, *AZIMUTH_WORDS]}, _AZIMUTH]}
+_FILE = {"type": "string", "minLength": 1}
+ANYTHING, VALUE = Kind(_unchecked), Kind(_check_value)
+FLAG = Kind(lambda problems, place, value: problems.boolean(place, value), {"type": "boolean"})
+FILES = Kind(_check_files, {"anyOf": [_FILE, {"type": "array", "minItems": 1, "items": _FILE}]})
+TITLE = Kind(
+    lambda problems, place, value: problems.require(isinstance(value, str), place, "words", value),
+    {"type": "string"},
+)
+# arguments that several functions share; their other ones are checked by the functions alone
+SHARED = {
+    **dict.fromkeys(("contact_modulus", "hardness", "seating_pressure"), number(unit=True, above=0.0)),
+    **dict.fromkeys(("smoothing", "distance", "viscosity", "unit_weight"), number(above=0.0)),
+    "tolerance": number(above=0.0, below=1.0),
+    **dict.fromkeys(("block", "spacing", "structure_size"), _numbers(above=0.0)),
+    **{key: _numbers(unit=key in PRESSURES, at_least=0.0) for key in ("shear", *LOADS)},
+    "direction": Kind(_check_direction, {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}),
+}
+OF_FILES = {
+    "channel": ANYTHING,
+    "units": _choice(UNITS),
+    "spacing": SHARED["spacing"],
+    **dict.fromkeys(("first_row", "columns", "plane"), ANYTHING),
+    "level": _integer(at_least=0),
+    **dict.fromkeys(("despike", "fill"), FLAG),
+}
+PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
+MATERIAL = {
+    "young": _numbers(unit=True, pair=True, above=0.0),
+    "poisson": _numbers(pair=True, above=-1.0, at_most=0.5),
+    "basic_friction_angle": number(at_least=0.0, below=90.0),
+    "hardness": SHARED["hardness"],
+    "yield_pressure": _numbers(unit=True, above=0.0),
+}
+OF_JOINT = {
+    "register": FLAG,
+    "turn_upper": _choice(("x", "y")),
+    "lower": FILES,
+    "upper": FILES,
+}
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of a table: the kind of each, those that it must have, and the stages with a table in it."""
+
+    kinds: Mapping[str, Kind]
+    required: tuple[str, ...] = ()
+    stages: Mapping[str, StageType] = field(default_factory=dict)
+
+
+def surface_forms(place: str) -> dict[str, Keys]:
+    """Return the keys of `[surface]` or `[upper]` by its source: `read`, `sample`, or the generator."""
+    plane = {"plane": _choice(PLANES[place])}
+    forms = {
+        "read": Keys({"read": FILES} | OF_FILES | plane, ("read",)),
+        "sample": Keys({"sample": _choice(SAMPLES)} | OF_FILES, ("sample",)),
+    }
+    for name in GENERATORS:
+        keys, required = arguments_of(f"surfaces.{name}")
+        kinds = {key: SHARED.get(key, ANYTHING) for key in keys}
+        kinds["shape"] = Kind(_check_shape, {"type": "array", "minItems": 2, "maxItems": 2})
+        if "members" in kinds:
+            kinds["members"] = _integer(at_least=1, at_most=LONGEST_RANGE)
+        kinds |= {"generate": Kind(_unchecked, {"const": name}), "level": OF_FILES["level"]}
+        forms[name] = Keys(kinds, ("generate", *sorted(required)))
+    return forms
+
+
+def keys_of(table: str, given: Table | None = None) -> Keys:
+    """Return the keys of a table of a scene other than those of the surfaces.
+
+    Of the table that is `given`, the words of a key that it does not have may be left out.
+    """
+    if table == "material":
+        return Keys(MATERIAL)
+    if table == "want":
+        methods: tuple[str, ...] = ()
+        if given is None or "dimensions" in given:
+            from fractalcontact import dimensions  # only here: it imports the estimators
+
+            methods = ("default", *dimensions.methods(), *SPELLINGS["dimensions"])
+        words = {**WANTED, "dimensions": methods}
+        return Keys({key: _choices(words[key]) if key in words else FLAG for key in WANT_KEYS})
+    if table == "dimensions":  # its methods are those of [want]
+        return Keys(_arguments(key for key in arguments_of("dimensions.estimate")[0] if key != "methods"))
+    if table == "contact":
+        return Keys(_arguments(arguments_of("contact.press")[0]), (), {PARTIAL_SLIP: STAGES[PARTIAL_SLIP]})
+    if table == "domains":
+        return Keys({}, (), {name: STAGES[f"domains/{name}"] for name in DOMAIN_STAGES})
+    stages = {name: STAGES[f"joints/{name}"] for name in JOINT_STAGES}
+    common = (key for row in stages.values() for key in row.arguments())
+    return Keys(_arguments(("block", *common)) | OF_JOINT, (), stages)
+
+
+def keys_of_stage(row: StageType) -> Keys:
+    """Return the keys of the table of a stage, `[joint.closure]` for example."""
+    return Keys(_arguments(row.arguments()))
+
+
+def _arguments(names: Iterable[str]) -> dict[str, Kind]:
+    return {name: SHARED.get(name, VALUE) for name in names}
