@@ -11,8 +11,8 @@ from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.results import public_name, public_result
 
 
-def _check_mean(problems, data, *, scale):
-    problems.number("scale", scale, above=0)
+def _check_mean(problems):
+    problems.number("scale", above=0)
 
 
 @public_result(title="Mean height", references="Nobody (2000)", achieved_error="exact", check=_check_mean)

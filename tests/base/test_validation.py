@@ -150,3 +150,18 @@ def test_ragged_sequences_are_refused():
         problems.choices("keep", ["gap", ["state"]], ("gap", "state"))
     text = "\n".join(caught.value.problems)
     assert all(f"{name}: expected" in text for name in ("young", "loads", "keep"))
+
+
+def test_checks_read_the_arguments_of_the_call():
+    arguments = {"lag": -1.0, "method": "quick", "keep": None, "spacing": [1.0, 2.0]}
+    with pytest.raises(InvalidInput) as caught, Problems("f", arguments=arguments) as problems:
+        assert not problems.number("lag", above=0)
+        assert problems.number("lag", 2.0, above=0)  # another value
+        problems.choice("method", among=("fast", "slow"))
+        assert problems.choices("keep", among=("state",), optional=True)
+        assert problems.numbers("spacing", above=0)
+        problems.require(False, "spacing", "one number")
+        assert problems.given.spacing == [1.0, 2.0]
+    assert [line.split(":")[0] for line in caught.value.problems] == ["lag", "method", "spacing"]
+    assert "got -1.0" in caught.value.problems[0]
+    assert "got [1.0, 2.0]" in caught.value.problems[2]

@@ -65,12 +65,12 @@ def test_load_path_refuses_bad_values(values):
         LoadPath("closure", values)
 
 
-def test_load_path_from_keywords():
-    path = LoadPath.from_keywords(closure=None, normal_force=np.array([1.0, 2.0]), nominal_pressure=None)
+def test_load_path_among_arguments():
+    path = LoadPath.among({"closure": None, "normal_force": np.array([1.0, 2.0]), "hardness": 2.0})
     assert path == LoadPath("normal_force", [1, 2])
     for loads in ({"closure": None, "normal_force": None}, {"closure": 1.0, "normal_force": 2.0}):
         with pytest.raises(InvalidInput, match="closure / normal_force: expected exactly one"):
-            LoadPath.from_keywords(**loads)
+            LoadPath.among(loads)
 
 
 def test_nominal_pressure_becomes_force():
