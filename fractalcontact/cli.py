@@ -434,7 +434,7 @@ def _run(options: argparse.Namespace) -> int:
         written = f"written to {out}: {files}{drawn}{_memory()}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
         print(f"next: open {out / 'report.html'} in a browser")
-    has_failed = "overview" in tree.children and (tree["overview/status"] == "failed").any()
+    has_failed = "overview" in tree.children and (tree["overview/status"] != "done").any()
     return FAILED if has_failed else 0
 
 

@@ -16,7 +16,7 @@ import os
 import platform
 import shutil
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -85,12 +85,7 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
     with Problems(where) as problems:
         for name, dataset in groups.items():
             _check_words(problems, name, dataset)
-    return save_groups(groups.items(), Path(path))
-
-
-def save_groups(groups: Iterable[tuple[str, xr.Dataset]], target: Path) -> Path:
-    """Write groups as they come, each by its path, with one of them in memory at a time; see `save`."""
-    where = SAVE
+    target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
@@ -216,7 +211,7 @@ def _is_attribute(value: object) -> bool:
     return array.dtype.kind in "SUiuf" and array.ndim < 2
 
 
-def _write(groups: Iterable[tuple[str, xr.Dataset]], path: Path) -> None:
+def _write(groups: Mapping[str, xr.Dataset], path: Path) -> None:
     """Write the groups of a file.
 
     Blocks of dask arrays are computed and written one by one, each under the lock.
@@ -229,7 +224,7 @@ def _write(groups: Iterable[tuple[str, xr.Dataset]], path: Path) -> None:
     with NETCDF_LOCK:
         file = netCDF4.Dataset(path, "w", format="NETCDF4")
     try:
-        for name, dataset in groups:
+        for name, dataset in groups.items():
             for variable in dataset.variables.values():
                 if variable.chunks is None:
                     variable.load()  # a lazy array of another file needs the lock of xarray

@@ -85,6 +85,11 @@ class Ensemble:
             for name in names
         }
 
+    @property
+    def failures(self) -> dict[str, str]:
+        """Return nothing: a stage that fails ends the study."""
+        return {}
+
     def preparation(self) -> dict[str, str | float]:
         """Return nothing: the surfaces of an ensemble are generated."""
         return {}

@@ -51,7 +51,8 @@ def pooled(overview: xr.Dataset) -> xr.Dataset:
     for key, values in overview.data_vars.items():
         if values.dtype.kind != "f" or str(key).endswith(("_low", "_high")) or key == ERROR:
             continue
-        errors = overview[ERROR].values if key == "fractal_dimension" and ERROR in overview else 0.0
+        has_errors = key == "fractal_dimension" and ERROR in overview and overview[ERROR].notnull().any()
+        errors = overview[ERROR].values if has_errors else 0.0
         found = random_effects(values.values, errors)
         # D lies between two whole numbers; what is negative in no scan is so in no mean
         is_dimension, smallest = key == "fractal_dimension", float(values.min())
@@ -63,15 +64,17 @@ def pooled(overview: xr.Dataset) -> xr.Dataset:
             "_low": (float(low), "lower end of the 95 % interval of the mean over scans"),
             "_high": (float(high), "upper end of the 95 % interval of the mean over scans"),
             "_scatter": (found.between, "standard deviation between scans, without the error within each"),
+            "_scans": (float(found.count), "number of scans that have a value"),
         }
         for ending, (value, words) in facts.items():
-            means[f"{key}{ending}"] = ((), value, {"units": values.attrs["units"], "long_name": text + words})
+            units = "1" if ending == "_scans" else values.attrs["units"]
+            means[f"{key}{ending}"] = ((), value, {"units": units, "long_name": text + words})
     return xr.Dataset(means)
 
 
 def folder_of(name: str) -> str:
-    """Return the name of the folder and the group of a scan."""
-    return name.replace("/", "_")
+    """Return the name of the folder and the group of a scan; those of two scans differ."""
+    return name.replace("%", "%25").replace("/", "%2F")
 
 
 def page_of(name: str) -> str:
@@ -84,7 +87,6 @@ def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
     overview, root = group_of(tree, OVERVIEW), tree.to_dataset(inherit=False)
     if overview is None:
         return
-    done = int((overview["status"] == "done").sum())
     keys, cells = [], []
     for head, name, decimals in MAIN_COLUMNS:
         if name not in root:
@@ -95,10 +97,11 @@ def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
             for each in (root[f"{name}{end}"].rename(name) for end in ("", "_low", "_high", "_scatter"))
         )
         keys.append((head,))
-        cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter))
-    heads = (f"mean of {done} scans", "95 % interval", "scatter between scans")
+        count = plain(root[f"{name}_scans"], 0)
+        cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter, count))
+    heads = ("mean", "95 % interval", "scatter between scans", "scans")
     yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells))
-    has_failed = done < overview.sizes[SCAN]
+    has_failed = bool((overview["status"] != "done").any())
     rows = _ROWS if has_failed else replace(_ROWS, columns=_ROWS.columns[:-1])
     table = table_of(rows, tree, overview)
     if table is not None:
@@ -111,8 +114,11 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
     if overview is None:
         return
     names = overview[SCAN].values.astype(str)
-    failed = overview["status"].values == "failed"
-    yield f"{names.size} scans" + (f"; {failed.sum()} failed: {_few(names[failed])}" if failed.any() else "")
+    counts = [f"{names.size} scans"]
+    for status in ("failed", "incomplete"):
+        chosen = names[overview["status"].values == status]
+        counts += [f"{chosen.size} {status}: {_few(chosen)}"] if chosen.size else []
+    yield "; ".join(counts)
     found = {head: names[is_far(overview[name].values)] for head, name, _ in MAIN_COLUMNS if name in overview}
     texts = [f"{head} of {_few(far)}" for head, far in found.items() if far.size]
     if texts:

@@ -25,6 +25,7 @@ from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.results import provenance_of
+from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._inputs import crack_options, read_surface
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
@@ -36,7 +37,7 @@ from fractalcontact.scenes._stages import (
     only_describes_surface,
     section_length,
 )
-from fractalcontact.scenes._validation import validate_placed
+from fractalcontact.scenes._validation import require_above, validate_placed
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -80,21 +81,27 @@ class MapReader:
 
 @dataclass(frozen=True, repr=False)
 class PartWithReaders:
-    """A part and the stages that read its maps; maps that nothing else needs are dropped afterwards."""
+    """A part and the stages that read its maps; maps that nothing else needs are dropped afterwards.
+
+    A reader that fails has its error as result: the part, and the other readers, are kept.
+    """
 
     part: Part
     readers: tuple[MapReader, ...] = ()
     dropped: tuple[str, ...] = ()
 
-    def __call__(self) -> tuple[list[xr.Dataset], list[float]]:
+    def __call__(self) -> tuple[list[xr.Dataset | Exception], list[float]]:
         """Return the results and the seconds each took."""
         start = time.perf_counter()
         source = self.part()
         seconds = [time.perf_counter() - start]
-        results = []
+        results: list[xr.Dataset | Exception] = []
         for reader in self.readers:
             start = time.perf_counter()
-            results.append(reader(source))
+            try:
+                results.append(reader(source))
+            except Exception as error:
+                results.append(error)
             seconds.append(time.perf_counter() - start)
         return [without(source, self.dropped), *results], seconds
 
@@ -246,6 +253,8 @@ def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
         faces = call("joints.register", lower, upper, turn_upper=scene.joint.turn_upper)
         validate_placed(scene, lower, faces["height"])
     else:
+        with Problems("fractalcontact.scenes.run") as problems:
+            require_above(upper, lower, problems)
         faces = as_dataset(upper.rename("height"))
     prepared = upper.attrs.get("preparation")
     return faces.assign_attrs(preparation=prepared) if prepared else faces

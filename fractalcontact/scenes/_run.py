@@ -28,7 +28,7 @@ from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._memory import check_memory
-from fractalcontact.scenes._overview import OVERVIEW, pooled
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, pooled
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._result_tables import MEMBER, of_member
@@ -50,6 +50,7 @@ from fractalcontact.scenes._summary import Summary, screen_text, summary_of, ver
 from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validate
 
+PARTIAL = "partial: "  # start of the attribute `completeness`
 OWN_REFERENCES = "see the references of each group"
 # what the root of a result states of its groups, for a reader that opens no group
 MAIN = {
@@ -108,12 +109,13 @@ def run(
     DataTree
         Groups named after the subpackages. The root's `provenance` holds the scene, and the run time,
         achieved error and origin of every stage. Of many scans: a row for each in the group `overview`, their
-        numbers along `scan`, in the root the means with their intervals; maps are in the file alone.
+        numbers along `scan`, in the root the means with their intervals; the maps of each in
+        `out/scans/NAME/result.nc`, without `out` in the group `scans/NAME`.
 
     Warns
     -----
     FractalContactWarning
-        Some of many scans failed: their rows state why.
+        Some of many scans, or some of their stages, failed: their rows state why.
 
     Raises
     ------
@@ -165,56 +167,50 @@ def _run_scans(
     """Return the numbers of all scans, and the summary; without a folder also their maps."""
     if folder is None:
         with tempfile.TemporaryDirectory() as name:
-            temporary = Path(name)
-            _, whole = _run_scans(scene, scans, temporary, progress, workers, start)
-            return netcdf.open(temporary / RESULT), whole
+            tree, whole = _run_scans(scene, scans, Path(name), progress, workers, start)
+            for file in sorted(Path(name).glob(f"{SCANS}/*/{RESULT}")):
+                tree[f"{SCANS}/{file.parent.name}"] = netcdf.open(file)
+            return tree, whole
     with locked(folder), signals.noted() as stop:
         studies = ScanStudies(scans, folder)
         studies.run(_study_scan, workers, stop, progress=progress)
         if stop:
             done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
             raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
-        tree = xr.DataTree()
-
-        def groups() -> Iterator[tuple[str, xr.Dataset]]:
-            nonlocal tree
-            for name in ("", OVERVIEW, *(stage.name for stage in stages_of(scene) if stage.stored)):
-                yield f"/{name}", xr.Dataset()  # first: a file lists its groups in this order
-            yield from studies.maps()
-            tree = _assemble(scene, studies.numbers, studies.seconds, [], pooled(studies.numbers[OVERVIEW]))
-            _note_run_time(tree, start)
-            tree.attrs["caveats"] = "none"
-            for node in tree.subtree:
-                yield node.path, node.to_dataset(inherit=False)
-
-        netcdf.save_groups(groups(), folder / RESULT)
+        groups = studies.groups()
+        tree = _assemble(scene, groups, studies.seconds, [], pooled(groups[OVERVIEW]))
+        _note_run_time(tree, start)
+        tree.attrs["caveats"] = "none"
+        netcdf.save(tree, folder / RESULT)
         with _beside_the_result():
             frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
             with netcdf.written_whole(folder / CSV) as temporary:
                 frame.to_csv(temporary, index=False)
             overview = xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
-            has_numbers = not all(studies.reasons.values())
-            figures = _draw(overview, folder, progress) if scene.want.figures and has_numbers else []
+            figures = _draw(overview, folder, progress) if scene.want.figures and studies.numbers else []
             remove_old_figures(folder, figures)
             whole = summary_of(tree)
             write_report(tree, folder / REPORT, figures, whole)
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
-            message = f"{failed} of {len(scans)} scans failed; the table states why"
+            message = f"{failed} of {len(scans)} scans failed or are incomplete; the table states why"
             warnings.warn(message, FractalContactWarning, stacklevel=3)
         return tree, whole
 
 
-def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> None:
-    """Validate and study one scan, in a folder of its own."""
+def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> str:
+    """Study one scan in a folder of its own; return which stages failed and why.
+
+    It is not validated beforehand: what does not fit this scan fails in its stage, and the others go on.
+    """
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report of the scan has them
-        scene = validate(scene)
         check_memory(scene, stages_of(scene))
         folder.mkdir(exist_ok=True)
         with locked(folder):
-            _run(scene, folder, False, None, start, stop, facts)
+            tree, _ = _run(scene, folder, False, None, start, stop, facts)
+    return str(tree.attrs.get("completeness", "")).removeprefix(PARTIAL)
 
 
 def _run(
@@ -226,11 +222,17 @@ def _run(
     stop: signals.Stop,
     facts: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[xr.DataTree, Summary | None]:
-    """Return the results, with these `facts` as attributes, and the summary where the report computed it."""
+    """Return the results, and the summary where the report computed it.
+
+    One of many scans, whose `facts` mark it as finished, goes on without stages that fail.
+    """
     store = PartStore(folder)
     scene = with_seeds(scene, store)
-    study_type = Study if scene.surface.members is None else Ensemble
-    study: Study | Ensemble = study_type(scene, store, progress, workers)
+    study: Study | Ensemble
+    if scene.surface.members is None:
+        study = Study(scene, store, progress, workers, goes_on=bool(facts))
+    else:
+        study = Ensemble(scene, store, progress, workers)
     missing = study.run(stop)
     missing += [FIGURES] if stop and scene.want.figures else []
     groups = study.groups()
@@ -238,7 +240,16 @@ def _run(
         if name in groups:
             warn(implausible_result(name, groups[name]))
     tree = _assemble(scene, groups, study.seconds, missing)
-    tree.attrs |= {**study.preparation(), **facts}
+    tree.attrs |= study.preparation()
+    reasons = list(dict.fromkeys(study.failures.values()))
+    failed = [", ".join(stage for stage in study.failures if study.failures[stage] == why) for why in reasons]
+    lines = [f"{stages}: {why}" for stages, why in zip(failed, reasons, strict=True)]
+    if failed and not groups:
+        raise InvalidInput("fractalcontact.scenes.run", lines)
+    if not failed:
+        tree.attrs.update(facts)
+    elif not missing:
+        tree.attrs["completeness"] = PARTIAL + "; ".join(lines)
     _note_run_time(tree, start)
     if folder is None:
         return tree, None
@@ -261,10 +272,11 @@ def _run(
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
         write_report(tree, folder / REPORT, figures, whole)
-        if scene.want.datasheet:
+        if scene.want.datasheet and not failed:
             tables(tree, folder / TABLES)
             _draw_datasheet(tree, folder / DATASHEET)
-    store.clear()
+    if not failed:
+        store.clear()
     return tree, whole
 
 
@@ -322,7 +334,7 @@ def _assemble(
     named = ", ".join(node.path.strip("/") for node in tree.subtree if node is not tree and node.has_data)
     tree.attrs = root.attrs | {"comment": f"{root.attrs['comment']}; results by group: {named}"}
     if missing:
-        tree.attrs["completeness"] = f"partial: the run was stopped; missing: {', '.join(missing)}"
+        tree.attrs["completeness"] = f"{PARTIAL}the run was stopped; missing: {', '.join(missing)}"
     return tree
 
 

@@ -38,10 +38,10 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
         files = {name: _files(read, name, scene.folder, problems) for name, read in reads.items()}
         if len(files) == 2 and all(files.values()):
             _check_pairs(reads, files, problems)
-    if isinstance(reads["surface"], list) or len(files) == 1:
-        names = _names(list(files["surface"].values()))
-    else:
-        names = list(files["surface"])
+        is_named_by_file = isinstance(reads["surface"], list) or len(files) == 1
+        names = _names(list(files["surface"].values())) if is_named_by_file else list(files["surface"])
+        twice = sorted({name for name in names if names.count(name) > 1})
+        problems.require(not twice, "surface.read", "each file once", Words(f"{', '.join(twice)} again"))
     pairs = zip(*(each.values() for each in files.values()), strict=True)
     tables = [
         {name: {**scene.table(name), "read": file} for name, file in zip(files, pair, strict=True)}

@@ -14,7 +14,7 @@ from pathlib import Path
 import xarray as xr
 
 from fractalcontact.base import signals
-from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.errors import FractalContactError
 from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf_header import read_headers
 from fractalcontact.base.output_folder import RESULT
@@ -28,44 +28,43 @@ from fractalcontact.scenes._result_tables import SCAN
 from fractalcontact.scenes._results_folder import REPORT
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stacked_results import stacked
-from fractalcontact.scenes._study import Study
+from fractalcontact.scenes._study import Study, reason_of
 from fractalcontact.scenes._tables import MAP_DIMS
 
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
 
-StudyOne = Callable[[Scene, Path, signals.Stop, Mapping[str, str]], None]
+StudyOne = Callable[[Scene, Path, signals.Stop, Mapping[str, str]], str]
+Numbers = dict[str, xr.Dataset]
 
 
 @dataclass(frozen=True, repr=False)
 class _ScanTask:
-    """The study of one scan in its folder; returns why it failed, empty if it did not."""
+    """The study of one scan in its folder."""
 
     scene: Scene
     folder: Path
     study: StudyOne
 
-    def __call__(self, store: PartStore, stop: signals.Stop) -> str | None:
-        """Return the reason; None if a stop cut the study short."""
+    def __call__(self, store: PartStore, stop: signals.Stop) -> tuple[str, Numbers] | None:
+        """Return why it or some of its stages failed, and its numbers; None if a stop cut the study short."""
         del store
         if stop:
             return None
         try:
             if not self.folder.parent.is_dir():
-                return NO_ACCESS
+                return NO_ACCESS, {}
             digests = Study(self.scene, PartStore(None), progress=False, workers=None).digests
-            digest = digest_of([digests, self.scene.want.figures])
+            digest, reason = digest_of([digests, self.scene.want.figures]), ""
             if not _is_finished(self.folder, digest):
                 for name in (RESULT, REPORT):
                     (self.folder / name).unlink(missing_ok=True)
-                self.study(self.scene, self.folder, stop, {DIGEST: digest})
+                reason = self.study(self.scene, self.folder, stop, {DIGEST: digest})
+            return reason, _numbers(self.folder / RESULT)
         except signals.Stopped:
             return None
         except Exception as error:  # whatever it is, the other scans go on, and the table states it
-            if isinstance(error, InvalidInput):
-                return "; ".join(error.problems)
-            return f"{type(error).__name__}: {error}"
-        return ""
+            return reason_of(error), {}
 
 
 def _is_finished(folder: Path, digest: str) -> bool:
@@ -77,39 +76,46 @@ def _is_finished(folder: Path, digest: str) -> bool:
         return False
 
 
+def _numbers(path: Path) -> Numbers:
+    """Return the groups of a result without its maps."""
+    groups = {node.path.strip("/"): node.to_dataset(inherit=False) for node in open_result(path).subtree}
+    return {name: data.drop_dims(MAP_DIMS, errors="ignore") for name, data in groups.items()}
+
+
 @dataclass
 class ScanStudies:
-    """The studies of the scans of a scene: why some failed, and their results as far as they are finished.
+    """The studies of the scans of a scene: why some failed, and their numbers as far as they are finished.
 
     Attributes
     ----------
     reasons : dict of str to str
-        By scan; empty where it is finished.
+        By scan, why it or some of its stages failed; empty where it is finished.
+    numbers : dict of str to mapping
+        The groups of each scan that has a result; "" is their root.
     """
 
     scans: Mapping[str, Scene]
     folder: Path
     reasons: dict[str, str] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    numbers: dict[str, xr.Dataset] = field(default_factory=dict)
+    numbers: dict[str, Numbers] = field(default_factory=dict)
 
     def run(self, study: StudyOne, workers: Workers | None, stop: signals.Stop, *, progress: bool) -> None:
         """Study the scans that are not finished; each failure is a reason."""
         names = list(self.scans)
-        folders = [self.folder / SCANS / folder_of(name) for name in names]
         (self.folder / SCANS).mkdir(exist_ok=True)
         tasks = {
-            number: _ScanTask(self.scans[name], folders[number], study) for number, name in enumerate(names)
+            number: _ScanTask(self.scans[name], self.folder / SCANS / folder_of(name), study)
+            for number, name in enumerate(names)
         }
         # of formats with two bytes for each point, the smallest
         points = max((file.stat().st_size // 2 for file in self._sources()), default=0)
         finished = run_tasks(tasks, PartStore(self.folder), stop, workers, points=points)
         bar = track(finished, progress, SCANS, unit=SCAN, total=len(names))
-        found = dict(sorted(bar, key=lambda entry: entry[0]))
-        self.reasons = {
-            names[number]: reason or ("" if (folders[number] / RESULT).is_file() else NO_ACCESS)
-            for number, reason in found.items()
-        }
+        for number, (reason, numbers) in sorted(bar, key=lambda entry: entry[0]):
+            is_here = (tasks[number].folder / RESULT).is_file()
+            self.reasons[names[number]] = NO_ACCESS if numbers and not is_here else reason
+            if numbers and is_here:
+                self.numbers[names[number]] = numbers
 
     def _sources(self) -> Iterator[Path]:
         for scene in self.scans.values():
@@ -122,33 +128,27 @@ class ScanStudies:
         """How many scans a stop has left out."""
         return len(self.scans) - len(self.reasons)
 
-    def maps(self) -> Iterator[tuple[str, xr.Dataset]]:
-        """Yield the maps of every finished scan, and keep its numbers: one scan is in memory at a time."""
-        roots: dict[str, xr.Dataset] = {}
-        trees: dict[str, dict[str, xr.Dataset]] = {}
-        for name in (name for name, reason in self.reasons.items() if not reason):
-            tree = open_result(self.folder / SCANS / folder_of(name) / RESULT)
-            roots[name], trees[name] = tree.to_dataset(inherit=False), {}
-            for stage, facts in provenance_of(roots[name]).get("stages", {}).items():
-                self.seconds[stage] = self.seconds.get(stage, 0.0) + float(facts["run_time"])
-            for node in tree.subtree:
-                data, path = node.to_dataset(inherit=False), node.path.strip("/")
-                flat = [key for key, variable in data.data_vars.items() if not set(variable.dims) >= MAP_DIMS]
-                maps = data.drop_vars(flat)
-                if path and maps.data_vars:
-                    yield f"/{SCANS}/{folder_of(name)}/{path}", maps
-                if path and data.data_vars:
-                    trees[name][path] = data.drop_dims(MAP_DIMS, errors="ignore")
-        paths = dict.fromkeys(path for groups in trees.values() for path in groups)
-        for path in paths:
-            having = {name: groups[path] for name, groups in trees.items() if path in groups}
-            if any(data.data_vars for data in having.values()):
-                self.numbers[path] = stacked(having, SCAN)
-        self.numbers[OVERVIEW] = self._overview(roots)
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds that each stage took, all scans together."""
+        total: dict[str, float] = {}
+        for groups in self.numbers.values():
+            for stage, facts in provenance_of(groups[""]).get("stages", {}).items():
+                total[stage] = total.get(stage, 0.0) + float(facts["run_time"])
+        return total
 
-    def _overview(self, roots: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    def groups(self) -> Numbers:
+        """Return the numbers of all scans along `scan`, and the overview."""
+        groups = {OVERVIEW: self._overview()}
+        for path in dict.fromkeys(path for each in self.numbers.values() for path in each if path):
+            having = {name: each[path] for name, each in self.numbers.items() if path in each}
+            if any(data.data_vars for data in having.values()):
+                groups[path] = stacked(having, SCAN)
+        return groups
+
+    def _overview(self) -> xr.Dataset:
         """Return a row for every scan: what stands for its study, whether it failed, and why."""
-        names = list(self.reasons)
+        names, roots = list(self.reasons), {name: each[""] for name, each in self.numbers.items()}
         table = xr.Dataset(coords={SCAN: names})
         for key in dict.fromkeys(key for root in roots.values() for key in root.data_vars):
             values = [
@@ -157,7 +157,13 @@ class ScanStudies:
             attributes = dict(next(root[key].attrs for root in roots.values() if key in root))
             attributes["long_name"] = attributes["long_name"].partition(", of the group")[0]
             table[key] = (SCAN, values, attributes)
-        table["status"] = (SCAN, ["failed" if self.reasons[name] else "done" for name in names])
+        table["status"] = (
+            SCAN,
+            [
+                "failed" if name not in roots else "incomplete" if self.reasons[name] else "done"
+                for name in names
+            ],
+        )
         table["reason"] = (SCAN, [self.reasons[name] for name in names], {"long_name": "why it failed"})
         caveats = {
             name: str(root.attrs.get("caveats", "none")).replace("none", "") for name, root in roots.items()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from fractalcontact.base import signals, threads
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.scenes._checkpoint import PartStore, digest
@@ -24,10 +25,11 @@ from fractalcontact.scenes._parts import (
 )
 from fractalcontact.scenes._plan import stages_of, stored_maps
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._stages import FIGURES, Stage
+from fractalcontact.scenes._stages import FIGURES, STAGES, Stage
 
 # parts, joined result and seconds of each stage
 _Finished = dict[str, tuple[dict[int, xr.Dataset], xr.Dataset | None, float]]
+_Results = tuple[list[xr.Dataset | Exception], list[float]]
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,13 +39,14 @@ class _PartTask:
     part: PartWithReaders
     keys: tuple[str, ...]
 
-    def __call__(self, store: PartStore, stop: signals.Stop) -> tuple[list[xr.Dataset], list[float]] | None:
+    def __call__(self, store: PartStore, stop: signals.Stop) -> _Results | None:
         """Return the results and the seconds each took; None if a stop was requested before it began."""
         if stop:
             return None
         results, seconds = self.part()
         for key, result in zip(self.keys, results, strict=False):
-            store.put(key, result)
+            if isinstance(result, xr.Dataset):
+                store.put(key, result)
         return results, seconds
 
 
@@ -58,10 +61,21 @@ class Study:
         Joined results of the finished stages.
     spent : dict
         Seconds that each stage took in this run.
+    failures : dict of str to str
+        Stages that failed, or need one that did, and why; empty unless the study `goes_on` without them.
     """
 
-    def __init__(self, scene: Scene, store: PartStore, progress: bool, workers: Workers | None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        store: PartStore,
+        progress: bool,
+        workers: Workers | None,
+        *,
+        goes_on: bool = False,
+    ) -> None:
         self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
+        self.goes_on, self.failures = goes_on, dict[str, str]()
         self.plan = stages_of(scene)
         self.parts: dict[str, dict[int, xr.Dataset]] = {}
         self.results: dict[str, xr.Dataset] = {}
@@ -92,7 +106,7 @@ class Study:
             beside = [stage for stage in rest if self._describes_surface(stage)]
             chains = [[stage for stage in rest if stage not in beside], *([beside] if beside else [])]
 
-        def run_chain(number: int) -> tuple[list[str], _Finished]:
+        def run_chain(number: int) -> tuple[list[str], _Finished, dict[str, str]]:
             half = threads.thread_count() // 2
             with threads.limit(half) if number else nullcontext():
                 lacking = self._run_stages(chains[number], stop, show=number == 0)
@@ -101,10 +115,11 @@ class Study:
                 for stage in chains[number]
                 if stage.name in self.spent
             }
-            return lacking, finished
+            return lacking, finished, self.failures
 
-        for _, (lacking, finished) in calls_in_two_processes(run_chain, len(chains)):
+        for _, (lacking, finished, failures) in calls_in_two_processes(run_chain, len(chains)):
             missing += lacking
+            self.failures |= failures
             for name, (parts, result, spent) in finished.items():
                 self.parts[name], self.spent[name] = parts, spent
                 if result is not None:
@@ -123,13 +138,30 @@ class Study:
         """Run some stages in order; return what is missing if a stop was requested."""
         bar = track(stages, show and self.progress, self.scene.name, unit="stage")
         for number, stage in enumerate(bar):
-            count = self._run_stage(stage, stop)
-            total = len(self.works[stage.name].parts)
+            try:
+                count = 0 if self._lacks(stage) else self._run_stage(stage, stop)
+            except Exception as error:
+                self._fail(stage.name, error)
+                count = 0
+            total = len(self.works[stage.name].parts) if stage.name not in self.failures else 0
             if stop:
                 rest = [other.name for other in stages[number + 1 :]]
                 part = [f"{stage.name} ({count} of {total} parts done)"] if count < total else []
                 return part + rest
         return []
+
+    def _lacks(self, stage: Stage) -> bool:
+        """Whether a stage has failed, or cannot run because one that it needs has."""
+        failed = [name for name in (stage.name, *stage.needs) if name in self.failures]
+        if failed:
+            self.failures[stage.name] = self.failures[failed[0]]
+        return bool(failed)
+
+    def _fail(self, name: str, error: Exception) -> None:
+        """Note why a stage failed, if the study goes on without it."""
+        if not self.goes_on or STAGES[name].takes == "file":
+            raise error
+        self.failures[name] = reason_of(error)
 
     @property
     def _points(self) -> int:
@@ -152,7 +184,10 @@ class Study:
         bar = track(finished, show_parts, stage.name, unit="part", total=len(missing))
         for number, (results, seconds) in bar:
             for name, result, spent in zip(names, results, seconds, strict=True):
-                self.parts[name][number] = result
+                if isinstance(result, Exception):
+                    self._fail(name, result)
+                else:
+                    self.parts[name][number] = result
                 self.spent[name] = self.spent.get(name, 0.0) + spent
         start = time.perf_counter()
         joined = work.join(done)
@@ -237,6 +272,13 @@ class Study:
     def seconds(self) -> dict[str, float]:
         """Seconds that the finished stages took in this run."""
         return {name: self.spent[name] for name in self.results}
+
+
+def reason_of(error: Exception) -> str:
+    """Return why something failed, in one line."""
+    return (
+        "; ".join(error.problems) if isinstance(error, InvalidInput) else f"{type(error).__name__}: {error}"
+    )
 
 
 def _is_fast_to_repeat(stage: Stage, scene: Scene) -> bool:

@@ -192,11 +192,11 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
                 if problems.surface(name, made, finite=False, smallest=1, leading=True):
                     surfaces[name] = made
     if set(surfaces) == {"surface", "upper"} and not scene.joint.register:
-        _require_above(surfaces["upper"], surfaces["surface"], problems)
+        require_above(surfaces["upper"], surfaces["surface"], problems)
     return surfaces
 
 
-def _require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) -> None:
+def require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) -> None:
     """Require that the upper face lies above the lower one on average."""
     mean = float((upper - lower).mean())
     expected = "an upper face above the lower one: swap them ([surface] and [upper]), or register them"

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scans")
     scene = write_scans(folder)
     (folder / "scans" / "damaged.nc").write_bytes(b"no heights")
-    with pytest.warns(FractalContactWarning, match="1 of 6 scans failed"):
+    with pytest.warns(FractalContactWarning, match="1 of 6 scans failed or are incomplete"):
         result = fc.scenes.run(scene, out=folder / "out", progress=False)
     return scene, folder / "out", result
 
@@ -62,7 +63,7 @@ def test_each_scan_equals_its_own_study(study):
         surface = fc.open(out.parent / "scans" / name)
         alone = fc.dimensions.estimate(surface, ["increments", "variogram"])
         np.testing.assert_array_equal(result["dimensions/hurst"].sel(scan=name), alone["hurst"])
-        stored = fc.open(out / "result.nc")[f"scans/{name}/surfaces/height"]
+        stored = fc.open(out / "scans" / name / "result.nc")["surfaces/height"]
         np.testing.assert_array_equal(stored, surface)
         assert (out / "scans" / name / "report.html").is_file()
 
@@ -76,11 +77,94 @@ def test_a_damaged_scan_is_a_row_with_its_reason(study):
     assert "damaged" in str(row["reason"].values)
     assert np.isnan(row["fractal_dimension"])
     assert "damaged.nc" not in result["dimensions"]["scan"]
+    assert [int(result[f"{name}_scans"]) for name in ("rms_height", "fractal_dimension")] == [5, 5]
     rows = (out / "scans.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + len(GRIDS) + 1
     page = (out / "report.html").read_text(encoding="utf-8")
     assert 'href="scans/a.nc/report.html"' in page
     assert 'href="scans/damaged.nc' not in page
+
+
+def test_maps_are_stored_once(study):
+    _, out, result = study
+    assert all("y" not in node.dims for node in fc.open(out / "result.nc").subtree)
+    assert fc.open(out / "scans" / "a.nc" / "result.nc")["surfaces/height"].shape == (32, 32)
+    same(fc.open(out / "result.nc"), result)
+
+
+def test_stage_that_fails_leaves_the_other_results_of_its_scan(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4), "gap.nc": (32, 1e-4)})
+    file = tmp_path / "scans" / "gap.nc"
+    surface = fc.open(file)
+    surface[4:9, 3:12] = np.nan
+    fc.save(surface, file)
+    text = SCENE.replace("domains = []", 'contact = ["press"]\ndomains = ["box_dimension"]')
+    scene.write_text(f"{text}[contact]\ncontact_modulus = 1e10\nnominal_pressure = 1e6\n", encoding="utf-8")
+    out = tmp_path / "out"
+    with pytest.warns(FractalContactWarning, match="1 of 2 scans"):
+        result = fc.scenes.run(scene, out=out, progress=False)
+    row = result["overview"].to_dataset().sel(scan="gap.nc")
+    assert str(row["status"].values) == "incomplete"
+    assert str(row["reason"].values).startswith("contact, domains/box_dimension: surface: ")
+    alone = fc.dimensions.estimate(surface, ["increments", "variogram"])
+    np.testing.assert_array_equal(result["dimensions/hurst"].sel(scan="gap.nc"), alone["hurst"])
+    assert list(result["contact"]["scan"].values) == ["a.nc"]
+    assert [int(result[f"{name}_scans"]) for name in ("fractal_dimension", "contact_fraction")] == [2, 1]
+    page = (out / "scans" / "gap.nc" / "report.html").read_text(encoding="utf-8")
+    assert "partial: contact, domains/box_dimension: surface: " in page
+    part = next((out / "scans" / "gap.nc" / ".stages").glob("dimensions.*"))
+    kept = part.stat().st_mtime_ns
+    with pytest.warns(FractalContactWarning, match="1 of 2 scans"):
+        fc.scenes.run(scene, out=out, progress=False)
+    assert part.stat().st_mtime_ns == kept
+    fc.save(surface.fillna(0.0).assign_attrs(surface.attrs), file)
+    mended = fc.scenes.run(scene, out=out, progress=False)
+    assert (mended["overview/status"] == "done").all()
+
+
+def test_stage_that_reads_a_failing_map_names_itself(tmp_path, monkeypatch):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4)})
+    text = SCENE.replace("domains = []", 'contact = ["press"]\ndomains = ["box_dimension", "lacunarity"]')
+    text = text.replace('"scans/*.nc"', '["scans/a.nc"]')
+    scene.write_text(f"{text}[contact]\ncontact_modulus = 1e10\nnominal_pressure = 1e6\n", encoding="utf-8")
+
+    def fail(*_, **__):
+        raise ArithmeticError("no boxes")
+
+    monkeypatch.setattr("fractalcontact.scenes._parts.public_function", broken("domains.box_dimension", fail))
+    with pytest.warns(FractalContactWarning, match="1 of 1 scans"):
+        result = fc.scenes.run(scene, progress=False)
+    assert str(result["overview/reason"].values[0]) == "domains/box_dimension: ArithmeticError: no boxes"
+    assert {"/contact", "/domains/lacunarity"} <= set(result.groups)
+    assert "/domains/box_dimension" not in result.groups
+
+
+def broken(name, function):
+    """Return `public_function` with another function under a name."""
+    from fractalcontact.scenes._functions import public_function
+
+    return lambda wanted: function if wanted == name else public_function(wanted)
+
+
+def test_scans_whose_names_differ_by_a_slash_have_their_own_folders(tmp_path):
+    scene = write_scans(tmp_path, {"d_a.nc": (32, 1e-4), "a.nc": (48, 1e-4)})
+    (tmp_path / "scans" / "d").mkdir()
+    (tmp_path / "scans" / "a.nc").rename(tmp_path / "scans" / "d" / "a.nc")
+    scene.write_text(SCENE.replace("*.nc", "**/*.nc"), encoding="utf-8")
+    result = fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert list(result["overview/scan"].values) == ["d/a.nc", "d_a.nc"]
+    pages = sorted((tmp_path / "out" / "scans").glob("*/report.html"))
+    assert len(pages) == 2
+    text = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for page in pages:
+        assert f'href="scans/{quote(page.parent.name)}/report.html"' in text
+
+
+def test_a_file_named_twice_is_refused(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4)})
+    scene.write_text(SCENE.replace('"scans/*.nc"', '["scans/a.nc", "./scans/a.nc"]'), encoding="utf-8")
+    with pytest.raises(InvalidInput, match=r"each file once, got a\.nc again"):
+        fc.scenes.validate(scene)
 
 
 def test_mean_has_the_interval_of_student_without_errors(study):
