@@ -29,8 +29,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
 
 WHOLE_PLANE = (slice(None), slice(None))
-# nodes from which single precision first saves a tenth of the time and more; at 384 x 384 it saves less than its
-# kernels, which double precision does not share, take to compile (3 s)
+# nodes from which single precision first saves a tenth of the time and more; at 384 x 384 it saves less than
+# its kernels, which double precision does not share, take to compile (3 s)
 SINGLE_FROM = 512 * 512
 # residual at which double precision takes over; 1e-6 and 3e-4 took as many transforms
 SINGLE_TOLERANCE = 3e-5

@@ -35,10 +35,11 @@ from fractalcontact.base.process import calls_in_two_processes, can_fork, end_wi
 from fractalcontact.scenes._checkpoint import MemoryStore, PartStore
 
 R = TypeVar("R")
+K = TypeVar("K")
 Task = Callable[[PartStore, signals.Stop], R | None]
 
 SMALL_SURFACE = 1 << 20  # points up to which a second process may press at the same time
-WORTH_A_COPY = 0.5  # seconds of work left, from which on a second process takes part of it
+WORTH_A_COPY = 0.5  # seconds of work, from which on a second process takes part of it
 PAUSE = 0.2  # seconds between two checks whether a stop was requested
 RUNNING, STOPPING = "running", "stopping"
 LOST = "the study on workers did not end; with a folder, finished parts are kept, and the same run resumes"
@@ -118,72 +119,68 @@ def _start_worker() -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
-def may_share(points: int) -> bool:
-    """Whether a copy of this process may take part of the work on a surface of so many points."""
-    return points <= SMALL_SURFACE and can_fork()
-
-
 def run_tasks(
-    tasks: Mapping[int, Task[R]],
+    tasks: Mapping[K, Task[R]],
     store: PartStore,
     stop: signals.Stop,
     workers: Workers | None = None,
     *,
     points: int,
-) -> Iterator[tuple[int, R]]:
-    """Yield number and result of every task as it finishes; a task that a stop cut short is left out.
+    spent: float = 0.0,
+) -> Iterator[tuple[K, R]]:
+    """Yield key and result of every task as it finishes; a task that a stop cut short is left out.
 
     Without workers a copy of this process shares the tasks of a surface of few `points`, where that is worth
-    it.
+    it: if the study took long so far (`spent`, in seconds), or would by the time of the last task.
     """
     if workers is not None:
         yield from _run_on_workers(tasks, store, stop, workers)
         return
-    left = dict(tasks)
-    for number, task in tasks.items():
+    left, expected = dict(tasks), spent
+    for key, task in tasks.items():
+        if len(left) > 1 and expected > WORTH_A_COPY and points <= SMALL_SURFACE and can_fork():
+            break
         start = time.perf_counter()
         result = task(store, stop)
-        del left[number]
+        del left[key]
+        expected = (time.perf_counter() - start) * len(left)
         if result is not None:
-            yield number, result
-        rest = (time.perf_counter() - start) * len(left)
-        if len(left) > 1 and rest > WORTH_A_COPY and may_share(points):
-            break
-    numbers, half = list(left), threads.thread_count() // 2
+            yield key, result
+    keys, half = list(left), threads.thread_count() // 2
 
     def run_one(place: int) -> R | None:
         with threads.limit(half):
-            return left[numbers[place]](store, stop)
+            return left[keys[place]](store, stop)
 
-    for place, result in calls_in_two_processes(run_one, len(numbers)):
+    for place, result in calls_in_two_processes(run_one, len(keys)):
         if result is not None:
-            yield numbers[place], result
+            yield keys[place], result
 
 
 def _run_on_workers(
-    tasks: Mapping[int, Task[R]], store: PartStore, stop: signals.Stop, workers: Workers
-) -> Iterator[tuple[int, R]]:
+    tasks: Mapping[K, Task[R]], store: PartStore, stop: signals.Stop, workers: Workers
+) -> Iterator[tuple[K, R]]:
     """Give every worker one task at a time; after a stop, running ones finish and no other starts."""
     waiting = iter(tasks.items())
-    running: dict[Future[Any], int] = {}
+    running: dict[Future[Any], K] = {}
     with _mark(store) as mark:
         try:
             while True:
                 while not stop and len(running) < workers.count and (entry := next(waiting, None)):
-                    number, task = entry
-                    running[workers.executor.submit(_WorkerTask(task, store, mark, workers.local))] = number
+                    key, task = entry
+                    running[workers.executor.submit(_WorkerTask(task, store, mark, workers.local))] = key
                 if not running:
                     return
                 if stop and mark is not None:
                     mark.write_text(STOPPING, encoding="utf-8")
                 done, _ = wait(running, timeout=PAUSE, return_when=FIRST_COMPLETED)
                 for future in [future for future in running if future in done]:
-                    number = running.pop(future)
+                    key = running.pop(future)
                     result, added = _result(future)
-                    for key, part in added.items():
-                        store.put(key, part)
+                    for name, part in added.items():
+                        store.put(name, part)
                     if result is not None:
-                        yield number, result
+                        yield key, result
         finally:
             for future in running:
                 future.cancel()

@@ -83,7 +83,7 @@ class MapReader:
 class PartWithReaders:
     """A part and the stages that read its maps; maps that nothing else needs are dropped afterwards.
 
-    A reader that fails has its error as result: the part, and the other readers, are kept.
+    What fails has its error as result: the part of a reader that fails, and the other readers, are kept.
     """
 
     part: Part
@@ -93,7 +93,10 @@ class PartWithReaders:
     def __call__(self) -> tuple[list[xr.Dataset | Exception], list[float]]:
         """Return the results and the seconds each took."""
         start = time.perf_counter()
-        source = self.part()
+        try:
+            source = self.part()
+        except Exception as error:
+            return [error] * (1 + len(self.readers)), [0.0] * (1 + len(self.readers))
         seconds = [time.perf_counter() - start]
         results: list[xr.Dataset | Exception] = []
         for reader in self.readers:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import xarray as xr
 
-from fractalcontact.base import signals, threads
+from fractalcontact.base import signals
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.scenes._checkpoint import PartStore, digest
-from fractalcontact.scenes._executor import Workers, may_share, run_tasks
+from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import plane_share
 from fractalcontact.scenes._parts import (
     PartWithReaders,
@@ -27,16 +24,15 @@ from fractalcontact.scenes._plan import stages_of, stored_maps
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES, STAGES, Stage
 
-# parts, joined result and seconds of each stage
-_Finished = dict[str, tuple[dict[int, xr.Dataset], xr.Dataset | None, float]]
 _Results = tuple[list[xr.Dataset | Exception], list[float]]
 
 
 @dataclass(frozen=True, repr=False)
 class _PartTask:
-    """A part of a stage with the stages that read it, and the names under which their results are kept."""
+    """A part of a stage with the stages that read it, and the keys under which their results are kept."""
 
     part: PartWithReaders
+    stages: tuple[str, ...]
     keys: tuple[str, ...]
 
     def __call__(self, store: PartStore, stop: signals.Stop) -> _Results | None:
@@ -86,69 +82,60 @@ class Study:
             self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped_maps(stage))
 
     def run(self, stop: signals.Stop) -> list[str]:
-        """Run the stages in order; return what is missing if a stop was requested.
+        """Run all stages; return what is missing if a stop was requested.
 
-        The surfaces come first, so that faces which do not fit are refused before a part is kept. What only
-        describes the surface then runs beside the contact, in a copy of this process where there may be one.
+        The surfaces come first, so that faces which do not fit are refused before a part is kept. The parts
+        of all stages whose needs are met then run side by side, where there are workers or a copy of this
+        process.
         """
-        stages = sorted(
-            (stage for stage in self.plan if stage.name != FIGURES),
-            key=lambda stage: stage.row.takes != "file",
-        )
+        stages = [stage for stage in self.plan if stage.name != FIGURES]
         faces = [stage for stage in stages if stage.row.takes == "file"]
-        rest = stages[len(faces) :]
-        missing = self._run_stages(faces, stop, show=False)
-        if missing:
-            return missing + [stage.name for stage in rest]
-        chains = [rest]
-        is_alone = self.workers is None and self.scene.surface.member is None
-        if is_alone and any(stage.row.presses for stage in rest) and may_share(self._points):
-            beside = [stage for stage in rest if self._describes_surface(stage)]
-            chains = [[stage for stage in rest if stage not in beside], *([beside] if beside else [])]
+        for left in (faces, [stage for stage in stages if stage not in faces]):
+            while left and not stop:
+                waiting = {stage.name for stage in left}
+                ready = [stage for stage in left if waiting.isdisjoint(stage.needs)]
+                self._run_stages(ready, stop)
+                left = [stage for stage in left if stage not in ready]
+        names = [stage.name for stage in stages if stage.name in self.results]
+        self.results = {name: self.results[name] for name in names}
+        return [line for stage in stages for line in self._missing(stage)] if stop else []
 
-        def run_chain(number: int) -> tuple[list[str], _Finished, dict[str, str]]:
-            half = threads.thread_count() // 2
-            with threads.limit(half) if number else nullcontext():
-                lacking = self._run_stages(chains[number], stop, show=number == 0)
-            finished = {
-                stage.name: (self.parts[stage.name], self.results.get(stage.name), self.spent[stage.name])
-                for stage in chains[number]
-                if stage.name in self.spent
-            }
-            return lacking, finished, self.failures
+    def _missing(self, stage: Stage) -> list[str]:
+        """Return the name of a stage with missing parts, and how many are there; nothing if it failed."""
+        if stage.name in self.failures:
+            return []
+        done = len(self.parts.get(stage.name, ()))
+        total = len(self.works[stage.name].parts) if stage.name in self.works else 0
+        if done and total:
+            return [f"{stage.name} ({done} of {total} parts done)"] if done < total else []
+        return [stage.name]
 
-        for _, (lacking, finished, failures) in calls_in_two_processes(run_chain, len(chains)):
-            missing += lacking
-            self.failures |= failures
-            for name, (parts, result, spent) in finished.items():
-                self.parts[name], self.spent[name] = parts, spent
-                if result is not None:
-                    self.results[name] = result
-        self.results = {
-            stage.name: self.results[stage.name] for stage in stages if stage.name in self.results
-        }
-        return missing
-
-    def _describes_surface(self, stage: Stage) -> bool:
-        """Whether a stage reads the surface alone, and no other stage reads its result."""
-        is_read = any(stage.name in other.needs for other in self.plan if other.name != FIGURES)
-        return stage.row.takes == "surface" and stage.needs == ("surfaces",) and not is_read
-
-    def _run_stages(self, stages: list[Stage], stop: signals.Stop, *, show: bool) -> list[str]:
-        """Run some stages in order; return what is missing if a stop was requested."""
-        bar = track(stages, show and self.progress, self.scene.name, unit="stage")
-        for number, stage in enumerate(bar):
+    def _run_stages(self, stages: list[Stage], stop: signals.Stop) -> None:
+        """Run the missing parts of stages that do not need each other, and join them."""
+        tasks: dict[tuple[str, int], _PartTask] = {}
+        for stage in (stage for stage in stages if not self._lacks(stage)):
             try:
-                count = 0 if self._lacks(stage) else self._run_stage(stage, stop)
+                self.works[stage.name] = stage_work(stage, self.scene, self.results, self.works)
+                tasks |= self._tasks(stage)
             except Exception as error:
                 self._fail(stage.name, error)
-                count = 0
-            total = len(self.works[stage.name].parts) if stage.name not in self.failures else 0
-            if stop:
-                rest = [other.name for other in stages[number + 1 :]]
-                part = [f"{stage.name} ({count} of {total} parts done)"] if count < total else []
-                return part + rest
-        return []
+        several, so_far = len(tasks) > 1, sum(self.spent.values())
+        workers = self.workers if several else None
+        finished = run_tasks(tasks, self.store, stop, workers, points=self._points, spent=so_far)
+        show = self.progress and several
+        bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
+        for key, (results, seconds) in bar:
+            for name, result, spent in zip(tasks[key].stages, results, seconds, strict=True):
+                if isinstance(result, Exception):
+                    self._fail(name, result)
+                else:
+                    self.parts[name][key[1]] = result
+                self.spent[name] = self.spent.get(name, 0.0) + spent
+        for stage in (stage for stage in stages if stage.name not in self.failures):
+            self.spent.setdefault(stage.name, 0.0)
+            joined = self.works[stage.name].join(self.parts[stage.name])
+            if joined is not None:
+                self.results[stage.name] = joined
 
     def _lacks(self, stage: Stage) -> bool:
         """Whether a stage has failed, or cannot run because one that it needs has."""
@@ -168,36 +155,6 @@ class Study:
         """Points of the surface."""
         return int(self.results["surfaces"]["height"].size) if "surfaces" in self.results else 0
 
-    def _run_stage(self, stage: Stage, stop: signals.Stop) -> int:
-        """Run the missing parts of a stage; return the number of finished ones."""
-        readers = self._part_readers(stage)
-        work = self.works[stage.name] = stage_work(stage, self.scene, self.results, self.works)
-        done = self.parts.setdefault(stage.name, {})
-        names = [stage.name, *(reader.name for reader in readers)]
-        for name in names:
-            self._load_kept(name, len(work.parts))
-        missing = [n for n in range(len(work.parts)) if any(n not in self.parts[name] for name in names)]
-        show_parts = self.progress and len(missing) > 1
-        workers = self.workers if len(missing) > 1 else None
-        tasks = self._tasks(stage, work, readers, missing)
-        finished = run_tasks(tasks, self.store, stop, workers, points=self._points)
-        bar = track(finished, show_parts, stage.name, unit="part", total=len(missing))
-        for number, (results, seconds) in bar:
-            for name, result, spent in zip(names, results, seconds, strict=True):
-                if isinstance(result, Exception):
-                    self._fail(name, result)
-                else:
-                    self.parts[name][number] = result
-                self.spent[name] = self.spent.get(name, 0.0) + spent
-        start = time.perf_counter()
-        joined = work.join(done)
-        if joined is not None:
-            self.results[stage.name] = joined
-        self.spent.setdefault(stage.name, 0.0)
-        if missing:
-            self.spent[stage.name] += time.perf_counter() - start
-        return len(done)
-
     def _load_kept(self, name: str, count: int) -> None:
         """Load the parts of a stage that an earlier run kept."""
         parts = self.parts.setdefault(name, {})
@@ -206,22 +163,24 @@ class Study:
             if kept is not None:
                 parts[number] = kept
 
-    def _tasks(
-        self, stage: Stage, work: StageWork, readers: list[Stage], missing: list[int]
-    ) -> dict[int, _PartTask]:
+    def _tasks(self, stage: Stage) -> dict[tuple[str, int], _PartTask]:
         """Return the missing parts of a stage, each with the stages that read its maps."""
-        dropped = self._dropped_maps(stage)
+        work, readers, dropped = self.works[stage.name], self._part_readers(stage), self._dropped_maps(stage)
         functions = tuple(map_reader(reader, self.scene) for reader in readers)
-        names = [stage.name, *(reader.name for reader in readers)]
-        if _is_fast_to_repeat(stage, self.scene):
-            names = []
+        names = (stage.name, *(reader.name for reader in readers))
+        for name in names:
+            self._load_kept(name, len(work.parts))
+        kept_names = () if _is_fast_to_repeat(stage, self.scene) else names
         tasks = {}
-        for number in missing:
+        for number, part in enumerate(work.parts):
+            if all(number in self.parts[name] for name in names):
+                continue
             kept = self.parts[stage.name].get(number)
-            has_maps = kept is not None and all(name in kept for name in stage.keep)
-            part = Precomputed(kept) if kept is not None and has_maps else work.parts[number]
-            keys = tuple(self._key(name, number) for name in names)
-            tasks[number] = _PartTask(PartWithReaders(part, functions, dropped), keys)
+            if kept is not None and all(name in kept for name in stage.keep):
+                part = Precomputed(kept)
+            keys = tuple(self._key(name, number) for name in kept_names)
+            task = _PartTask(PartWithReaders(part, functions, dropped), names, keys)
+            tasks[stage.name, number] = task
         return tasks
 
     def _part_readers(self, stage: Stage) -> list[Stage]:

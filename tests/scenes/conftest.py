@@ -26,5 +26,4 @@ def one_process():
     """Run the parts of studies in this process, where tests record their calls, however slow it is."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", math.inf)
-        patch.setattr("fractalcontact.scenes._study.may_share", lambda points: False)
         yield

@@ -22,9 +22,10 @@ import fractalcontact as fc
 from fractalcontact import cli
 from fractalcontact.base import threads
 from fractalcontact.base.errors import FractalContactError, InvalidInput
-from fractalcontact.base.process import calls_in_two_processes
-from fractalcontact.base.signals import Stopped
-from fractalcontact.scenes._executor import may_share
+from fractalcontact.base.process import calls_in_two_processes, can_fork
+from fractalcontact.base.signals import Stop, Stopped
+from fractalcontact.scenes._checkpoint import PartStore
+from fractalcontact.scenes._executor import run_tasks
 
 SWEEP = (
     SOUND.replace("rng = 5", "rng = 5\nmembers = 5").replace("[48, 48]", "[32, 32]").replace("2.4e-3", "1e-3")
@@ -236,14 +237,15 @@ def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, te
             xr.testing.assert_identical(serial[name][variable].variable, shared[name][variable].variable)
 
 
-def test_surface_described_beside_the_contact_has_the_same_numbers(tmp_path, monkeypatch):
+def test_stages_side_by_side_give_the_same_numbers(tmp_path, monkeypatch):
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
     wanted = 'surfaces = ["height", "describe"]\ndimensions = ["default", "spectrum"]\njoints = ['
     (tmp_path / "study.toml").write_text(SOUND.replace("joints = [", wanted), encoding="utf-8")
     serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
     # other tests may have left threads, with which no copy of the process is made
-    monkeypatch.setattr("fractalcontact.scenes._study.may_share", lambda points: True)
-    counts, can_copy = [], may_share(1)
+    counts, can_copy = [], can_fork()
+    monkeypatch.setattr("fractalcontact.scenes._executor.can_fork", lambda: True)
 
     def counted(function, count):
         counts.append(count)
@@ -251,9 +253,9 @@ def test_surface_described_beside_the_contact_has_the_same_numbers(tmp_path, mon
             return calls_in_two_processes(function, count)
         return ((number, function(number)) for number in range(count))
 
-    monkeypatch.setattr("fractalcontact.scenes._study.calls_in_two_processes", counted)
+    monkeypatch.setattr("fractalcontact.scenes._executor.calls_in_two_processes", counted)
     shared = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
-    assert counts == [2]
+    assert max(counts) > 4  # the two closures, and more
     stages = [json.loads(tree.attrs["provenance"])["stages"] for tree in (serial, shared)]
     assert [*stages[0]] == [*stages[1]]
     assert [node.path for node in serial.subtree] == [node.path for node in shared.subtree]
@@ -263,20 +265,12 @@ def test_surface_described_beside_the_contact_has_the_same_numbers(tmp_path, mon
             xr.testing.assert_identical(node[variable].variable, found)
 
 
-def test_last_part_keeps_all_threads(tmp_path, monkeypatch):
-    """A copy of the process helps from two parts on: one alone is not held to half of the threads."""
+def test_last_task_keeps_all_threads(monkeypatch):
+    """A copy of the process helps from two tasks on: one alone is not held to half of the threads."""
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
     monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
-    (tmp_path / "study.toml").write_text(SOUND, encoding="utf-8")
-    closure, used = fc.joints.closure, []
-
-    def watched(*arguments, **options):
-        used.append(threads.thread_count())
-        return closure(*arguments, **options)
-
-    monkeypatch.setattr(fc.joints, "closure", functools.update_wrapper(watched, closure))
-    fc.scenes.run(tmp_path / "study.toml", progress=False)
-    assert used == [2, 2]
+    tasks = dict.fromkeys("ab", lambda store, stop: threads.thread_count())
+    assert dict(run_tasks(tasks, PartStore(None), Stop(), points=1)) == {"a": 2, "b": 2}
 
 
 def test_error_of_a_part_is_raised_with_a_copy(tmp_path, monkeypatch):
