@@ -12,15 +12,9 @@ from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.domains import _masks
 from fractalcontact.domains._hausdorff_content import SQUARE, shifted_contents
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_mask,
-    mask_grid,
-    read_planes,
-)
+from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import ROUNDING, fit_line, interval_notes
 
 # share of a cell by which each side on the boundary makes the area too large (Yastrebov et al. 2017)
@@ -38,14 +32,16 @@ def _check(problems: Problems) -> None:
     is_list = isinstance(given.masks, (list, tuple)) and len(given.masks) > 1
     if not problems.require(is_list, "masks", "a list of two masks or more"):
         return
-    are_valid = [check_mask(problems, mask, argument=f"masks[{k}]") for k, mask in enumerate(given.masks)]
+    are_valid = [
+        _masks.check_mask(problems, mask, argument=f"masks[{k}]") for k, mask in enumerate(given.masks)
+    ]
     if all(are_valid):
         _check_same_extent(problems, given.masks)
 
 
 def _check_same_extent(problems: Problems, masks: Sequence[xr.DataArray]) -> None:
     """Check that the masks have one extent, the same leading dims, and each its own spacing."""
-    grids = [mask_grid(mask) for mask in masks]
+    grids = [_masks.mask_grid(mask) for mask in masks]
     first = grids[0]
     leading = masks[0].dims[:-2], masks[0].shape[:-2]
     coarsest = max(max(grid.spacing) for grid in grids)
@@ -109,7 +105,7 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
     >>> round(float(result.area_dimension), 4)  # ln 8 / ln 3
     1.8928
     """
-    stacks = sorted((read_planes(mask) for mask in masks), key=lambda planes: planes.side)
+    stacks = sorted((_masks.read_planes(mask) for mask in masks), key=lambda planes: planes.side)
     fractions = [_contact_fractions(planes) for planes in stacks]
     counted, improved = (np.stack(values, axis=-1) for values in zip(*fractions, strict=True))
     resolution = np.array([planes.side for planes in stacks])
@@ -129,7 +125,7 @@ def area_dimension(masks: Sequence[xr.DataArray], *, corrected: bool = False) ->
         "stationary_exponent": planes.variable(stationary_exponents(stacks)),
     }
     coords = {"resolution": ("resolution", resolution)}
-    return build_dataset(planes, variables, coords, notes=_notes(slope))
+    return planes.dataset(variables, coords, notes=_notes(slope))
 
 
 def _contact_fractions(planes: Planes) -> tuple[Array, Array]:

@@ -11,14 +11,8 @@ from scipy.special import stdtrit
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.results import public_result
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_mask,
-    parallel_map,
-    read_planes,
-)
+from fractalcontact.domains import _masks
+from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import dimension_variables, interval_notes, window_notes
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev. Lett. 53:596 (1984)"
@@ -36,7 +30,7 @@ ROUGH = 1.3, 1.85  # smoother islands may be that small, and rougher ones hold n
 SMOOTH, SMOOTH_FACTOR = 1.3, 2.0  # below this dimension blocks are not independent: the error grows
 
 
-@public_result(title="Dimension of the boundary of a set", references=SOURCE, check=check_mask)
+@public_result(title="Dimension of the boundary of a set", references=SOURCE, check=_masks.check_mask)
 def boundary_dimension(
     mask: xr.DataArray, *, periodic: bool | None = None, valid: xr.DataArray | None = None
 ) -> xr.Dataset:
@@ -85,20 +79,16 @@ def boundary_dimension(
     >>> round(float(result.boundary_dimension), 1)  # a smooth boundary
     1.0
     """
-    return analyse(read_planes(mask, valid=valid, periodic=periodic))
+    return analyse(_masks.read_planes(mask, valid=valid, periodic=periodic))
 
 
 def analyse(planes: Planes) -> xr.Dataset:
     """Return the result of `boundary_dimension` for planes, without labels."""
-    counts = parallel_map(
-        lambda k: count_pairs(planes.cells[k], planes.valid_of(k), planes.grid),
-        range(planes.count),
-        planes.plane_size,
-    )
+    counts = planes.map(lambda cells, valid: count_pairs(cells, valid, planes.grid))
     fits = np.array([fit_boundary_dimension(pairs, differing) for pairs, differing in counts])
     dimension, half_width = fits.reshape(-1, 2).T
     has_interior = np.array(
-        parallel_map(
+        _masks.parallel_map(
             lambda k: has_interiors(planes.cells[k], planes.valid_of(k), planes.grid, dimension[k]),
             range(planes.count),
             planes.plane_size,
@@ -115,7 +105,7 @@ def analyse(planes: Planes) -> xr.Dataset:
         **dimension_variables(planes, "boundary_dimension", dimension, half_width, LAGS),
         "boundary_sides": planes.variable(sides),
     }
-    return build_dataset(planes, variables, notes=notes)
+    return planes.dataset(variables, notes=notes)
 
 
 def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, Array]:

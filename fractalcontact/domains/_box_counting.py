@@ -13,35 +13,11 @@ from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains import _random_null
+from fractalcontact.domains import _masks, _random_null, _scaling_fit
 from fractalcontact.domains._box_covers import COVERS, Curve, cover_curve
 from fractalcontact.domains._connected_components import label_planes
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_box_sizes,
-    check_mask,
-    check_window,
-    mask_sides,
-    read_box_sizes,
-    read_planes,
-)
-from fractalcontact.domains._scaling_fit import (
-    ROUNDING,
-    Fit,
-    deviations_of_95_percent,
-    dimension_variables,
-    drift_of,
-    fit_regression,
-    fit_steady_ratio,
-    interval_notes,
-    longer_sizes,
-    ratio_slopes,
-    steadiest_window,
-    weighted_mean,
-    window_notes,
-)
+from fractalcontact.domains._masks import Array, Planes
+from fractalcontact.domains._scaling_fit import Fit
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
 COVER_DIFFERENCE = 0.02  # of the dimensions of two covers, up to which it widens the interval as it is
@@ -54,8 +30,8 @@ MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in th
 def _check_box_counts(problems: Problems) -> bool:
     given = problems.given
     problems.choice("cover", among=COVERS)
-    has_mask = check_mask(problems, profiles=True)
-    check_box_sizes(problems, _longest_box(mask_sides(given.mask), given.cover))
+    has_mask = _masks.check_mask(problems, profiles=True)
+    _masks.check_box_sizes(problems, _longest_box(_masks.mask_sides(given.mask), given.cover))
     return has_mask
 
 
@@ -72,7 +48,7 @@ def _check_box_dimension(problems: Problems) -> None:
     if isinstance(window, str):
         problems.choice("window", among=("each",))
     else:
-        check_window(problems, has_mask=has_mask)
+        _masks.check_window(problems, has_mask=has_mask)
 
 
 @public_result(title="Box dimension", references=SOURCE, check=_check_box_dimension)
@@ -142,7 +118,7 @@ def box_dimension(
     >>> round(float(result.box_dimension), 4)  # ln 3 / ln 2
     1.585
     """
-    planes = read_planes(mask, valid=valid, periodic=periodic)
+    planes = _masks.read_planes(mask, valid=valid, periodic=periodic)
     return analyse(planes, box_sizes=box_sizes, window=window, cover=cover)
 
 
@@ -183,16 +159,16 @@ def box_counts(
     >>> fc.domains.box_counts(mask, [1, 2, 4], cover="aligned").box_count.values.tolist()
     [64, 16, 4]
     """
-    planes = read_planes(mask, valid=valid, periodic=periodic)
+    planes = _masks.read_planes(mask, valid=valid, periodic=periodic)
     every = np.arange(1, max(1, min(planes.sides) // 2) + 1)
-    sizes = read_box_sizes(box_sizes, every)
+    sizes = _masks.read_box_sizes(box_sizes, every)
     curve = cover_curve(planes, sizes, cover)
     variables = {
         "box_count": planes.variable(curve.count, "box_size"),
         "box_measure": planes.variable(curve.measure, "box_size"),
         "local_slope": planes.variable(0.0 - local_slope(sizes, curve.measure), "box_size"),
     }
-    return build_dataset(planes, variables, _size_coords(sizes, planes))
+    return planes.dataset(variables, _size_coords(sizes, planes))
 
 
 def analyse(
@@ -200,11 +176,11 @@ def analyse(
 ) -> xr.Dataset:
     """Return the result of `box_dimension` for planes, without labels."""
     shape = planes.sides
-    default = longer_sizes(shape)
+    default = _scaling_fit.longer_sizes(shape)
     if window is not None and not isinstance(window, str):
         low, high = float_array(window) / planes.side
         box_sizes = np.unique(np.rint(np.geomspace(low, high, 9)).clip(1, _longest_box(shape, cover)))
-    sizes = read_box_sizes(box_sizes, default[default <= _longest_box(shape, cover)])
+    sizes = _masks.read_box_sizes(box_sizes, default[default <= _longest_box(shape, cover)])
     by_regression = box_sizes is not None
     curve = cover_curve(planes, sizes, cover)
     limits = _unsaturated_counts(planes, sizes, curve)
@@ -221,7 +197,7 @@ def analyse(
     ends = np.where(np.isfinite(dimension)[:, None], ends, np.nan)
     stops = np.array([window.stop for window in windows])
     variables = {
-        **dimension_variables(planes, "box_dimension", dimension, half_width, sizes, windows),
+        **_scaling_fit.dimension_variables(planes, "box_dimension", dimension, half_width, sizes, windows),
         "coverage": planes.variable(planes.coverage),
         "window_low": planes.variable(ends[:, 0]),
         "window_high": planes.variable(ends[:, 1]),
@@ -234,7 +210,7 @@ def analyse(
         "null_count": planes.variable(null["null_count"], "box_size"),
     }
     notes = _notes(fits, sizes, by_regression=by_regression)
-    return build_dataset(planes, variables, _size_coords(sizes, planes), notes=notes)
+    return planes.dataset(variables, _size_coords(sizes, planes), notes=notes)
 
 
 def _size_coords(sizes: Array, planes: Planes) -> dict[str, Any]:
@@ -285,7 +261,7 @@ def _fit(
 ) -> list[WindowFit]:
     """Return the dimension, its interval and its window of sizes for every plane."""
     if by_regression:
-        regressions = [fit_regression(sizes, measure) for measure in curve.measure]
+        regressions = [_scaling_fit.fit_regression(sizes, measure) for measure in curve.measure]
         pairs = [(fit.dimension, 2.0 * fit.spread) for fit in regressions]
         windows = [slice(0, sizes.size)] * planes.count
         steady = curve
@@ -299,26 +275,28 @@ def _fit(
         windows = [slice(0, sizes.size)] * planes.count
         for group in groups:
             if len(group):
-                window = steadiest_window(
+                window = _scaling_fit.steadiest_window(
                     sizes, steady.area[group], quarters[group].min(), planes.sides, limits[group].min()
                 )
                 windows = [window if k in group else other for k, other in enumerate(windows)]
         pairs = []
         for window, area, mean_area in zip(windows, steady.area, mean.area, strict=True):
             if cover == "aligned":
-                fit = fit_steady_ratio(sizes[window], area[window])
-                half_width = deviations_of_95_percent(sizes[window]) * fit.spread
+                fit = _scaling_fit.fit_steady_ratio(sizes[window], area[window])
+                half_width = _scaling_fit.deviations_of_95_percent(sizes[window]) * fit.spread
                 pairs.append((fit.dimension, half_width))
             else:
                 pairs.append(fit_two_covers(sizes[window], area[window], mean_area[window], cover))
     fits = []
     for (value, half_width), window, area in zip(pairs, windows, steady.area, strict=True):
         used = sizes[window]
-        slopes = ratio_slopes(used, area[window])
-        drift = 0.0 if by_regression or window.start == 0 else drift_of(slopes) + BETWEEN_CLUSTERS
+        slopes = _scaling_fit.ratio_slopes(used, area[window])
+        drift = (
+            0.0 if by_regression or window.start == 0 else _scaling_fit.drift_of(slopes) + BETWEEN_CLUSTERS
+        )
         has_spread = used.size > (2 if by_regression else 3)
         local = slopes[1] if slopes[1].size else np.array([np.nan])
-        width = half_width + drift + ROUNDING if has_spread else np.nan
+        width = half_width + drift + _scaling_fit.ROUNDING if has_spread else np.nan
         fits.append(WindowFit(value, width, window, float(local.min()), float(local.max())))
     return fits
 
@@ -338,13 +316,13 @@ def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tupl
     still share an error: the difference of the two covers widens the interval, up to a limit, as the mean is
     far off for sets on a lattice. The limit was set on some thousand sets of known dimension.
     """
-    first, second = fit_steady_ratio(sizes, fewest), fit_steady_ratio(sizes, mean)
+    first, second = _scaling_fit.fit_steady_ratio(sizes, fewest), _scaling_fit.fit_steady_ratio(sizes, mean)
     if not (np.isfinite(first.dimension) and np.isfinite(second.dimension)):
         return first.dimension if cover == "minimum" else second.dimension, np.nan
     variance = first.spread**2, max(first.spread, second.spread) ** 2
-    both, spread, _ = weighted_mean((first.dimension, second.dimension), variance)
+    both, spread, _ = _scaling_fit.weighted_mean((first.dimension, second.dimension), variance)
     difference = abs(first.dimension - second.dimension)
-    deviations = deviations_of_95_percent(sizes)
+    deviations = _scaling_fit.deviations_of_95_percent(sizes)
     if cover == "minimum":
         return both, deviations * spread + min(difference, COVER_DIFFERENCE + 0.5 * spread)
     deviation = float(np.hypot(second.spread, second.dimension - both))
@@ -366,7 +344,11 @@ def _null(planes: Planes, sizes: Array, windows: list[slice], *, by_regression: 
         boxes = [by_size[size] for size in sizes.tolist()]
         null = _random_null.expected_counts(cells, observed, sizes**planes.rank, boxes)
         used, part = sizes[windows[plane]], null[windows[plane]]
-        fit = fit_regression(used, part) if by_regression else fit_steady_ratio(used, part * used**2)
+        fit = (
+            _scaling_fit.fit_regression(used, part)
+            if by_regression
+            else _scaling_fit.fit_steady_ratio(used, part * used**2)
+        )
         has_value = np.isfinite(fit.dimension)
         deviation = np.nan
         if has_value:
@@ -400,7 +382,7 @@ def _null_deviation(
     if sizes.size > MANY_SIZES:
         places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], SOME_SIZES)))
         sizes, null, boxes = sizes[places], null[places], [boxes[place] for place in places]
-        fit = fit_regression(sizes, null)
+        fit = _scaling_fit.fit_regression(sizes, null)
     return _random_null.fit_deviation(cells, observed, sizes**rank, boxes, null, fit.weights)
 
 
@@ -408,8 +390,8 @@ def _notes(fits: list[WindowFit], sizes: Array, *, by_regression: bool) -> dict[
     interval = "two standard deviations" if by_regression else "from the spread"
     interval = f"interval of the box dimension ({interval} of the local slopes)"
     notes = {
-        **interval_notes(interval),
-        **window_notes("smallest box of the fit", "largest box of the fit"),
+        **_scaling_fit.interval_notes(interval),
+        **_scaling_fit.window_notes("smallest box of the fit", "largest box of the fit"),
         "local_slope": {"long_name": "local dimension, -d ln(box_measure)/d ln(box_size)"},
     }
     empty = sum(np.isnan(fit.value) for fit in fits)

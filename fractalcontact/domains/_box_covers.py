@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fractalcontact.base.jit import kernel
-from fractalcontact.domains._mask_input import Array, Planes, parallel_map
+from fractalcontact.domains._masks import Array, Planes, parallel_map
 
 COVERS = ("minimum", "mean", "aligned")
 ROW = np.array(
@@ -136,11 +136,7 @@ def _mean_cover(planes: Planes, sizes: Array) -> Curve:
     """
     largest = int(sizes.max())
     periodic = planes.grid.periodic if planes.rank == 2 else (True, *planes.periodic)
-    positions = parallel_map(
-        lambda cells: _positions_that_meet(cells, largest, periodic),
-        planes.cells,
-        planes.plane_size,
-    )
+    positions = planes.map(lambda cells, _: _positions_that_meet(cells, largest, periodic))
     every, folded = (np.array([pair[k][sizes] for pair in positions], float) for k in (0, 1))
     length = sizes.astype(float)
     return Curve(sizes, every / length**planes.rank, folded * length ** (2 - planes.rank))

@@ -16,7 +16,7 @@ from scipy import ndimage
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains._mask_input import Array, Planes, check_mask, parallel_map
+from fractalcontact.domains._masks import Array, Planes, check_mask
 
 STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
 BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept: 16 MB of labels
@@ -125,10 +125,8 @@ def label_planes(
 ) -> list[Components]:
     """Find the islands of every plane; see `label_plane`."""
     periodic = planes.grid.periodic
-    return parallel_map(
-        lambda cells: label_plane(cells, connectivity, periodic, keep=keep, detailed=detailed),
-        planes.cells,
-        planes.plane_size,
+    return planes.map(
+        lambda cells, _: label_plane(cells, connectivity, periodic, keep=keep, detailed=detailed)
     )
 
 

@@ -13,17 +13,9 @@ from fractalcontact.base.grid import Grid
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.domains import _masks
 from fractalcontact.domains._gliding_box import BLOCKS
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_box_sizes,
-    check_mask,
-    mask_sides,
-    read_box_sizes,
-    read_planes,
-)
+from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
 SOURCE = (
@@ -33,8 +25,8 @@ SOURCE = (
 
 
 def _check(problems: Problems) -> None:
-    check_mask(problems, profiles=True)
-    check_box_sizes(problems, min(mask_sides(problems.given.mask)))
+    _masks.check_mask(problems, profiles=True)
+    _masks.check_box_sizes(problems, min(_masks.mask_sides(problems.given.mask)))
 
 
 @public_result(title="Correlation dimension", references=SOURCE, check=_check)
@@ -90,12 +82,12 @@ def correlation_dimension(
     >>> round(float(fc.domains.correlation_dimension(mask).correlation_dimension), 6)  # a line
     1.0
     """
-    return analyse(read_planes(mask, valid=valid, periodic=periodic), box_sizes=box_sizes)
+    return analyse(_masks.read_planes(mask, valid=valid, periodic=periodic), box_sizes=box_sizes)
 
 
 def analyse(planes: Planes, *, box_sizes: Any = None) -> xr.Dataset:
     """Return the result of `correlation_dimension` for planes, without labels."""
-    sizes = read_box_sizes(box_sizes, default_sizes(planes.sides))
+    sizes = _masks.read_box_sizes(box_sizes, default_sizes(planes.sides))
     # one plane at a time: the transform uses the threads
     mass = np.array([mean_mass(planes, k, sizes) for k in range(planes.count)])
     numbers = zip(planes.occupied, planes.observed, strict=True)
@@ -112,7 +104,7 @@ def analyse(planes: Planes, *, box_sizes: Any = None) -> xr.Dataset:
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
     notes = fit_notes("correlation_dimension", dimension, sizes.size, "square")
     notes["local_slope"] = {"long_name": "local dimension, d ln(mean_mass)/d ln(box_size)"}
-    return build_dataset(planes, variables, coords, notes=notes)
+    return planes.dataset(variables, coords, notes=notes)
 
 
 def mean_mass(planes: Planes, plane: int, sizes: Array) -> Array:

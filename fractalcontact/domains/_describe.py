@@ -25,7 +25,7 @@ from fractalcontact.domains import (
     _signature,
 )
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
+from fractalcontact.domains._masks import Array, Planes, read_planes
 
 ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
     "box_dimension": _box_counting.analyse,
@@ -122,7 +122,7 @@ def describe(
     }
     coords = {name: values for name, values in measurements.coords.items() if name in ("axis", "scale")}
     notes = {name: note for name, note in measurements.notes.items() if name in variables}
-    return build_dataset(planes, variables, coords, notes=notes)
+    return planes.dataset(variables, coords, notes=notes)
 
 
 class Measurements:

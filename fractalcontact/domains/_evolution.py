@@ -19,7 +19,7 @@ from fractalcontact.domains import _signature
 from fractalcontact.domains._connected_components import Components, label_planes
 from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes, sources
 from fractalcontact.domains._lineage import Path, check_path
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, check_window, read_planes
+from fractalcontact.domains._masks import Array, Planes, check_window, read_planes
 
 SOURCE = joined_references(_signature.SOURCE, "Hausdorff, Mengenlehre (1927)")
 LOADS = ("normal_force", "nominal_pressure", "closure")
@@ -105,7 +105,7 @@ def evolution(
     measurements.add_dataset(_signature.analyse(planes, components, window=window, along=along))
     _add_changes(measurements, components, path)
     _add_returns(measurements, path)
-    result = build_dataset(planes, measurements.variables, measurements.coords, notes=measurements.notes)
+    result = planes.dataset(measurements.variables, measurements.coords, notes=measurements.notes)
     return result.assign_attrs(references=joined_references(SOURCE, *([sources(wanted)] if wanted else [])))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fractalcontact.base.jit import kernel, sum_kernel
-from fractalcontact.domains._mask_input import Array
+from fractalcontact.domains._masks import Array
 
 BLOCKS = 4  # along each axis: 16 give 15 degrees of freedom, and each is still wider than a box of L/8
 LARGEST_INT32 = 2**31 - 1

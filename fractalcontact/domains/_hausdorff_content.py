@@ -19,15 +19,8 @@ from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_mask,
-    mask_grid,
-    parallel_map,
-    read_planes,
-)
+from fractalcontact.domains import _masks
+from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (
     "Mattila, Geometry of Sets and Measures in Euclidean Spaces (1995), ch. 4 and 8 (content, Frostman's "
@@ -43,9 +36,9 @@ def _check(problems: Problems) -> None:
     problems.numbers("s", at_least=0.0, at_most=2.0)
     problems.integer("shifts", at_least=1)
     is_length = problems.number("coarsest", above=0.0, at_most=10.0**DECADES, optional=True)
-    if check_mask(problems):
+    if _masks.check_mask(problems):
         check_square_cells(problems, "mask", given.mask)
-        finest = min(mask_grid(given.mask).spacing)
+        finest = min(_masks.mask_grid(given.mask).spacing)
         if is_length and given.coarsest is not None:
             expected = f"at least the spacing, {finest:g} m"
             problems.require(given.coarsest >= finest * (1 - 1e-9), "coarsest", expected)
@@ -53,7 +46,7 @@ def _check(problems: Problems) -> None:
 
 def check_square_cells(problems: Problems, argument: str, mask: xr.DataArray) -> None:
     """Check that the cells of a mask are square, as those of a cover by squares must be."""
-    dy, dx = mask_grid(mask).spacing
+    dy, dx = _masks.mask_grid(mask).spacing
     problems.require(abs(dy - dx) <= SQUARE * dx, argument, "square cells", f"spacings {dy:g} and {dx:g} m")
 
 
@@ -117,7 +110,7 @@ def hausdorff_content(
     >>> fc.domains.hausdorff_content(row, [0.5, 1, 1.5]).hausdorff_content.values.tolist()
     [4.0, 16.0, 16.0]
     """
-    planes = read_planes(mask, valid=valid, periodic=periodic)
+    planes = _masks.read_planes(mask, valid=valid, periodic=periodic)
     exponents, spacing = np.atleast_1d(float_array(s)), planes.side
     levels = cover_levels(planes, coarsest)
     contents = shifted_contents(planes, exponents, levels, shifts)
@@ -130,7 +123,7 @@ def hausdorff_content(
         "relative_content": planes.variable(mean / extent**exponents, "exponent"),
         "coarsest_side": ((), spacing * 2.0**levels),
     }
-    dataset = build_dataset(planes, variables, {"exponent": ("exponent", exponents)})
+    dataset = planes.dataset(variables, {"exponent": ("exponent", exponents)})
     return dataset if np.ndim(s) else dataset.isel(exponent=0)
 
 
@@ -144,12 +137,10 @@ def cover_levels(planes: Planes, coarsest: float | None) -> int:
 def shifted_contents(planes: Planes, exponents: Array, levels: int, shifts: int) -> Array:
     """Return the contents in cells^s for each shift of the grid of squares, (planes, shifts, exponents)."""
     offsets = np.floor(2**levels * (np.arange(shifts)[:, None] * EVEN_STEPS % 1.0)).astype(np.int64)
-    contents = parallel_map(
-        lambda cells: [
-            _contents(cells, exponents, levels, offset, planes.grid.periodic) for offset in offsets
-        ],
-        planes.cells,
-        planes.plane_size * shifts,
+    periodic = planes.grid.periodic
+    contents = planes.map(
+        lambda cells, _: [_contents(cells, exponents, levels, offset, periodic) for offset in offsets],
+        passes=shifts,
     )
     return np.array(contents).reshape(planes.count, shifts, exponents.size)
 

@@ -21,7 +21,7 @@ from fractalcontact.domains._connected_components import (
     euler_number,
     label_planes,
 )
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, mask_sides, read_planes
+from fractalcontact.domains._masks import Array, Planes, mask_sides, read_planes
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components); scipy.ndimage.label"
 
@@ -118,7 +118,7 @@ def islands(
         coords["island_label"] = ("island", _chain([np.arange(1, n + 1, dtype=np.int32) for n in counts]))
     rows = ("island", np.repeat(np.arange(planes.count), counts)) if columns and planes.dims else None
     notes = _notes(planes, too_many=too_many)
-    return build_dataset(planes, variables, coords, on_plane="label" in maps, notes=notes, rows=rows)
+    return planes.dataset(variables, coords, on_plane="label" in maps, notes=notes, rows=rows)
 
 
 def _maps(components: Sequence[Components], planes: Planes) -> tuple[tuple[str, ...], Array]:

@@ -11,20 +11,9 @@ from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.domains import _masks
 from fractalcontact.domains._gliding_box import LARGEST_INT64, box_sums, half_width
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_box_sizes,
-    check_measure,
-    mask_sides,
-    measure_of,
-    parallel_map,
-    read_box_sizes,
-    read_planes,
-    support_of,
-)
+from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (
     "Allain and Cloitre, Phys. Rev. A 44:3552 (1991); Plotnick et al., Phys. Rev. E 53:5461 (1996) "
@@ -36,8 +25,8 @@ BOXES = ("gliding", "fixed", "along_x", "along_y")
 
 def _check(problems: Problems) -> None:
     problems.choice("boxes", among=BOXES)
-    support = check_measure(problems, profiles=True)
-    check_box_sizes(problems, min(mask_sides(support)))
+    support = _masks.check_measure(problems, profiles=True)
+    _masks.check_box_sizes(problems, min(_masks.mask_sides(support)))
 
 
 @public_result(title="Lacunarity", references=SOURCE, achieved_error="exact to rounding", check=_check)
@@ -101,8 +90,8 @@ def lacunarity(
     >>> result.lacunarity.values.tolist()
     [2.0, 1.0, 1.0]
     """
-    planes = read_planes(support_of(mask), valid=valid, periodic=periodic)
-    return analyse(planes, box_sizes, boxes=boxes, field=measure_of(mask, planes))
+    planes = _masks.read_planes(_masks.support_of(mask), valid=valid, periodic=periodic)
+    return analyse(planes, box_sizes, boxes=boxes, field=_masks.measure_of(mask, planes))
 
 
 def analyse(
@@ -110,7 +99,7 @@ def analyse(
 ) -> xr.Dataset:
     """Return the result of `lacunarity` for planes, or a field (planes, ny, nx), without labels."""
     half = max(1, min(planes.sides) // 2)
-    sizes = read_box_sizes(box_sizes, 2 ** np.arange(half.bit_length(), dtype=np.int64))
+    sizes = _masks.read_box_sizes(box_sizes, 2 ** np.arange(half.bit_length(), dtype=np.int64))
     cells = planes.cells if field is None else field
     values, low, high = _with_interval(planes, cells, sizes, boxes)
     p = planes.coverage
@@ -134,7 +123,7 @@ def analyse(
         patch = (values - 1.0) * p[:, None] * area * planes.grid.cell_area
         variables["integral_range"] = planes.variable(patch, "box_size")
     coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
-    return build_dataset(planes, variables, coords, notes=_notes(planes, values, boxes))
+    return planes.dataset(variables, coords, notes=_notes(planes, values, boxes))
 
 
 def _with_interval(planes: Planes, cells: Array, sizes: Array, boxes: str) -> tuple[Array, Array, Array]:
@@ -151,7 +140,7 @@ def _with_interval(planes: Planes, cells: Array, sizes: Array, boxes: str) -> tu
         elif planes.rank == 1:
             shapes[:, 0] = 1
         replicates = np.array(
-            parallel_map(
+            _masks.parallel_map(
                 lambda k: (
                     box_sums(cells[k], planes.valid_of(k), shapes, planes.grid.periodic)
                     .leaving_out()

@@ -12,15 +12,9 @@ import xarray as xr
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.domains import _masks
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_along,
-    plane_shape,
-    read_planes,
-)
+from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = "Rosenfeld and Pfaltz, J. ACM 13:471 (1966) (connected components)"
 CONTINUATION, BIRTH, DEATH, MERGE, SPLIT, MERGE_AND_SPLIT = range(6)  # the flags of `event` in the schema
@@ -32,8 +26,8 @@ def check_path(problems: Problems) -> None:
     given = problems.given
     check_connected(problems)
     is_frame = problems.choice("frame", among=FRAMES)
-    is_along = check_along(problems)
-    if not isinstance(given.mask, xr.DataArray) or plane_shape(given.mask)[0] > given.mask.size:
+    is_along = _masks.check_along(problems)
+    if not isinstance(given.mask, xr.DataArray) or _masks.plane_shape(given.mask)[0] > given.mask.size:
         return
     expected = "at least one leading dim for the path, as in (step, y, x)"
     if not problems.require(given.mask.ndim > 2, "mask.dims", expected, "(y, x)"):
@@ -104,7 +98,7 @@ def lineage(
     >>> [result.event.flag_meanings.split()[event] for event in result.event.values]
     ['merge', 'merge']
     """
-    planes = read_planes(mask, valid=valid, periodic=periodic)
+    planes = _masks.read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity)
     path = Path.of(planes, along, frame)
     later = np.flatnonzero(path.before >= 0).tolist()
@@ -116,7 +110,7 @@ def lineage(
     columns = {name: np.concatenate([empty[name], *(table[name] for table in tables)]) for name in empty}
     rows = np.repeat(np.array(later, np.int64), [table["event"].size for table in tables])
     variables = {name: ("link", values) for name, values in columns.items()}
-    return build_dataset(planes, variables, rows=("link", rows))
+    return planes.dataset(variables, rows=("link", rows))
 
 
 @dataclass(frozen=True)

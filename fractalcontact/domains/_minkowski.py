@@ -14,15 +14,8 @@ from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_mask,
-    parallel_map,
-    plane_shape,
-    read_planes,
-)
+from fractalcontact.domains import _masks
+from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._random_null import miss_probability
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
@@ -31,8 +24,8 @@ SHORT_REACH = 2**14  # cells; distances up to it are kept as int16
 
 
 def _check(problems: Problems) -> None:
-    check_mask(problems)
-    shape = plane_shape(problems.given.mask)
+    _masks.check_mask(problems)
+    shape = _masks.plane_shape(problems.given.mask)
     problems.numbers("radii", at_least=0.5, at_most=float(max(shape)), optional=True)
 
 
@@ -89,19 +82,13 @@ def minkowski_dimension(
     >>> round(float(fc.domains.minkowski_dimension(mask).minkowski_dimension), 6)  # a line
     1.0
     """
-    return analyse(read_planes(mask, valid=valid, periodic=periodic), radii=radii)
+    return analyse(_masks.read_planes(mask, valid=valid, periodic=periodic), radii=radii)
 
 
 def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:
     """Return the result of `minkowski_dimension` for planes, without labels."""
     r = default_sizes(planes.grid.shape) / 2.0 if radii is None else np.unique(float_array(radii))
-    area = np.array(
-        parallel_map(
-            lambda k: dilated_area(planes.cells[k], planes.valid_of(k), planes.grid, r),
-            range(planes.count),
-            planes.plane_size,
-        )
-    )
+    area = np.array(planes.map(lambda cells, valid: dilated_area(cells, valid, planes.grid, r)))
     numbers = zip(planes.occupied, planes.observed, strict=True)
     null = np.array([null_area(cells, observed, planes.grid, r) for cells, observed in numbers])
     dimension, half_width = fit_power_law(r, area, -1.0)
@@ -117,7 +104,7 @@ def analyse(planes: Planes, *, radii: Any = None) -> xr.Dataset:
     coords = {"radius": ("radius", r), "radius_length": ("radius", r * planes.side)}
     notes = fit_notes("minkowski_dimension", dimension, r.size, "radius")
     notes["local_slope"] = {"long_name": "local dimension, 2 - d ln(area)/d ln(radius)"}
-    return build_dataset(planes, variables, coords, notes=notes)
+    return planes.dataset(variables, coords, notes=notes)
 
 
 def dilated_area(cells: Array, valid: Array | None, grid: Grid, radii: Array) -> Array:

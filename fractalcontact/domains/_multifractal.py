@@ -10,24 +10,8 @@ import xarray as xr
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.domains._mask_input import (
-    Array,
-    build_dataset,
-    check_box_sizes,
-    check_measure,
-    measure_of,
-    plane_shape,
-    read_box_sizes,
-    read_planes,
-    support_of,
-)
-from fractalcontact.domains._scaling_fit import (
-    ROUNDING,
-    default_sizes,
-    fit_line,
-    interval_notes,
-    window_notes,
-)
+from fractalcontact.domains import _masks, _scaling_fit
+from fractalcontact.domains._masks import Array
 
 ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)  # support, entropy, pairs, and two that the largest boxes rule
 LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
@@ -39,7 +23,7 @@ SOURCE = (
 
 def _check(problems: Problems) -> None:
     problems.numbers("q", at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
-    check_box_sizes(problems, max(plane_shape(check_measure(problems))))
+    _masks.check_box_sizes(problems, max(_masks.plane_shape(_masks.check_measure(problems))))
 
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)
@@ -98,13 +82,13 @@ def generalised_dimensions(
     1.737
     """
     orders = float_array(q)
-    planes = read_planes(support_of(mask), valid=valid)
-    field = measure_of(mask, planes)
+    planes = _masks.read_planes(_masks.support_of(mask), valid=valid)
+    field = _masks.measure_of(mask, planes)
     measures = planes.cells.astype(float) if field is None else field
     default = 2 ** np.arange(
-        default_sizes(planes.grid.shape).max(initial=1).item().bit_length(), dtype=np.int64
+        _scaling_fit.default_sizes(planes.grid.shape).max(initial=1).item().bit_length(), dtype=np.int64
     )
-    sizes = read_box_sizes(box_sizes, default)
+    sizes = _masks.read_box_sizes(box_sizes, default)
     fits = [_fit_moments(measure, planes.valid_of(k), orders, sizes) for k, measure in enumerate(measures)]
     has_value = np.array([np.isfinite(fit[0]).any() for fit in fits])
     dimension, half_width, tau, alpha, f = np.moveaxis(np.array(fits), 1, 0)
@@ -119,7 +103,7 @@ def generalised_dimensions(
         "scale_max": planes.variable(np.where(has_value, sizes.max(), np.nan)),
     }
     coords = {"moment_order": ("moment_order", orders)}
-    return build_dataset(planes, variables, coords, notes=_notes(has_value, sizes))
+    return planes.dataset(variables, coords, notes=_notes(has_value, sizes))
 
 
 def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Array) -> Array:
@@ -140,12 +124,12 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
             weight = (observed[size] / _sum_boxes(np.ones(measure.shape), size))[occupied]
         log_mu = np.log(share / share.sum() / weight)
         log_partition[:, place], mean_log_mu[:, place] = _moments(log_mu, weight, orders)
-    tau, tau_spread, _ = fit_line(np.log(sizes), log_partition)
-    alpha, alpha_spread, _ = fit_line(np.log(sizes), mean_log_mu)  # Chhabra and Jensen (1989)
+    tau, tau_spread, _ = _scaling_fit.fit_line(np.log(sizes), log_partition)
+    alpha, alpha_spread, _ = _scaling_fit.fit_line(np.log(sizes), mean_log_mu)  # Chhabra and Jensen (1989)
     is_one = orders == 1.0  # D_1 = alpha(1), the slope of the entropy
     q_less_1 = np.where(is_one, 1.0, orders - 1.0)
     dimension = np.where(is_one, alpha, tau / q_less_1)
-    half_width = ROUNDING + 2.0 * np.where(is_one, alpha_spread, tau_spread / np.abs(q_less_1))
+    half_width = _scaling_fit.ROUNDING + 2.0 * np.where(is_one, alpha_spread, tau_spread / np.abs(q_less_1))
     return np.stack([dimension, half_width, tau, alpha, orders * alpha - tau])
 
 
@@ -176,8 +160,8 @@ def _moments(log_mu: Array, weight: Array, orders: Array) -> tuple[Array, Array]
 def _notes(has_value: Array, sizes: Array) -> dict[str, dict[str, str]]:
     interval = "interval of the generalised dimension (two standard deviations of the local slopes)"
     notes = {
-        **interval_notes(interval),
-        **window_notes("smallest box of the fit", "largest box of the fit"),
+        **_scaling_fit.interval_notes(interval),
+        **_scaling_fit.window_notes("smallest box of the fit", "largest box of the fit"),
     }
     if not has_value.all():
         reason = "one size of box gives no slope" if sizes.size < 2 else "where the plane is empty"

@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.results import public_result
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._mask_input import Array, Planes, build_dataset, read_planes
+from fractalcontact.domains._masks import Array, Planes, read_planes
 
 AXES = ("x", "y")
 SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (1994)"
@@ -67,7 +67,7 @@ def percolation(
         "percolates": planes.variable(values["percolates"], "axis"),
     }
     notes = {"percolates": {"long_name": percolation_name(connectivity)}}
-    return build_dataset(planes, variables, {"axis": ("axis", np.array(AXES))}, notes=notes)
+    return planes.dataset(variables, {"axis": ("axis", np.array(AXES))}, notes=notes)
 
 
 def crossings(components: Sequence[Components], planes: Planes) -> dict[str, Array]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaln
 
-from fractalcontact.domains._mask_input import Array, Planes
+from fractalcontact.domains._masks import Array, Planes
 
 TESTED_SIZES = (2, 3, 4)  # box sizes in cells at which a set is compared with the null
 DEVIATIONS = 3.3  # about one null in a thousand lies further out at a given size

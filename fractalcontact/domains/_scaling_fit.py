@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from fractalcontact.domains._mask_input import Array, Planes
+from fractalcontact.domains._masks import Array, Planes
 
 DEVIATIONS = 2.5  # of the local slopes, to either side of a dimension
 ROUNDING = 1e-14  # smallest half-width of an interval

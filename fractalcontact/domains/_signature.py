@@ -19,18 +19,11 @@ from fractalcontact.base.numbers import float_array
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.domains import _masks
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._correlation import pair_correlation_length
 from fractalcontact.domains._gliding_box import BoxMoments, box_sums, half_width
-from fractalcontact.domains._mask_input import (
-    Array,
-    Planes,
-    build_dataset,
-    check_along,
-    check_window,
-    parallel_map,
-    read_planes,
-)
+from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (
     "Falconer, Fractal Geometry (1990), ch. 3; Chiu, Stoyan, Kendall and Mecke, Stochastic Geometry (2013), "
@@ -66,8 +59,8 @@ CHANGES = {
 
 
 def _check(problems: Problems) -> None:
-    check_window(problems, has_mask=check_connected(problems))
-    check_along(problems)
+    _masks.check_window(problems, has_mask=check_connected(problems))
+    _masks.check_along(problems)
 
 
 @public_result(title="Signature of a contact domain", references=SOURCE, check=_check)
@@ -143,7 +136,7 @@ def signature(
     >>> round(float(result.clustering[1]), 1)
     1.0
     """
-    planes = read_planes(mask, valid=valid, periodic=periodic)
+    planes = _masks.read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
     return analyse(planes, components, window=window, along=along)
 
@@ -174,7 +167,7 @@ def analyse(
         planes, gap[:, 0], islands, median, np.fmax(low, start), has_window=bool(np.isfinite(low))
     )
     in_window = _window_quantities(planes, spots, np.array([low, high]), scales)
-    pairs = parallel_map(
+    pairs = _masks.parallel_map(
         lambda plane: pair_correlation_length(planes, plane), range(planes.count), planes.plane_size
     )
     quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
@@ -200,7 +193,7 @@ def analyse(
     if planes.dims:
         variables |= _changes(planes, quantities, along or planes.dims[-1])
     coords = {"side": ("side", sides), "scale": ("scale", scales)}
-    return build_dataset(planes, variables, coords, notes=_notes(low, high))
+    return planes.dataset(variables, coords, notes=_notes(low, high))
 
 
 def common_window(spots: Array, gaps: Array, shortest: float, extent: float) -> tuple[float, float]:
@@ -358,10 +351,9 @@ def _sides(steps: Array, grid: Grid) -> Array:
 
 def _moments(planes: Planes, boxes: Array) -> BoxMoments:
     """Return the moments of all planes, each (planes, 1 + blocks, boxes)."""
-    results = parallel_map(
-        lambda k: box_sums(planes.cells[k], planes.valid_of(k), boxes, planes.grid.periodic).leaving_out(),
-        range(planes.count),
-        planes.plane_size * len(boxes),
+    results = planes.map(
+        lambda cells, valid: box_sums(cells, valid, boxes, planes.grid.periodic).leaving_out(),
+        passes=len(boxes),
     )
     return BoxMoments(
         np.array([each.hit for each in results]), np.array([each.lacunarity for each in results])

@@ -16,14 +16,7 @@ from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._fit_plane import (
-    check_frame,
-    check_points,
-    finite_points,
-    fit_plane,
-    frame_of,
-    point_array,
-)
+from fractalcontact.surfaces import _fit_plane
 from fractalcontact.surfaces._grid_input import check_length
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -42,13 +35,13 @@ MOST_CELLS = 1 << 28
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    is_valid = check_points(problems)
+    is_valid = _fit_plane.check_points(problems)
     check_length(problems, "spacing", optional=True)
     check_length(problems, "largest_gap", optional=True)
     problems.choice("units", among=UNITS)
-    values = point_array(given.points) if is_valid else None
+    values = _fit_plane.point_array(given.points) if is_valid else None
     shape = (0, 3) if values is None else values.shape
-    check_frame(problems, None if values is None else shape[1])
+    _fit_plane.check_frame(problems, None if values is None else shape[1])
     triangles = _triangles(given.points, given.triangles)
     if triangles is not None:
         faces = as_array(triangles)
@@ -142,7 +135,7 @@ def from_points(
     >>> bool(abs(surface).max() < 1e-12), round(float(surface.finest_scale), 3)
     (True, 0.012)
     """
-    values, triangles = finite_points(points, units), _triangles(points, triangles)
+    values, triangles = _fit_plane.finite_points(points, units), _triangles(points, triangles)
     frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
     cells = _cells_of(plane) if spacing is None else None
     step = spacing if cells is None else cells[-1].spacing
@@ -151,7 +144,7 @@ def from_points(
     elif values.shape[1] == 2:
         gridded = _profile(values, step, largest_gap, cells)
     else:
-        given = None if triangles is None else _finite_triangles(point_array(points), triangles)
+        given = None if triangles is None else _finite_triangles(_fit_plane.point_array(points), triangles)
         gridded = _triangulated(values, step, given, largest_gap, cells)
     facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
     core = ("y", "x")[2 - gridded.heights.ndim :]
@@ -183,7 +176,7 @@ def _in_plane(points: Array, plane: Any, spacing: float | None) -> tuple[dict[st
         plane = "fit" if _regular_axes(points, spacing) is None else "xy"
     if isinstance(plane, str) and plane == "xy":
         return {"plane": "xy"}, points
-    frame = frame_of(fit_plane(points) if isinstance(plane, str) else plane)
+    frame = _fit_plane.frame_of(_fit_plane.fit_plane(points) if isinstance(plane, str) else plane)
     assert frame is not None  # checked before
     rotation, centre = frame
     entries = {"plane": "best fit", "rotation_matrix": rotation.tolist(), "centre": centre.tolist()}

@@ -17,14 +17,8 @@ from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._files import (
-    FileContent,
-    Request,
-    check_unpacked,
-    corrupt_named,
-    file_suffix,
-    open_bytes,
-)
+from fractalcontact.surfaces import _files
+from fractalcontact.surfaces._files import FileContent, Request
 from fractalcontact.surfaces._grid_input import surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -55,8 +49,8 @@ def read_instrument(request: Request) -> FileContent:
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
     # some of the readers open NetCDF files, and filters of warnings are shared by all threads
-    with NETCDF_LOCK, _quiet() as messages, open_bytes(path) as file:
-        check_unpacked(path.name, file)
+    with NETCDF_LOCK, _quiet() as messages, _files.open_bytes(path) as file:
+        _files.check_unpacked(path.name, file)
         reader, other_unit = _open(file, path)
         chosen = _channel(reader, request.channel, path.name)
         name = str(reader.format())
@@ -102,7 +96,7 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
     from SurfaceTopography.IO import open_topography, readers
     from SurfaceTopography.IO.Reader import MagicMatch
 
-    head, suffix = file.read(4096), file_suffix(path).lstrip(".")
+    head, suffix = file.read(4096), _files.file_suffix(path).lstrip(".")
     reasons, tried = [], 0
     for reader in readers:
         is_list = reader.format() == POINTS and not head.startswith(PROFILERS)
@@ -122,7 +116,7 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
     """Return a channel by name or number; None stands for the default of the format."""
-    with corrupt_named(name):
+    with _files.corrupt_named(name):
         channels = list(reader.channels)
         if channel is None:
             return reader.default_channel
@@ -179,7 +173,7 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
     options: dict[str, Any] = {"channel_index": chosen.index}
     if size is None:
         options["physical_sizes"] = tuple(float(n) for n in np.atleast_1d(chosen.nb_grid_pts))
-    with corrupt_named(name):
+    with _files.corrupt_named(name):
         topography = reader.topography(**options)
         values = topography.heights()
     if np.iscomplexobj(values) or values.ndim not in (1, 2):
@@ -221,7 +215,7 @@ def read_raster(request: Request) -> FileContent:
     from rasterio.errors import NotGeoreferencedWarning
 
     band = 1 if channel is None else int(channel) + 1 if isinstance(channel, (int, np.integer)) else 0
-    with corrupt_named(path.name), warnings.catch_warnings(), open_bytes(path) as stream:
+    with _files.corrupt_named(path.name), warnings.catch_warnings(), _files.open_bytes(path) as stream:
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         content = stream.read()
         with (

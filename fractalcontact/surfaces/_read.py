@@ -23,39 +23,19 @@ from fractalcontact.base.results import provenance_of, public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.surface_argument import usual_form
 from fractalcontact.base.validation import NONE, Problems, reading
-from fractalcontact.surfaces._files import (
-    EmptyTable,
-    FileContent,
-    NotATable,
-    Request,
-    corrupt_named,
-    file_suffix,
-    open_bytes,
-    read_npy,
-    read_npz,
-    read_table,
-)
+from fractalcontact.surfaces import _files, _read_points
+from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
 from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing
 from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
-from fractalcontact.surfaces._read_points import (
-    ALWAYS_POINTS,
-    CLOUDS,
-    LEAST_POINTS,
-    MESHES,
-    Points,
-    check_columns,
-    is_list,
-    listed_points,
-    point_content,
-)
+from fractalcontact.surfaces._read_points import Points
 
 Array = np.ndarray[Any, np.dtype[Any]]
 T = TypeVar("T")
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
-TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *ALWAYS_POINTS)
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *_read_points.ALWAYS_POINTS)
 RASTERS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"ncols", b"NCOLS", b"DSAA", b"DSBB", b"DSRB")
 IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
 WIDE_CLOUD = 20.0  # m: points of a file without a unit that are wider may be in millimetres
@@ -78,7 +58,7 @@ WIDEST = 1.0  # m: wider than the field of any microscope
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    check_columns(problems)
+    _read_points.check_columns(problems)
     check_frame(problems)
     if given.spacing is not None:
         check_spacing(problems)
@@ -90,7 +70,7 @@ def _check(problems: Problems) -> None:
     if not problems.file("path"):
         return
     source = Path(given.path)
-    if is_row and file_suffix(source) in NETCDF:
+    if is_row and _files.file_suffix(source) in NETCDF:
         expected = "'bottom' for a NetCDF file, which has its y"
         problems.require(given.first_row in (None, "bottom"), "first_row", expected)
         problems.require(
@@ -201,15 +181,15 @@ def file_content(request: Request) -> FileContent:
     path, suffix = request.path, request.suffix
     if suffix in NETCDF:
         return _netcdf_content(request)
-    if suffix in (*MESHES, *CLOUDS):
-        return _gridded_points(point_content(path, request.columns), request)
+    if suffix in (*_read_points.MESHES, *_read_points.CLOUDS):
+        return _gridded_points(_read_points.point_content(path, request.columns), request)
     if suffix == ".npy":
-        with corrupt_named(path.name):
-            values = read_npy(path)
+        with _files.corrupt_named(path.name):
+            values = _files.read_npy(path)
         return _array_content(values, request)
     if suffix == ".npz":
         return _archive_content(request)
-    with open_bytes(path) as file:
+    with _files.open_bytes(path) as file:
         head = file.read(8)
     if not head:
         raise UnreadableFile(WHERE, [f"path: expected data, got the empty file {path.name!r}"])
@@ -225,9 +205,9 @@ def _text_content(request: Request) -> FileContent:
     """Read text: a list of points, a table of heights, or the file of an instrument."""
     path = request.path
     try:
-        table = read_table(path)
+        table = _files.read_table(path)
     except NotATable as error:
-        is_points = request.columns is not None or request.suffix in ALWAYS_POINTS
+        is_points = request.columns is not None or request.suffix in _read_points.ALWAYS_POINTS
         if not (is_points or isinstance(error, EmptyTable)):
             if request.spacing is None:
                 return _instrument_or_table(request)
@@ -237,8 +217,8 @@ def _text_content(request: Request) -> FileContent:
                     return content
         fault = f"is not a table of numbers ({error})"
         raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault}"]) from error
-    if is_list(table, path, request.columns):
-        return _gridded_points(listed_points(table, path, request.columns), request)
+    if _read_points.is_list(table, path, request.columns):
+        return _gridded_points(_read_points.listed_points(table, path, request.columns), request)
     rows, number = table.values.shape
     with Problems(WHERE, UnreadableFile) as problems:
         if table.is_named:
@@ -299,8 +279,8 @@ def _archive_content(request: Request) -> FileContent:
     One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
     """
     path, channel, spacing = request.path, request.channel, request.spacing
-    with corrupt_named(path.name):
-        arrays = read_npz(path)
+    with _files.corrupt_named(path.name):
+        arrays = _files.read_npz(path)
     names = [name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)]
     default = names[0] if len(names) == 1 else "height"
     name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
@@ -326,7 +306,7 @@ def _archive_content(request: Request) -> FileContent:
 def _array_content(values: Array, request: Request) -> FileContent:
     """Return an array of a numpy file: heights, or points in two or three columns."""
     has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
-    if has_points and len(values) >= LEAST_POINTS:
+    if has_points and len(values) >= _read_points.LEAST_POINTS:
         return _gridded_points(Points(values.astype(np.float64)), replace(request, plane=None))
     return _heights_content(values, request)
 

@@ -21,15 +21,8 @@ from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, reading
-from fractalcontact.surfaces._files import (
-    RATIO,
-    NotATable,
-    Table,
-    corrupt_named,
-    file_suffix,
-    open_bytes,
-    read_table,
-)
+from fractalcontact.surfaces import _files
+from fractalcontact.surfaces._files import NotATable, Table
 from fractalcontact.surfaces._instruments import PROJECT
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -94,7 +87,7 @@ def _check(problems: Problems) -> None:
     source = Path(given.path)
     problems.file("path")
     suffixes = (*MESHES, *CLOUDS, *LISTS)
-    known = file_suffix(source) in suffixes
+    known = _files.file_suffix(source) in suffixes
     problems.require(known, "path", f"a file of points: {', '.join(suffixes)}", source.name)
 
 
@@ -161,13 +154,13 @@ def read_points(
 
 def point_content(path: Path, columns: Sequence[str | int] | None) -> Points:
     """Read a file of points with the reader of its format."""
-    suffix = file_suffix(path)
+    suffix = _files.file_suffix(path)
     if suffix in MESHES:
         return _mesh(path, suffix)
     if suffix in CLOUDS:
         return _las(path)
     try:
-        table = read_table(path)
+        table = _files.read_table(path)
     except NotATable as error:
         raise UnreadableFile(WHERE, [f"path: {path.name!r} is not a table of numbers ({error})"]) from error
     return listed_points(table, path, columns)
@@ -179,7 +172,7 @@ def is_list(table: Table, path: Path, columns: Sequence[str | int] | None) -> bo
     names = [name.lower() for name in table.names]
     return (
         columns is not None
-        or file_suffix(path) in ALWAYS_POINTS
+        or _files.file_suffix(path) in ALWAYS_POINTS
         or (number in (2, 3) and rows >= LEAST_POINTS)
         or (bool(names) and _place(names, X) is not None and _place(names, Z) is not None)
     )
@@ -229,7 +222,7 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
         return [place for place in places if place is not None]
     elif number == 2:
         return [0, 1]
-    elif not (names and table.is_named) and (number == 3 or file_suffix(path) in ALWAYS_POINTS):
+    elif not (names and table.is_named) and (number == 3 or _files.file_suffix(path) in ALWAYS_POINTS):
         return [0, 1, 2]
     else:
         known = f"called {', '.join(map(repr, table.names))}" if names else f"without names, {number} of them"
@@ -250,8 +243,8 @@ def _mesh(path: Path, suffix: str) -> Points:
         raise MissingExtra(f"reading {path.name!r}", "trimesh", "mesh")
     import trimesh
 
-    with corrupt_named(path.name, WHERE):
-        with open_bytes(path) as file:
+    with _files.corrupt_named(path.name, WHERE):
+        with _files.open_bytes(path) as file:
             mesh = trimesh.load(file, file_type=suffix.lstrip("."), process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh() if mesh.geometry else trimesh.Trimesh()
@@ -269,9 +262,9 @@ def _las(path: Path) -> Points:
         raise MissingExtra(f"reading {path.name!r}", "laspy", "mesh")
     import laspy
 
-    if file_suffix(path) == ".laz" and not laspy.LazBackend.detect_available():
+    if _files.file_suffix(path) == ".laz" and not laspy.LazBackend.detect_available():
         raise MissingExtra(f"reading {path.name!r}", "lazrs", "mesh")
-    with corrupt_named(path.name, WHERE), open_bytes(path) as file:
+    with _files.corrupt_named(path.name, WHERE), _files.open_bytes(path) as file:
         _check_las_size(file, path)
         cloud = laspy.read(file)
         position = np.array(cloud.xyz, dtype=np.float64)
@@ -302,7 +295,7 @@ def _check_las_size(file: IO[bytes], path: Path) -> None:
     file.seek(0)
     header = laspy.LasHeader.read_from(file)
     stated = header.point_count * header.point_format.size
-    require_unpacked(WHERE, path.name, stated, unpacked_limit(size, RATIO))
+    require_unpacked(WHERE, path.name, stated, unpacked_limit(size, _files.RATIO))
     if header.are_points_compressed:
         (table,) = _unpacked("<q", file, header.offset_to_point_data)
         if table == -1:  # written to a stream: the place of the table ends the file

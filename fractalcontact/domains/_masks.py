@@ -108,6 +108,42 @@ class Planes:
         values = np.asarray(values)
         return (*self.dims, *new_dims), values.reshape(self.shape + values.shape[1:])
 
+    def map(self, function: Callable[[Array, Array | None], R], *, passes: int = 1) -> list[R]:
+        """Apply a function that makes so many passes over a plane to cells and observed cells of each."""
+        planes = [(cells, self.valid_of(k)) for k, cells in enumerate(self.cells)]
+        return parallel_map(lambda plane: function(*plane), planes, self.plane_size * passes)
+
+    def dataset(
+        self,
+        variables: dict[str, Any],
+        coords: dict[str, Any] | None = None,
+        *,
+        on_plane: bool = False,
+        notes: dict[str, dict[str, str]] | None = None,
+        rows: tuple[str, Array] | None = None,
+    ) -> xr.Dataset:
+        """Build a Dataset from variables (dims, values), with the coordinates of the leading dims.
+
+        `on_plane` adds the coordinates x and y. `notes` gives attributes by name, which replace those of the
+        schema. `rows` names the dim of a table and gives the plane that each of its rows belongs to.
+        """
+        used = {dim for dims, _ in variables.values() for dim in dims}
+        leading = {
+            name: values
+            for name, values in self.coords.items()
+            if name not in variables and (name in QUANTITIES or name in used)
+        }
+        on_grid = self.plane_coords if on_plane else {}
+        of_rows = _row_coords(self, *rows) if rows else {}
+        dataset = xr.Dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
+        if not self.grid.has_coordinates:  # lengths and areas are in cells
+            own = [name for name in dataset.variables if name not in leading and name not in of_rows]
+            for name in own:
+                dataset.variables[name].attrs.update(in_cells(str(name)))
+        for name, attributes in (notes or {}).items():
+            dataset.variables[name].attrs.update(attributes)
+        return dataset
+
 
 def check_mask(
     problems: Problems, mask: Any = GIVEN, *, argument: str = "mask", profiles: bool = False
@@ -281,38 +317,6 @@ def _flags(mask: xr.DataArray) -> Array:
         )
         np.greater(mask[region].values, 0, out=flags[region])
     return flags
-
-
-def build_dataset(
-    planes: Planes,
-    variables: dict[str, Any],
-    coords: dict[str, Any] | None = None,
-    *,
-    on_plane: bool = False,
-    notes: dict[str, dict[str, str]] | None = None,
-    rows: tuple[str, Array] | None = None,
-) -> xr.Dataset:
-    """Build a Dataset from variables (dims, values), with the coordinates of the leading dims.
-
-    `on_plane` adds the coordinates x and y. `notes` gives attributes by name, which replace those of the
-    schema. `rows` names the dim of a table and gives the plane that each of its rows belongs to.
-    """
-    used = {dim for dims, _ in variables.values() for dim in dims}
-    leading = {
-        name: values
-        for name, values in planes.coords.items()
-        if name not in variables and (name in QUANTITIES or name in used)
-    }
-    on_grid = planes.plane_coords if on_plane else {}
-    of_rows = _row_coords(planes, *rows) if rows else {}
-    dataset = xr.Dataset(variables, {**leading, **on_grid, **of_rows, **(coords or {})})
-    if not planes.grid.has_coordinates:  # lengths and areas are in cells
-        own = [name for name in dataset.variables if name not in leading and name not in of_rows]
-        for name in own:
-            dataset.variables[name].attrs.update(in_cells(str(name)))
-    for name, attributes in (notes or {}).items():
-        dataset.variables[name].attrs.update(attributes)
-    return dataset
 
 
 def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
