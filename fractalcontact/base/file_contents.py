@@ -5,19 +5,18 @@ Nothing here needs xarray, so that the command starts fast.
 
 from __future__ import annotations
 
-import json
 import os
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.netcdf_header import Header, read_headers
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.tables import Note, screen_width, table
 
 SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
-REASONS = ("comment", "reason")  # attributes with a reason for each direction, as JSON
 REMARKS = ("note", "reason")  # string variables over `method`
 
 
@@ -48,7 +47,7 @@ def stage_rows(result: Any) -> list[tuple[str, ...]]:
 
     `result` has the attributes of the root of a study, or of a single result, whose call is the only row.
     """
-    entry = _provenance(result)
+    entry = provenance_of(result)
     stages = entry.get("stages", {})
     if not stages or not _are_stages(stages):
         call = _single_call(entry)
@@ -66,18 +65,6 @@ def stage_rows(result: Any) -> list[tuple[str, ...]]:
     return rows
 
 
-def reasons(attributes: Mapping[Any, Any], key: str) -> dict[str, str]:
-    """Return the reasons in an attribute by method; a reason of several methods is listed once."""
-    try:
-        by_method = json.loads(attributes.get(key, "{}"))
-    except (TypeError, ValueError):
-        return {}
-    methods: dict[str, list[str]] = {}
-    for method, reason in by_method.items() if isinstance(by_method, dict) else ():
-        methods.setdefault(str(reason), []).append(method)
-    return {", ".join(names): reason for reason, names in methods.items() if reason}
-
-
 def remarks(methods: Sequence[str], texts: Any) -> dict[str, str]:
     """Return texts (..., methods) by method; a text of several methods is listed once, without empty ones."""
     found: dict[str, dict[str, None]] = {}
@@ -93,15 +80,6 @@ def _are_stages(stages: Any) -> bool:
         isinstance(facts, dict) and isinstance(facts.get("run_time"), (int, float))
         for facts in stages.values()
     )
-
-
-def _provenance(result: Any) -> dict[str, Any]:
-    """Return the provenance of a result, empty for a file of another origin."""
-    try:
-        entry = json.loads(result.attrs.get("provenance", "{}"))
-    except (TypeError, ValueError):
-        return {}
-    return entry if isinstance(entry, dict) else {}
 
 
 _NOT_ACHIEVED = ("parameters", "version", "fft", "threads", "random", "file_sha256", "merged", "stages")
@@ -182,16 +160,8 @@ def _achieved_lines(group: Header) -> Iterable[str]:
 
 
 def _reason_lines(group: Header) -> Iterable[str]:
-    """Yield the remarks on single methods, those of several variables once."""
-    variables: dict[str, list[str]] = {}
-    for name, (_, attributes) in group.variables.items():
-        for key in REASONS:
-            for methods, reason in reasons(attributes, key).items():
-                variables.setdefault(f"{methods}: {reason}", []).append(name)
-    for text, names in variables.items():
-        yield str(Note(f"{', '.join(names)}, {text}", indent=4))
-    if "method" in group.values:
-        order = [str(name) for name in group.values["method"]]
-        for key in REMARKS:
-            for concerned, remark in remarks(order, group.values.get(key, [])).items():
-                yield str(Note(f"{concerned}: {remark}", indent=4))
+    """Yield the remarks on single methods."""
+    order = [str(name) for name in group.values.get("method", ())]
+    for key in REMARKS if order else ():
+        for concerned, remark in remarks(order, group.values.get(key, [])).items():
+            yield str(Note(f"{concerned}: {remark}", indent=4))

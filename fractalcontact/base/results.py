@@ -18,7 +18,6 @@ shorten), and `completeness`, which stays an attribute: it lists what a stopped 
 from __future__ import annotations
 
 import inspect
-import json
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -245,12 +244,3 @@ def public_name(function: Callable[..., Any]) -> str:
     """Return the name under which users call a function of a private module."""
     parts = [part for part in function.__module__.split(".") if not part.startswith("_")]
     return ".".join([*parts, function.__qualname__])
-
-
-def provenance_of(data: xr.Dataset | xr.DataArray) -> dict[str, Any]:
-    """Return the provenance of a result, as `stamp` wrote it; empty where there is none."""
-    try:
-        entry = json.loads(data.attrs.get("provenance", "{}"))
-    except (TypeError, ValueError):
-        return {}
-    return entry if isinstance(entry, dict) else {}

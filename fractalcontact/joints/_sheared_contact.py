@@ -26,8 +26,7 @@ from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import number_of_entries
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import content, plain
-from fractalcontact.base.references import PAPER, joined_references
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import PAPER, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights

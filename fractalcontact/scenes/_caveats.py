@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.references import scene_of
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
 from fractalcontact.scenes._overview import OVERVIEW
@@ -50,7 +50,7 @@ def caveats(tree: xr.DataTree) -> list[str]:
     for path, data in known.items():
         lines += _resolution(path, data)
     for path, data in known.items():
-        lines += _true_pressure(path, data, _scene(tree).get("material", {}))
+        lines += _true_pressure(path, data, _table(tree, "material"))
     lines += _strength(tree)
     for path, data in known.items():
         lines += _slopes(path, data, PRESSED[path])
@@ -73,8 +73,8 @@ def _spikes(tree: xr.DataTree) -> Iterator[str]:
     heights: dict[str, xr.DataArray] = {}
     clean: dict[str, xr.DataArray] = {}
     for name, path in (("surface", "surfaces"), ("upper", "joints/faces")):
-        data, table = group_of(tree, path), _scene(tree).get(name, {})
-        is_scan = isinstance(table, dict) and ("read" in table or "sample" in table)
+        data, table = group_of(tree, path), _table(tree, name)
+        is_scan = "read" in table or "sample" in table
         if data is None or "height" not in data or data["height"].ndim != 2 or not is_scan:
             continue
         if table.get("despike") or min(data["height"].shape) < 3:
@@ -103,9 +103,7 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
         from fractalcontact import dimensions
 
         before = float(estimates["fractal_dimension"].sel({"method": "default"}))
-        after = float(
-            dimensions.estimate(clean, **_scene(tree).get("dimensions", {}))["fractal_dimension"][0]
-        )
+        after = float(dimensions.estimate(clean, **_table(tree, "dimensions"))["fractal_dimension"][0])
         if not abs(after - before) <= SPIKED_DIMENSION:  # also where there is no D with them, or without
             yield f"D is {fixed(after, 2)}, not {fixed(before, 2)}"
     if jrc is not None:
@@ -220,7 +218,7 @@ def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
 
 def _strength(tree: xr.DataTree) -> Iterator[str]:
     friction = group_of(tree, "joints/friction")
-    limits = _scene(tree).get("material", {}).get("yield_pressure")
+    limits = _table(tree, "material").get("yield_pressure")
     if friction is None or limits is None or "peak_shear_strength" not in friction:
         return
     strengths = np.ravel(friction["peak_shear_strength"].values)
@@ -273,14 +271,7 @@ def _uplift(tree: xr.DataTree) -> Iterator[str]:
         )
 
 
-def _scene(tree: xr.DataTree) -> dict[str, Any]:
-    """Return the tables of the scene of a study, empty where there is none."""
-    try:
-        scene = json.loads(tree.attrs["provenance"])["parameters"]["scene"]
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return {}
-    return (
-        {name: table for name, table in scene.items() if isinstance(table, dict)}
-        if isinstance(scene, dict)
-        else {}
-    )
+def _table(tree: xr.DataTree, name: str) -> dict[str, Any]:
+    """Return a table of the scene of a study, empty where there is none."""
+    table = scene_of(tree).get(name)
+    return table if isinstance(table, dict) else {}

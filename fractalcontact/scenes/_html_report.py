@@ -22,6 +22,7 @@ import xarray as xr
 from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.references import provenance_of, scene_of
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
@@ -159,8 +160,8 @@ def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summ
     template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
     single = of_member(tree, 0)
     pages = {name: page for name in _scans(tree) if (target.parent / (page := page_of(name))).is_file()}
-    entry = _provenance(tree)
-    scene = entry.get("parameters", {}).get("scene")
+    entry = provenance_of(tree)
+    scene = scene_of(tree)
     written = str(tree.attrs.get("history", "")).split(" ")[0]
     subtitle = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -437,15 +438,6 @@ def _column(head: str, values: Any) -> tuple[str, list[str]]:
     scale = scale_for(units, values.to_numpy())
     cells = ["-" if not np.isfinite(value) else f"{value:.4g}" for value in scale(values.to_numpy())]
     return scale.label(name), cells
-
-
-def _provenance(tree: xr.DataTree) -> dict[str, Any]:
-    """Return the provenance of a study, empty for one of another origin."""
-    try:
-        entry = json.loads(tree.attrs.get("provenance", "{}"))
-    except (TypeError, ValueError):
-        return {}
-    return entry if isinstance(entry, dict) else {}
 
 
 def _as_json(entry: Any) -> str:

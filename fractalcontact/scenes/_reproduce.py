@@ -23,7 +23,7 @@ from fractalcontact.base.provenance import (
     member_entry,
     with_provenance,
 )
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._parts import concatenate
@@ -77,9 +77,9 @@ def reproduce(
         expected = "a result with the attribute `provenance` of this package"
         problems.integer("member", member, at_least=0, optional=True)
         attributes = getattr(result, "attrs", None)
-        is_result = isinstance(attributes, Mapping) and bool(provenance_of(result))  # type: ignore[arg-type]
+        is_result = isinstance(attributes, Mapping) and bool(provenance_of(result))
         if problems.require(is_result, "result", expected, type(result).__name__) and is_path:
-            entry = provenance_of(result)  # type: ignore[arg-type]
+            entry = provenance_of(result)
             count = member_count(entry)
             if count is None:
                 problems.integer("member", member, at_least=0, at_most=0, optional=True)

@@ -63,9 +63,8 @@ class Column:
     screen: bool = True
 
 
-def no_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterable[str]:
+def no_remarks(*_: object) -> Iterable[str]:
     """Return no remark."""
-    del tree, data
     return ()
 
 
@@ -94,6 +93,11 @@ class Rows:
     remarks: Remarks = no_remarks
     first_dim: bool = False
     load: str = "nominal_pressure"
+
+
+def rows(title: str, over: tuple[str, ...], *columns: Column, **options: Any) -> Rows:
+    """Return the table of a stage with these columns; the options are the other fields of `Rows`."""
+    return Rows(title, over, columns, **options)
 
 
 @dataclass(frozen=True)

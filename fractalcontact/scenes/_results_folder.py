@@ -5,7 +5,6 @@ A result file states the scene that it is from, a report and a figure the progra
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from typing import Any
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.netcdf_header import read_headers
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, WHERE, output_folder
+from fractalcontact.base.references import scene_of
 from fractalcontact.base.signals import Stopped
 from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes._checkpoint import FOLDER
@@ -111,11 +111,11 @@ def _scene_of(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        attributes = read_headers(path, lambda _: False)["/"].attrs
-        scene = json.loads(attributes["provenance"])["parameters"]["scene"]
-    except (UnreadableFile, KeyError, TypeError, ValueError):
+        root = read_headers(path, lambda _: False)["/"]
+    except UnreadableFile:
         return None
-    return {"title": attributes.get("title")} | scene if isinstance(scene, dict) else None
+    scene = scene_of(root)
+    return {"title": root.attrs.get("title")} | scene if scene else None
 
 
 def _title(scene: Scene) -> dict[str, Any]:

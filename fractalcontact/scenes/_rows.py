@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import starmap
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.file_contents import remarks
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.units import jrc_text, number, quantity_text
 from fractalcontact.scenes._result_tables import (
     MEMBER,
     ROUNDING,
     Column,
+    Remarks,
     Rows,
     amount,
     finite,
     group_of,
     in_turn,
     length,
+    no_remarks,
     plain,
+    rows,
 )
 
 WATER = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight of water over its viscosity, at 20 °C
@@ -60,18 +65,12 @@ def _along(name: str, dim: str, value: Any) -> Any:
     return take
 
 
-def _of_method(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield notes and reasons, those of several methods once."""
-    del tree
     methods = [str(name) for name in data["method"].values]
-    for key in ("note", "reason"):
-        if key not in data:
-            continue
-        by_text: dict[str, dict[str, None]] = {}
-        for row in np.reshape(data[key].transpose(..., "method").values.astype(str), (-1, len(methods))):
-            for method, text in zip(methods, row, strict=True):
-                by_text.setdefault(text, {})[method] = None
-        yield from (f"{', '.join(names)}: {text}" for text, names in by_text.items() if text)
+    for key in (key for key in ("note", "reason") if key in data):
+        texts = data[key].transpose(..., "method").values
+        yield from (f"{names}: {text}" for names, text in remarks(methods, texts).items())
     if MEMBER in data.dims:
         yield "The intervals are those of one surface: the means of their ends."
 
@@ -83,15 +82,13 @@ def _misfit(state: xr.Dataset) -> str | None:
     return "" if text == "-" else f"z = {text}"
 
 
-dimensions = Rows(
+dimensions = rows(
     "fractal dimension", ("method",),
-    (
-        Column("dimension D", "fractal_dimension", 3),
-        Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
-        Column("range of scales", ("scale_min", "scale_max")),
-        Column("goodness of fit", _misfit, screen=False),
-    ),
-    _of_method,
+    Column("dimension D", "fractal_dimension", 3),
+    Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
+    Column("range of scales", ("scale_min", "scale_max")),
+    Column("goodness of fit", _misfit, screen=False),
+    remarks=_of_method,
 )  # fmt: skip
 
 
@@ -119,20 +116,17 @@ def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     yield text
 
 
-surfaces = Rows(
-    "ISO 25178", (), tuple(_iso_column(symbol, name) for symbol, name in ISO_25178.items()), _gridding
-)
-texture = Rows("texture", (), surfaces.columns)
+surfaces = rows("ISO 25178", (), *starmap(_iso_column, ISO_25178.items()), remarks=_gridding)
+texture = rows("texture", (), *surfaces.columns)
 
 AREAS = (
     Column("contact area", "contact_fraction"),
     Column("area, perimeter-corrected", "corrected_contact_fraction", screen=False),
 )
-contact = Rows("contact", ("step",), (Column("closure", "closure"), *AREAS))
+contact = rows("contact", ("step",), Column("closure", "closure"), *AREAS)
 
 
-def _outside_scale(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    del tree
+def _outside_scale(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     if (data["scale_position"] != 0).any():
         yield OUTSIDE_SCALE
 
@@ -154,14 +148,12 @@ def _jrc_scatter(state: xr.Dataset) -> str | None:
     return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))
 
 
-roughness_coefficient = Rows(
+roughness_coefficient = rows(
     "joint roughness coefficient (JRC)", ("direction",),
-    (
-        Column("JRC", _jrc, 1),
-        Column("slope Z2", "profile_slope", 3),
-        Column("scatter of the profiles", _jrc_scatter),
-    ),
-    _outside_scale,
+    Column("JRC", _jrc, 1),
+    Column("slope Z2", "profile_slope", 3),
+    Column("scatter of the profiles", _jrc_scatter),
+    remarks=_outside_scale,
 )  # fmt: skip
 
 
@@ -179,18 +171,15 @@ def _extreme(choose: Any) -> Any:
     return describe
 
 
-def _azimuths(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    del tree, data
+def _azimuths(*_: object) -> Iterator[str]:
     yield "Azimuths are from E (+x) anticlockwise; a compass bearing is 90° minus the azimuth."
 
 
-directional_roughness = Rows(
+directional_roughness = rows(
     "directional roughness (Grasselli), theta_max / (C + 1)", (),
-    (
-        Column("largest roughness metric", _extreme(np.nanargmax)),
-        Column("smallest roughness metric", _extreme(np.nanargmin)),
-    ),
-    _azimuths,
+    Column("largest roughness metric", _extreme(np.nanargmax)),
+    Column("smallest roughness metric", _extreme(np.nanargmin)),
+    remarks=_azimuths,
 )  # fmt: skip
 
 
@@ -202,60 +191,49 @@ def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
     return upper["height"] - lower["height"]
 
 
-faces = Rows(
+faces = rows(
     "mated position of the upper face", (),
-    (
-        Column("shift along x", "shift_x"),
-        Column("shift along y", "shift_y"),
-        Column("rotation", "rotation"),
-        Column("mismatch, rms", "mismatch"),
-        Column("correlation", "correlation", 3),
-    ),
+    Column("shift along x", "shift_x"),
+    Column("shift along y", "shift_y"),
+    Column("rotation", "rotation"),
+    Column("mismatch, rms", "mismatch"),
+    Column("correlation", "correlation", 3),
 )  # fmt: skip
 
 
-def _last_pressure(tree: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
+def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the pressure on the block at the last step, where it is the same for all shears."""
-    del tree
     pressures = finite(last["nominal_pressure"])
     if pressures.size and float(np.ptp(pressures)) <= ROUNDING * float(pressures.max()):
         yield f"at the last step of the load, {amount(last['nominal_pressure'])} on the area of the block"
 
 
-closure = Rows(
+closure = rows(
     "closure", ("shear",),
-    (
-        Column("normal force", "normal_force", screen=False),
-        Column("closure", "closure", screen=False),
-        Column("interface closure", "interface_closure"),
-        *AREAS,
-    ),
-    _last_pressure,
+    Column("normal force", "normal_force", screen=False),
+    Column("closure", "closure", screen=False),
+    Column("interface closure", "interface_closure"),
+    *AREAS,
+    remarks=_last_pressure,
 )  # fmt: skip
-closure_laws = Rows(
+closure_laws = rows(
     "laws of closure", ("shear",),
-    (
-        Column("initial stiffness", "initial_stiffness", screen=False),
-        Column("greatest closure", "greatest_closure", screen=False),
-        Column("closure length", "closure_length", screen=False),
-        Column("stiffness", "stiffness", screen=False),
-    ),
+    Column("initial stiffness", "initial_stiffness", screen=False),
+    Column("greatest closure", "greatest_closure", screen=False),
+    Column("closure length", "closure_length", screen=False),
+    Column("stiffness", "stiffness", screen=False),
 )  # fmt: skip
-elimination = Rows(
+elimination = rows(
     "elimination on a part of the block", ("shear",),
-    (
-        Column("part of the block", "nominal_area", screen=False),
-        Column("contact area", "contact_fraction", screen=False),
-        Column("rounds", "iterations", 0, screen=False),
-    ),
+    Column("part of the block", "nominal_area", screen=False),
+    Column("contact area", "contact_fraction", screen=False),
+    Column("rounds", "iterations", 0, screen=False),
 )  # fmt: skip
-area_dimension = Rows(
+area_dimension = rows(
     "contact area against the spacing", ("shear", "resolution"),
-    (
-        Column("normal force", "normal_force", screen=False),
-        Column("contact area", "contact_fraction"),
-        Column("area dimension", "area_dimension", 2),
-    ),
+    Column("normal force", "normal_force", screen=False),
+    Column("contact area", "contact_fraction"),
+    Column("area dimension", "area_dimension", 2),
 )  # fmt: skip
 
 
@@ -264,8 +242,7 @@ def _sticks(state: xr.Dataset) -> str:
     return f"{plain(share, 1)} %"
 
 
-def _slip_limits(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    del tree
+def _slip_limits(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     limit = data["friction_coefficient"] * data["normal_force"].max()
     yield f"all slides at {quantity_text(float(limit.mean()), 'N')}"
     if "stuck_ratio" in data:
@@ -274,31 +251,25 @@ def _slip_limits(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield f"shear over normal stiffness of the joint: {ratios} (theory)"
 
 
-partial_slip = Rows(
+partial_slip = rows(
     "partial slip", ("shear", "step"),
-    (
-        Column("displacement", "tangential_displacement"),
-        Column("sticks", _sticks),
-        Column("stiffness", "tangential_stiffness"),
-        Column("dissipated energy", "dissipated_energy"),
-    ),
-    _slip_limits,
+    Column("displacement", "tangential_displacement"),
+    Column("sticks", _sticks),
+    Column("stiffness", "tangential_stiffness"),
+    Column("dissipated energy", "dissipated_energy"),
+    remarks=_slip_limits,
     load="tangential_force",
 )  # fmt: skip
-delta_dimension = Rows(
+delta_dimension = rows(
     "dimension of the delta-surface", ("shear",),
-    (
-        Column("D of the delta-surface, by area", "covering_dimension", 3),
-        Column("by variogram", "variogram_dimension", 3, screen=False),
-        Column("by spectrum", "spectrum_dimension", 3, screen=False),
-    ),
+    Column("D of the delta-surface, by area", "covering_dimension", 3),
+    Column("by variogram", "variogram_dimension", 3, screen=False),
+    Column("by spectrum", "spectrum_dimension", 3, screen=False),
 )  # fmt: skip
-decorrelation_length = Rows(
+decorrelation_length = rows(
     "decorrelation", ("direction",),
-    (
-        Column("decorrelation length", "decorrelation_length"),
-        Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
-    ),
+    Column("decorrelation length", "decorrelation_length"),
+    Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
 )  # fmt: skip
 
 
@@ -312,21 +283,17 @@ def _mean_slope(state: xr.Dataset) -> str | None:
     return plain(state["mean_slope"], 4, sign=True) if is_shown else None
 
 
-rigid_dilatancy = Rows(
+rigid_dilatancy = rows(
     "rigid dilatancy", ("direction",),
-    (
-        Column("shear", _greatest_shear),
-        Column("rigid dilatancy", "rigid_dilatancy"),
-        Column("slope of face", _mean_slope),
-    ),
+    Column("shear", _greatest_shear),
+    Column("rigid dilatancy", "rigid_dilatancy"),
+    Column("slope of face", _mean_slope),
 )  # fmt: skip
-elastic_dilatancy = Rows(
+elastic_dilatancy = rows(
     "elastic dilatancy", ("direction", "step"),
-    (
-        Column("shear", _greatest_shear, screen=False),
-        Column("dilatancy", "dilatancy", screen=False),
-        Column("rigid dilatancy", "rigid_dilatancy", screen=False),
-    ),
+    Column("shear", _greatest_shear, screen=False),
+    Column("dilatancy", "dilatancy", screen=False),
+    Column("rigid dilatancy", "rigid_dilatancy", screen=False),
 )  # fmt: skip
 
 
@@ -402,15 +369,13 @@ def _peak_distance(state: xr.Dataset) -> str | None:
     return length(state["peak_distance"].max()) if "peak_distance" in state else None
 
 
-friction = Rows(
+friction = rows(
     "peak shear strength", ("direction", "step"),
-    (
-        Column("peak shear strength", _strength("peak_shear_strength")),
-        Column("peak friction angle", _strength("peak_friction_angle")),
-        Column("from shear", _strength("peak_shear"), screen=False),
-        Column("over", _peak_distance),
-    ),
-    _peak_remarks,
+    Column("peak shear strength", _strength("peak_shear_strength")),
+    Column("peak friction angle", _strength("peak_friction_angle")),
+    Column("from shear", _strength("peak_shear"), screen=False),
+    Column("over", _peak_distance),
+    remarks=_peak_remarks,
 )  # fmt: skip
 
 
@@ -418,27 +383,22 @@ def _worn_depth(state: xr.Dataset) -> Any:
     return state["wear_depth"].max("point", keep_attrs=True) if "wear_depth" in state else None
 
 
-direct_shear = Rows(
+direct_shear = rows(
     "direct shear", ("nominal_pressure",),
-    (
-        Column("peak strength", "peak_shear_strength"),
-        Column("friction angle", "peak_friction_angle"),
-        Column("residual strength", "residual_shear_strength"),
-        Column("worn depth", _worn_depth),
-    ),
+    Column("peak strength", "peak_shear_strength"),
+    Column("friction angle", "peak_friction_angle"),
+    Column("residual strength", "residual_shear_strength"),
+    Column("worn depth", _worn_depth),
 )  # fmt: skip
-shear_curve = Rows(
+shear_curve = rows(
     "shear curve", ("nominal_pressure",),
-    (
-        Column("peak strength (shear curve)", "peak_shear_strength"),
-        Column("at displacement", "peak_displacement"),
-    ),
+    Column("peak strength (shear curve)", "peak_shear_strength"),
+    Column("at displacement", "peak_displacement"),
 )  # fmt: skip
 
 
-def _at_pressures(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _at_pressures(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield what the criteria assume, and where they are used outside their range."""
-    del tree
     if "assumption" in data:
         names = [str(name) for name in data["criterion"].values]
         yield from (
@@ -446,19 +406,16 @@ def _at_pressures(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         )
 
 
-strength_envelope = Rows(
+strength_envelope = rows(
     "strength by criterion", ("criterion",),
-    (
-        Column("shear strength", "shear_strength"),
-        Column("friction angle", "friction_angle", screen=False),
-        Column("in its range", "in_range", screen=False),
-    ),
-    _at_pressures,
+    Column("shear strength", "shear_strength"),
+    Column("friction angle", "friction_angle", screen=False),
+    Column("in its range", "in_range", screen=False),
+    remarks=_at_pressures,
 )  # fmt: skip
 
 
-def _rigid_faces(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    del tree
+def _rigid_faces(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     if "converged" not in data:  # nothing was pressed without a modulus
         yield "of rigid faces"
 
@@ -468,19 +425,16 @@ def _weight_strength(state: xr.Dataset) -> Any:
     return strength if finite(strength).size else "the faces lock"
 
 
-self_weight = Rows(
+self_weight = rows(
     "strength under self-weight", ("direction", "shear", "structure_size"),
-    (
-        Column("shear strength", _weight_strength),
-        Column("exponent of size", "strength_exponent", 3, screen=False),
-    ),
-    _rigid_faces,
+    Column("shear strength", _weight_strength),
+    Column("exponent of size", "strength_exponent", 3, screen=False),
+    remarks=_rigid_faces,
 )  # fmt: skip
 
 
-def _transmissivity(tree: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
+def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
-    del tree
     values = finite(last["transmissivity"])
     values = values[values > 0]
     if values.size:
@@ -494,21 +448,18 @@ def _transmissivity(tree: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
         )
 
 
-transmissivity = Rows(
+transmissivity = rows(
     "aperture", ("shear",),
-    (
-        Column("normal force", "normal_force", screen=False),
-        Column("mean aperture", "aperture"),
-        Column("hydraulic (x)", _along("hydraulic_aperture", "axis", "x")),
-        Column("hydraulic (y)", _along("hydraulic_aperture", "axis", "y"), screen=False),
-    ),
-    _transmissivity,
+    Column("normal force", "normal_force", screen=False),
+    Column("mean aperture", "aperture"),
+    Column("hydraulic (x)", _along("hydraulic_aperture", "axis", "x")),
+    Column("hydraulic (y)", _along("hydraulic_aperture", "axis", "y"), screen=False),
+    remarks=_transmissivity,
 )  # fmt: skip
 
 
-def _uplift_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _uplift_remarks(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield whether the joint has more or less uplift than the guidelines assume."""
-    del tree
     for shear, state in in_turn(data, "shear"):
         joint, arm = (state[name].sel(diagram="joint") for name in ("uplift_force", "uplift_arm"))
         place = f"at shear {shear}: " if shear else ""
@@ -530,24 +481,21 @@ def _normal_stress(state: xr.Dataset) -> Any:
     return None if "effective_stress" in state else state["nominal_pressure"]
 
 
-uplift = Rows(
+uplift = rows(
     "uplift", ("shear",),
-    (
-        Column("effective stress", "effective_stress"),
-        Column("normal stress", _normal_stress),
-        Column("uplift", _along("uplift_force", "diagram", "joint")),
-        Column("of the drained diagram", _along("uplift_force", "diagram", "drained"), screen=False),
-        Column("of the linear diagram", _along("uplift_force", "diagram", "linear"), screen=False),
-        Column("arm, joint", _along("uplift_arm", "diagram", "joint")),
-    ),
-    _uplift_remarks,
+    Column("effective stress", "effective_stress"),
+    Column("normal stress", _normal_stress),
+    Column("uplift", _along("uplift_force", "diagram", "joint")),
+    Column("of the drained diagram", _along("uplift_force", "diagram", "drained"), screen=False),
+    Column("of the linear diagram", _along("uplift_force", "diagram", "linear"), screen=False),
+    Column("arm, joint", _along("uplift_arm", "diagram", "joint")),
+    remarks=_uplift_remarks,
 )  # fmt: skip
 
 
-def _set(title: str, *columns: Column, remarks: Any = None) -> Rows:
+def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
     """Return the table of an analysis of contact sets: over the shears, or over the load."""
-    more = {} if remarks is None else {"remarks": remarks}
-    return Rows(title, ("shear", "step"), columns, first_dim=True, **more)
+    return rows(title, ("shear", "step"), *columns, remarks=remarks, first_dim=True)
 
 
 def _window(state: xr.Dataset) -> str | None:
@@ -563,9 +511,8 @@ def _window(state: xr.Dataset) -> str | None:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def _beside_random(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield how many sets have box counts that random sets of equal coverage do not have."""
-    del tree
     if "differs_from_random" in data:
         differs = np.asarray(data["differs_from_random"].values, dtype=bool)
         yield (
@@ -658,9 +605,8 @@ def _longest_scale(name: str) -> Any:
     return lambda state: state[name].isel(scale=-1) if name in state else None
 
 
-def _signature_window(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield the windows (each member has its own), and why some states have no dimension."""
-    del tree
     ends = zip(*(data[name].values.ravel() for name in ("window_low", "window_high")), strict=True)
     for low, high in dict.fromkeys((length(low), length(high)) for low, high in ends if np.isfinite(low)):
         yield f"D is over {low} to {high}, beside that of random spots; clustering and patches at {high}."

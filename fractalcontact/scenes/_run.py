@@ -19,7 +19,7 @@ import xarray as xr
 from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
-from fractalcontact.base.references import joined_references
+from fractalcontact.base.references import joined_references, provenance_of
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import caveats
@@ -377,9 +377,7 @@ def _name_outside(read: Any) -> Any:
 def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:
     """Return the heights of a surface with its description; the provenance states both calls."""
     merged = heights.assign(description.data_vars)
-    entry = json.loads(heights.attrs["provenance"]) | {
-        "merged": [json.loads(description.attrs["provenance"])]
-    }
+    entry = provenance_of(heights) | {"merged": [provenance_of(description)]}
     sources = (dataset.attrs["references"] for dataset in (heights, description))
     references = joined_references(*sources)
     return merged.assign_attrs(provenance=json.dumps(entry), references=references)
@@ -387,7 +385,7 @@ def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:
 
 def _note_run_time(tree: xr.DataTree, start: float) -> None:
     """Note the time since the call of `run`: stages, validation, starting of workers, waiting."""
-    entry = json.loads(tree.attrs["provenance"])
+    entry = provenance_of(tree)
     tree.attrs["provenance"] = json.dumps(entry | {"run_time": time.perf_counter() - start})
 
 
@@ -408,7 +406,7 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
         facts["standard error of H"] = " ".join(" to ".join(pair) for pair in ends) or "none"
     if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
         facts["interpolation error (m)"] = float(result["interpolation_error"].max())
-    words = json.loads(result.attrs.get("provenance", "{}")).get("achieved_error")
+    words = provenance_of(result).get("achieved_error")
     return facts if facts or words is None else {"error": words}
 
 
@@ -446,7 +444,7 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
 
     start = time.perf_counter()
     files = plotting.draw(tree, folder, progress=progress)
-    entry = json.loads(tree.attrs["provenance"])
+    entry = provenance_of(tree)
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)
     return files

@@ -19,7 +19,7 @@ from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf_header import read_headers
 from fractalcontact.base.output_folder import RESULT
 from fractalcontact.base.progress import track
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.schema import label
 from fractalcontact.scenes._checkpoint import PartStore, digest_of
 from fractalcontact.scenes._executor import Workers, run_tasks

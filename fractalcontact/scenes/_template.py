@@ -12,7 +12,7 @@ from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.file_patterns import files_of, is_pattern
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import OF_SURFACE
 

@@ -11,7 +11,8 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import as_array
-from fractalcontact.base.results import provenance_of, public_result
+from fractalcontact.base.references import provenance_of
+from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -19,7 +19,8 @@ from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.provenance import file_checksum
-from fractalcontact.base.results import provenance_of, public_result
+from fractalcontact.base.references import provenance_of
+from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.surface_argument import usual_form
 from fractalcontact.base.validation import NONE, Problems, reading

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.schema import QUANTITIES
 
 

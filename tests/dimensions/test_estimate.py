@@ -7,7 +7,7 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base import threads
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 
 VARIABLES = {
     "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",

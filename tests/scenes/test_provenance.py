@@ -9,7 +9,7 @@ from study import watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.base.results import provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.signals import Stopped
 
 STUDY = """
