@@ -34,6 +34,36 @@ from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
 SOFTEST = 1e4  # Pa: below the softest gels; a modulus below it is in another unit
 WEAKEST = 1e4  # Pa: below the weakest clays; a strength below it is in another unit
+TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
+    "spacing", "units", "level", "despike", "young", "poisson", "register", "turn_upper", "friction_angle",
+    "wall_strength",
+)  # fmt: skip
+HELP = {  # of options, where it is long
+    "run folder": "folder for result.nc, the report and the figures (default: the name of the scene); a "
+    "stopped run resumes there",
+    "accuracy folder": "folder for the results (NetCDF) and figures; after a stop of `estimators` the same "
+    "command continues",
+    "question folder": "folder for the results (default: SCAN_QUESTION, without suffix; of many scans "
+    "their folder)",
+    "workers": "share scans, members, shears and directions between N processes (default 0: this process)",
+    "scheduler": "share them between the workers of this dask scheduler instead (tcp://host:8786); of many "
+    "scans they need the files and the folder of the results",
+    "faces": "files of both faces, in one frame, heights up, the upper one above the lower; of many joints "
+    "all lower faces, then all upper ones in the same order, or a pattern for each in quotes",
+    "surfaces": "files of the surfaces, or a pattern in quotes: every format of fractalcontact.surfaces.read",
+    "turn": "the upper body was scanned with its face up: turn it over about this axis",
+    "jcs": "compressive strength of the joint walls, Pa or with its unit; with --friction-angle: shear "
+    "strength, and a datasheet",
+    "level": "remove the mean plane (1, the default unless the surface is periodic) or quadric (2); 0 "
+    "keeps the tilt",
+    "young": "Young's modulus of both bodies, Pa, or with its unit: 30e9, 30GPa",
+    "units": "unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of "
+    "the file, else m)",
+    "benchmarks": "surfaces, dimensions, contact, domains, joints: error against run time of their methods "
+    "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
+    "of roughness",
+    "mated": "do not move the upper face into mated position",
+}
 QUESTIONS = {
     "roughness": "fractal dimension with its interval, JRC and directional roughness of a scan",
     "contact": "contact of a scan with a flat under growing pressure",
@@ -92,16 +122,10 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     commands = parser.add_subparsers(required=True, metavar="command")
 
     run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
-    run.add_argument("scene", help="a scene file (TOML), or the name of a shipped scene")
-    run.add_argument(
-        "-o",
-        "--out",
-        help="folder for result.nc, the report and the figures (default: the name of the scene); a stopped "
-        "run resumes there",
-    )
-    run.add_argument(
-        "--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing"
-    )
+    add = run.add_argument
+    add("scene", help="a scene file (TOML), or the name of a shipped scene")
+    add("-o", "--out", help=HELP["run folder"])
+    add("--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing")
     _add_run_options(run)
     run.set_defaults(action=_run)
 
@@ -113,28 +137,16 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     init.set_defaults(action=_init)
 
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
-    accuracy.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help="surfaces, dimensions, contact, domains, joints: error against run time of their methods "
-        "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
-        "of roughness",
-    )
-    accuracy.add_argument(
-        "-o",
-        "--out",
-        help="folder for the results (NetCDF) and figures; after a stop of `estimators` the same command "
-        "continues",
-    )
+    accuracy.add_argument("names", nargs="*", metavar="NAME", help=HELP["benchmarks"])
+    accuracy.add_argument("-o", "--out", help=HELP["accuracy folder"])
     accuracy.add_argument("--budget", type=float, default=60.0, help="time budget in seconds (default 60)")
-    bench = accuracy.add_argument_group("estimators")
-    bench.add_argument("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
-    bench.add_argument("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
-    bench.add_argument("--families", nargs="+", help="fbm, spectral (default: both)")
-    bench.add_argument("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
-    bench.add_argument("--members", type=int, nargs="+", help="surfaces for each case (default 25600 / size)")
-    bench.add_argument("--seed", type=int, help="seed of the random stream")
+    add = accuracy.add_argument_group("estimators").add_argument
+    add("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
+    add("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
+    add("--families", nargs="+", help="fbm, spectral (default: both)")
+    add("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
+    add("--members", type=int, nargs="+", help="surfaces for each case (default 25600 / size)")
+    add("--seed", type=int, help="seed of the random stream")
     accuracy.set_defaults(action=_accuracy)
 
     methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
@@ -147,12 +159,11 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     report.set_defaults(action=_report)
 
     export = commands.add_parser("export", help="write the maps of a result file for ParaView or Fiji")
-    export.add_argument("file", help="a result file: heights, and the maps that [want] keep stores")
-    export.add_argument(
-        "--to", choices=("vti", "tiff"), default="vti", help="VTK image data (default) or stacks of TIFF"
-    )
-    export.add_argument("-o", "--out", help="folder for the files (default: maps beside the result)")
-    export.add_argument("--force", action="store_true", help="overwrite files of the same names")
+    add = export.add_argument
+    add("file", help="a result file: heights, and the maps that [want] keep stores")
+    add("--to", choices=("vti", "tiff"), default="vti", help="VTK image data (default) or stacks of TIFF")
+    add("-o", "--out", help="folder for the files (default: maps beside the result)")
+    add("--force", action="store_true", help="overwrite files of the same names")
     export.set_defaults(action=_export)
 
     info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
@@ -163,26 +174,12 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
 
 def _add_run_options(command: argparse.ArgumentParser) -> None:
     """Add what all commands that run a scene take."""
-    command.add_argument("--quiet", action="store_true", help="no progress bars and no summary")
-    command.add_argument(
-        "--verbose", action="store_true", help="all tables, remarks and caveats, and the time of every stage"
-    )
-    command.add_argument(
-        "--force", action="store_true", help="overwrite results of another study and files of others"
-    )
-    command.add_argument(
-        "--workers",
-        type=int,
-        default=0,
-        metavar="N",
-        help="share scans, members, shears and directions between N processes (default 0: this process)",
-    )
-    command.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="share them between the workers of this dask scheduler instead (tcp://host:8786); of many scans "
-        "they need the files and the folder of the results",
-    )
+    add = command.add_argument
+    add("--quiet", action="store_true", help="no progress bars and no summary")
+    add("--verbose", action="store_true", help="all tables, remarks and caveats, and the time of every stage")
+    add("--force", action="store_true", help="overwrite results of another study and files of others")
+    add("--workers", type=int, default=0, metavar="N", help=HELP["workers"])
+    add("--scheduler", metavar="ADDRESS", help=HELP["scheduler"])
 
 
 def _pascal(text: str) -> float:
@@ -200,61 +197,24 @@ def _pascal(text: str) -> float:
 def _add_question(commands: Any, question: str, line: str) -> None:
     """Add a command that answers one question to a scan."""
     command = commands.add_parser(question, help=line)
-    is_joint = question == "joint"
-    command.add_argument(
-        "scans",
-        nargs="+",
-        metavar="LOWER UPPER" if is_joint else "SCAN",
-        help="files of both faces, in one frame, heights up, the upper one above the lower; of many joints "
-        "all lower faces, then all upper ones in the same order, or a pattern for each in quotes"
-        if is_joint
-        else "files of the surfaces, or a pattern in quotes: every format of fractalcontact.surfaces.read",
-    )
-    if is_joint:
-        command.add_argument(
-            "--as-scanned", action="store_true", help="do not move the upper face into mated position"
-        )
-        command.add_argument(
-            "--turn-upper",
-            choices=("x", "y"),
-            help="the upper body was scanned with its face up: turn it over about this axis",
-        )
-        command.add_argument("--friction-angle", type=float, help="basic friction angle, degree")
-        command.add_argument(
-            "--jcs",
-            type=_pascal,
-            help="compressive strength of the joint walls, Pa or with its unit; with --friction-angle: shear "
-            "strength, and a datasheet",
-        )
+    add = command.add_argument
+    if question == "joint":
+        add("scans", nargs="+", metavar="LOWER UPPER", help=HELP["faces"])
+        add("--as-scanned", dest="register", action="store_false", help=HELP["mated"])
+        add("--turn-upper", choices=("x", "y"), help=HELP["turn"])
+        add("--friction-angle", type=float, help="basic friction angle, degree")
+        add("--jcs", dest="wall_strength", type=_pascal, metavar="JCS", help=HELP["jcs"])
     else:
-        command.add_argument(
-            "--level",
-            type=int,
-            choices=(0, 1, 2),
-            help="remove the mean plane (1, the default unless the surface is periodic) or quadric (2); 0 "
-            "keeps the tilt",
-        )
+        add("scans", nargs="+", metavar="SCAN", help=HELP["surfaces"])
+        add("--level", type=int, choices=(0, 1, 2), help=HELP["level"])
     if question != "roughness":
-        command.add_argument(
-            "--young",
-            type=_pascal,
-            required=True,
-            help="Young's modulus of both bodies, Pa, or with its unit: 30e9, 30GPa",
-        )
-        command.add_argument("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
-    command.add_argument("--despike", action="store_true", help="remove spikes of the scan")
-    command.add_argument(
-        "--units",
-        help="unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of the "
-        "file, else m)",
-    )
-    command.add_argument("--spacing", type=float, help="distance between the points, or of the cells, in m")
-    command.add_argument(
-        "-o",
-        "--out",
-        help="folder for the results (default: SCAN_QUESTION, without suffix; of many scans their folder)",
-    )
-    command.add_argument("--scene", action="store_true", help="print the scene and run nothing")
+        add("--young", type=_pascal, required=True, help=HELP["young"])
+        add("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
+    add("--despike", action="store_true", help="remove spikes of the scan")
+    add("--units", help=HELP["units"])
+    add("--spacing", type=float, help="distance between the points, or of the cells, in m")
+    add("-o", "--out", help=HELP["question folder"])
+    add("--scene", action="store_true", help="print the scene and run nothing")
     _add_run_options(command)
     command.set_defaults(action=_answer, question=question, plan=False)
 
@@ -271,27 +231,13 @@ def _answer(options: argparse.Namespace) -> int:
         first = Path(scan[0] if isinstance(scan, list) else scan)
         stem = first.resolve().parent.name.replace("*", "") if several else first.name.partition(".")[0]
         folder = f"{stem}_{options.question}"
-    arguments: dict[str, Any] = {
-        name: getattr(options, name)
-        for name in (
-            "spacing",
-            "units",
-            "level",
-            "despike",
-            "young",
-            "poisson",
-            "turn_upper",
-            "friction_angle",
-        )
-        if hasattr(options, name)
-    }
-    if options.question == "joint":
-        arguments |= {"register": not options.as_scanned, "wall_strength": options.jcs}
+    arguments = {name: value for name, value in vars(options).items() if name in TEMPLATE_ARGUMENTS}
     if arguments.get("young", SOFTEST) < SOFTEST:
         message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)
-    if (arguments.get("wall_strength") or WEAKEST) < WEAKEST:
-        message = f"--jcs: {options.jcs:g} Pa is weaker than any rock; is it {options.jcs:g} MPa?"
+    strength = arguments.get("wall_strength")
+    if strength is not None and strength < WEAKEST:
+        message = f"--jcs: {strength:g} Pa is weaker than any rock; is it {strength:g} MPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:
@@ -491,7 +437,9 @@ def _error_against_time(options: argparse.Namespace) -> int:
             written.append(f"{name}.png")
             _write_figure(error_against_time(part.to_dataset()), Path(options.out) / written[-1])
         print(f"\nwritten to {options.out}: {', '.join(written)}")
-    return _accuracy_exit_code(stop)
+    if stop:
+        raise Stopped(stop.number, "the results so far are printed above")
+    return 0
 
 
 def _write_figure(axes: Any, path: Path) -> None:
@@ -508,13 +456,6 @@ def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
         return save(result, target.with_name(PARTIAL_RESULT)).name
     target.with_name(PARTIAL_RESULT).unlink(missing_ok=True)
     return save(result, target).name
-
-
-def _accuracy_exit_code(stop: Stop) -> int:
-    """Return 0; raise if the run was stopped."""
-    if stop:
-        raise Stopped(stop.number, "the results so far are printed above")
-    return 0
 
 
 def _estimators(options: argparse.Namespace) -> int:

@@ -143,11 +143,10 @@ def register(
         for dim, step in zip(("y", "x"), grid.spacing, strict=True)
     ]
     offset = (starts[0], starts[1])
-    if turn_upper is not None:
-        up = turned_over(up, turn_upper)
+    scanned, up = up, turned_over(up, turn_upper)
     pose = find_pose(low, up, offset, rotation, tilt)
-    if turn_upper is None and not pose.is_certain:
-        _refuse_turned_face(low, up, offset, rotation, tilt)
+    if not pose.is_certain:
+        _refuse_turned_face(low, scanned, turn_upper, offset, rotation, tilt)
     if not pose.determined:
         expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
@@ -160,20 +159,23 @@ def register(
     return result
 
 
-def turned_over(face: Array, axis: str) -> Array:
-    """Return the heights of a body that is turned over about x or y."""
-    return np.asarray(-np.flip(face, TURNS[axis]))
+def turned_over(face: Array, axis: str | None) -> Array:
+    """Return the heights of a body that is turned over about x or y; as they are without an axis."""
+    return face if axis is None else np.asarray(-np.flip(face, TURNS[axis]))
 
 
-def _refuse_turned_face(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> None:
-    """Raise where the upper face, which does not fit, fits once it is turned over."""
-    for axis in TURNS:
-        if find_pose(lower, turned_over(upper, axis), offset, rotates, tilts).is_certain:
-            cure = (
-                f"expected faces seen from above, got one scanned face up: it fits with turn_upper={axis!r} "
-                f"(--turn-upper {axis})"
-            )
-            raise InvalidInput(WHERE, [f"upper: {cure}"])
+def _refuse_turned_face(
+    lower: Array, scanned: Array, given: str | None, offset: Pair, rotates: bool, tilts: bool
+) -> None:
+    """Raise where the upper face, which does not fit turned over as `given`, fits in another way."""
+    for axis in (None, *TURNS):
+        turned = turned_over(scanned, axis)
+        if axis != given and find_pose(lower, turned, offset, rotates, tilts).is_certain:
+            remedy = f"with turn_upper={axis!r} (--turn-upper {axis})" if axis else "without turn_upper"
+            problem = "upper: expected faces seen from above, got one scanned face up"
+            if given is not None:
+                problem = f"turn_upper: expected another way to turn the upper body, got {given!r}"
+            raise InvalidInput(WHERE, [f"{problem}: it fits {remedy}"])
 
 
 def _refuse_swapped_faces(result: xr.Dataset) -> None:

@@ -18,6 +18,7 @@ from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
 RIGID_LINE = 1.0  # points, width
+ON_AXIS = 0.005  # of the height of the axes: a line that rises by less lies on the axis of a level face
 
 
 @figure
@@ -34,7 +35,7 @@ def dilatancy(
 
     Under constant normal force there is one curve per force, and a black one for rigid surfaces. Without
     forces there is one curve per direction for rigid surfaces; thin dotted lines show the rise along the
-    mean plane.
+    mean plane, unless the faces are level.
 
     Parameters
     ----------
@@ -75,7 +76,8 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     if "mean_slope" in data:
         ends = np.array([0.0, np.nanmax(shear.values)])
         rise = table(data, "mean_slope", ("direction",))[:, None] * ends
-        panel.curves("mean slope", ends, rise, key="mean slope", **_style.DOTTED)
+        if np.nanmax(np.abs(rise), initial=0.0) > ON_AXIS * np.nanmax(opening.values, initial=0.0):
+            panel.curves("mean slope", ends, rise, key="mean slope", **_style.DOTTED)
     return panel.finish()
 
 

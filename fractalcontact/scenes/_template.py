@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import FractalContactError, InvalidInput
+from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
 from fractalcontact.base.file_patterns import files_of, is_pattern
 from fractalcontact.base.references import provenance_of
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import OF_SURFACE
 
@@ -79,6 +81,11 @@ def template(
     str
         TOML. Loads and shears are chosen from the size and the slope of the surface, which is read for that;
         of many scans from the first that can be read.
+
+    Warns
+    -----
+    FractalContactWarning
+        The points of a face are too far apart for its JRC, which is left out.
 
     Raises
     ------
@@ -229,8 +236,13 @@ def _roughness(facts: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
         "surfaces": ["height", "describe", "texture"],
         "dimensions": ["default", "variogram"],
     }
-    if facts["spacing"] <= JRC_LAG and facts["extent"] >= JRC_LENGTHS * JRC_LAG:
+    is_long, spacing = facts["extent"] >= JRC_LENGTHS * JRC_LAG, facts["spacing"]
+    if is_long and spacing <= JRC_LAG:
         want["joints"] = ["roughness_coefficient", "directional_roughness"]
+    elif is_long:
+        lag, distance = quantity_text(JRC_LAG, "m"), quantity_text(spacing, "m")
+        message = f"JRC is left out: its readings are {lag} apart, and the points of this face {distance}"
+        warnings.warn(message, FractalContactWarning, stacklevel=3)
     return [("want", want | {"figures": True})]
 
 

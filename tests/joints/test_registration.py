@@ -329,6 +329,11 @@ def test_face_scanned_face_up_is_recognised_and_turned_over(make_face, rough, ax
     plain = fc.joints.register(faces[0], make_face(upper, S))
     np.testing.assert_allclose(result.height, plain.height, atol=1e-12)
     assert result.shift_x / S == pytest.approx(-2.0, abs=0.05)
+    other = "y" if axis == "x" else "x"
+    with pytest.raises(ValueError, match=f"turn_upper: .* got '{other}': it fits with turn_upper='{axis}'"):
+        fc.joints.register(*faces, turn_upper=other)
+    with pytest.raises(ValueError, match=f"got '{axis}': it fits without turn_upper"):
+        fc.joints.register(faces[0], make_face(upper, S), turn_upper=axis)
 
 
 def test_faces_of_different_joints_fit_neither_way(make_face, rough):
