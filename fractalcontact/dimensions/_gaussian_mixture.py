@@ -205,8 +205,15 @@ class Lattice:
         """Half waves along y and x of the modes that are used: those that vary along both axes."""
         if not self.periodic:
             return [np.zeros(1) if n == 1 else np.arange(1.0, n) for n in self.shape]
-        rows = np.zeros(1) if self.axes == 1 else 2.0 * np.fft.fftfreq(self.shape[0]) * self.shape[0]
-        return [rows, np.arange(2.0, self.shape[1] + 1.0, 2.0)]
+        ny, (rows, columns) = self.shape[0], self._waves
+        return [2.0 * np.where(rows > ny // 2, rows - ny, rows), 2.0 * columns]
+
+    @property
+    def _waves(self) -> tuple[Array, Array]:
+        """Rows and columns of the Fourier modes: without those of two spacings, of which some are real."""
+        ny, nx = self.shape
+        rows = np.zeros(1, dtype=int) if ny == 1 else np.r_[1 : (ny + 1) // 2, ny // 2 + 1 : ny]
+        return rows, np.arange(1, (nx + 1) // 2)
 
     @cached_property
     def wavenumbers(self) -> list[Array]:
@@ -272,7 +279,9 @@ class Lattice:
         """Return the squared modes of complete heights."""
         z = heights - heights.mean()
         if self.periodic:
-            return np.asarray(np.abs(fft.rfft2(z)[:, 1:]) ** 2 / z.size)
+            rows, columns = self._waves
+            modes = fft.rfft2(z)[rows, 1 : 1 + columns.size]
+            return np.asarray((np.square(modes.real) + np.square(modes.imag)) / z.size)
         if self.axes == 1:
             x = np.arange(z.size) - 0.5 * (z.size - 1)
             z = z - (z @ x)[:, None] / (x @ x) * x

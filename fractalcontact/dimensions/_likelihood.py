@@ -180,7 +180,8 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
         pilot, clean = expected_power(lattice, theta, form)
         sharp = theta.copy()
         sharp[SPREAD] = 0.0
-        keep = clear_modes(pilot, clean, expected_power(lattice, sharp, form)[1])
+        unblurred = expected_power(lattice, sharp, form)[1] if theta[SPREAD] > 0.0 else clean
+        keep = clear_modes(pilot, clean, unblurred)
         if not is_complete:
             correction = filling_ratio(lattice, pilot, observed)
             information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)

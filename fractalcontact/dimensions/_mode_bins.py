@@ -28,7 +28,7 @@ _TAIL = 1e-3  # squared transfer function below which no form of a filter holds
 _ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
 _ISOTROPIC = math.pi / 3.0  # radians per point up to which they differ by less than 5 % for H above .1
 _FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
-_SECTORS = 8  # of azimuth, on a quarter of the plane
+_SECTORS = 9  # of azimuth, on a quarter of the plane; an odd number, so that no sector ends at the diagonal
 _OCTAVE = math.log(2.0)
 
 
@@ -39,13 +39,17 @@ def expected_power(lattice: Lattice, theta: Array, form: int) -> tuple[Array, Ar
     powers = []
     for edges in (True, False):
         rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
-        powers.append(np.maximum((rows * weight[:, None]).T @ columns, 1e-300))
+        power = (rows * weight[:, None]).T @ columns
+        np.maximum(power, 1e-300, out=power)
+        powers.append(power)
     if theta[3] > 0.0:
         corner = 2.0 * theta[5] * np.log(theta[3] / lattice.q)
         bend = np.exp((theta[4] - theta[0]) / theta[5] * np.logaddexp(0.0, corner))
-        powers = [power * bend for power in powers]
-    noise = theta[2] ** 2
-    return powers[0] + noise, powers[1] + noise
+        for power in powers:
+            power *= bend
+    for power in powers:
+        power += theta[2] ** 2
+    return powers[0], powers[1]
 
 
 def clear_modes(total: Array, clean: Array, unblurred: Array) -> Array:
@@ -55,12 +59,11 @@ def clear_modes(total: Array, clean: Array, unblurred: Array) -> Array:
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
     """Return power over pilot, with the median of each half octave as expected of Gaussian heights."""
-    number, count = _classes(lattice, keep, 0.5 * _OCTAVE, math.inf)
+    number, count = _joined(*_classes(lattice, keep, 0.5 * _OCTAVE, math.inf))
     ratio = power / pilot
-    places = _Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE).places
     factor = np.ones(count.size + 1)  # the last one of modes that do not count
-    for octave in np.flatnonzero(count >= LEAST):
-        values = ratio.ravel()[places[octave][places[octave] >= 0]]
+    for octave, places in enumerate(_Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE).places):
+        values = ratio.ravel()[places[places >= 0]]
         factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
     ratio *= factor[number]
     return ratio
