@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from fractalcontact.base.validation import Problems
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
 Array = np.ndarray[Any, np.dtype[Any]]
 
-BLOCK = 1 << 14  # points at a time, so that their differences stay in the cache
 HEIGHT_STATISTICS = (
     "mean_height",
     "rms_height",
@@ -154,15 +152,14 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
     steps = [step / unit for step in spacing]
     ratio = scale / unit
-    neighbours = _neighbours(values, steps, periodic, ratio, complete)
+    squares, laplacian_square, excess = _neighbours(values, steps, periodic, ratio)
     if all(periodic) and complete:
         psd, _ = spectra.periodogram(values, steps)
         moments = spectra.spectral_moments(psd, values.shape, steps)
         along = spectra.directional_slopes(psd, values.shape, steps)
     else:
-        squares = neighbours.slope_squares
         height = (result["rms_height"] / scale) ** 2
-        moments = spectra.Moments(height, sum(squares), neighbours.laplacian_square, values.ndim)
+        moments = spectra.Moments(height, sum(squares), laplacian_square, values.ndim)
         along = tuple(math.sqrt(square) for square in squares)
     mean = scaled_slopes(values, spacing)
     result["rms_slope"] = moments.rms_slope * ratio
@@ -171,8 +168,8 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     for name, rms, slope in zip(("y", "x")[2 - heights.ndim :], along, mean, strict=True):
         result[f"rms_slope_{name}"] = rms * ratio
         result[f"mean_slope_{name}"] = scale * slope
-    result["developed_area_ratio"] = 1.0 + neighbours.excess
-    result["developed_area_excess"] = neighbours.excess
+    result["developed_area_ratio"] = 1.0 + excess
+    result["developed_area_excess"] = excess
     return result
 
 
@@ -188,125 +185,52 @@ def _heights(values: Array, reference: float, scale: float) -> dict[str, float]:
     result = dict.fromkeys(HEIGHT_STATISTICS, math.nan)
     mean = float(values.mean())
     highest, lowest = float(values.max()), float(values.min())
-    sums = np.zeros(4)
-    line = values.reshape(-1)
-    for start in range(0, line.size, BLOCK):
-        part = line[start : start + BLOCK] - mean
-        squares = part * part  # higher powers as products: numpy takes ten times as long for values**3
-        sums += (np.abs(part).sum(), squares.sum(), squares @ part, squares @ squares)
-    size, variance = line.size, float(sums[1]) / line.size
+    deviation = values.ravel() - mean
+    squares = deviation * deviation  # higher powers as products: numpy takes ten times as long for values**3
+    variance = float(squares.mean())
     result["mean_height"] = reference + scale * mean
     result["rms_height"] = scale * math.sqrt(variance)
-    result["mean_absolute_height"] = scale * float(sums[0]) / size
+    result["mean_absolute_height"] = scale * float(np.abs(deviation).mean())
     result["peak_height"] = scale * (highest - mean)
     result["valley_depth"] = scale * (mean - lowest)
     result["peak_to_valley"] = scale * (highest - lowest)
     if highest > lowest:
-        result["skewness"] = float(sums[2]) / size / variance**1.5
-        result["kurtosis"] = float(sums[3]) / size / variance**2
+        result["skewness"] = float(squares @ deviation) / deviation.size / variance**1.5
+        result["kurtosis"] = float(squares @ squares) / deviation.size / variance**2
     return result
 
 
-@dataclass(frozen=True)
-class Neighbours:
-    """Means over pairs, triples and cells of neighbours, in scaled heights and steps; NaN without any.
-
-    Attributes
-    ----------
-    slope_squares : tuple of float
-        Mean square difference quotient along each axis.
-    laplacian_square : float
-        Mean square of the sum of second difference quotients.
-    excess : float
-        Mean of sqrt(1 + gradient^2) - 1 over chords, or over triangles of cells cut both ways.
-    """
-
-    slope_squares: tuple[float, ...]
-    laplacian_square: float
-    excess: float
-
-
 def _neighbours(
-    values: Array, steps: Sequence[float], periodic: Sequence[bool], ratio: float, complete: bool
-) -> Neighbours:
-    """Return the means over neighbours; `ratio` is the unit of height over that of length."""
-    plane = values.reshape((1,) * (2 - values.ndim) + values.shape)
-    step_y, step_x = (1.0, *steps)[-2:]
-    wrap_y, wrap_x = (False, *periodic)[-2:]
-    ny, nx = plane.shape
-    sums = []
-    rows = max(1, BLOCK // nx)  # a block and its differences stay in the cache
-    for start in range(0, ny, rows):
-        stop = min(start + rows, ny)
-        above, below = int(wrap_y or start > 0), int(wrap_y or stop < ny)
-        if start >= above and stop + below <= ny:
-            block = plane[start - above : stop + below]
-        else:
-            block = plane[np.arange(start - above, stop + below) % ny]
-        if wrap_x:
-            block = np.concatenate([block[:, -1:], block, block[:, :1]], axis=1)
-        own = (above, stop - start), (int(wrap_x), nx)
-        sums.append(_block_sums(block, own, (step_y, step_x), ratio * ratio, complete))
-    means = [float(total / count) if count else math.nan for total, count in np.sum(sums, axis=0)]
-    return Neighbours(tuple(means[2 - values.ndim : 2]), *means[2:])
+    values: Array, steps: Sequence[float], periodic: Sequence[bool], ratio: float
+) -> tuple[list[float], float, float]:
+    """Return means over neighbours: squares of the slopes and of the Laplacian, and excess of area over plan.
 
-
-def _block_sums(
-    block: Array,
-    own: tuple[tuple[int, int], tuple[int, int]],
-    steps: tuple[float, float],
-    ratio_squared: float,
-    complete: bool,
-) -> list[tuple[float, int]]:
-    """Return sums and counts: squares of the slopes along y and x and of the Laplacian, excess of area.
-
-    `own` is the first row and the number of rows that the block is about, and the same of its columns; the
-    others are neighbours. A block of one row, without neighbours, is a profile.
+    They are in scaled heights and steps; `ratio` is the unit of height over that of length.
     """
-    (first_row, rows), (first_column, columns) = own
-    across = np.diff(block[first_row:], axis=1)  # from each point to the next
-    across /= steps[1]
-    along = np.diff(block, axis=0)
-    along /= steps[0]
-    laplacian = np.diff(across[:rows], axis=1)
-    laplacian /= steps[1]
-    if len(block) > 1:
-        bend = np.diff(along, axis=0)
-        bend /= steps[0]
-        start = 1 - first_row  # the first row of the plane has no second difference
-        laplacian = laplacian[start : start + len(bend)]
-        laplacian += bend[:, 1:-1]
-    laplacian *= laplacian
-    along, across = along[first_row:], across[:, first_column:]
-    along *= along
-    across *= across
-    results = [along[:, first_column : first_column + columns], across[:rows], laplacian]
-    sums = [_sum(values, complete) for values in results]
-    across *= ratio_squared
-    if len(block) == 1:
-        return [*sums, _sum(_excess(across), complete)]
-    along *= ratio_squared
-    cells = across.shape[1]
-    excess = np.zeros((len(along), cells))
-    for above in (0, 1):
-        for left in (0, 1):
-            start = first_column + left
-            excess += _excess(across[above : above + len(along)] + along[:, start : start + cells])
-    excess *= 0.25
-    return [*sums, _sum(excess, complete)]
+    plane, spacing = np.atleast_2d(values), (1.0, *steps)[-2:]
+    wraps = [int(wrap) for wrap in (False, *periodic)[-2:]]
+    onward = np.pad(plane, [(0, wrap) for wrap in wraps], mode="wrap")  # each point and the next
+    slopes = [np.diff(onward, axis=axis) / step for axis, step in enumerate(spacing)]
+    own = slopes[0][:, : plane.shape[1]], slopes[1][: plane.shape[0]]
+    squares = [_observed_mean(slope**2) for slope in own[2 - values.ndim :]]
+    around = np.pad(plane, [(wrap, wrap) for wrap in wraps], mode="wrap")
+    bends = [np.diff(around, 2, axis=axis) / step**2 for axis, step in enumerate(spacing)]
+    laplacian = bends[1] if values.ndim == 1 else bends[0][:, 1:-1] + bends[1][1:-1]
+    laplacian_square = _observed_mean(laplacian**2)
+    along, across = ((ratio * slope) ** 2 for slope in slopes)
+    if values.ndim == 1:
+        return squares, laplacian_square, _observed_mean(_excess(across))
+    # of a cell, the mean over its corners, at each of which two of its edges meet
+    corners = (_excess(x + y) for x in (across[:-1], across[1:]) for y in (along[:, :-1], along[:, 1:]))
+    return squares, laplacian_square, _observed_mean(0.25 * sum(corners, np.zeros(1)))
 
 
-def _sum(values: Array, complete: bool) -> tuple[float, int]:
-    """Return the sum of the observed values, and their number."""
-    if not complete:
-        values = values[np.isfinite(values)]
-    return float(values.sum()), values.size
+def _observed_mean(values: Array) -> float:
+    """Return the mean of the observed values; NaN without any."""
+    observed = values[np.isfinite(values)]
+    return float(observed.mean()) if observed.size else math.nan
 
 
 def _excess(square: Array) -> Array:
-    """Return sqrt(1 + square) - 1 without loss of digits for small slopes; `square` is overwritten."""
-    root = square + 1.0
-    np.sqrt(root, out=root)
-    root += 1.0
-    square /= root
-    return square
+    """Return sqrt(1 + square) - 1 without loss of digits for small slopes."""
+    return np.asarray(square / (1.0 + np.sqrt(1.0 + square)))
