@@ -7,6 +7,7 @@ balance. Unloading is elastic, and the surface that remains is that of the last 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -39,6 +40,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 ROWS = 64  # of a plane at a time: half a megabyte at n = 1024, in the place of one more plane
 # greatest share of an imposed force that the pressures may miss
 FORCE_TOLERANCE = 1e-9
+STIFFNESS_TOLERANCE = 0.03  # of the punch; the error of its stiffness is the square of that of its pressure
 
 
 @dataclass(frozen=True)
@@ -275,3 +277,30 @@ def flat_contact(problem: Problem, control: Control) -> Solution | None:
         block.residual,
         work=block.compliance * force * force,
     )
+
+
+def press_punch(step: Step, guess: Array | None, *, tolerance: float = STIFFNESS_TOLERANCE) -> Step | None:
+    """Press a punch with the contact of `step` as its base, from a pressure; None where there is no contact.
+
+    Its stiffness is that of the contact (Barber 2003): a node at the edge of a contact bears no pressure, so
+    that nodes that come into contact add nothing to the force at first. Away from the base the gap is more
+    than the punch can close: its closure is at most that of `step`, whose stiffness grows with the load.
+    Yielded nodes are part of the base: the stiffness is that of unloading.
+    """
+    if not step.force > 0:
+        return None
+    depth = 4 * step.solution.closure + 1.0
+    path = replace(
+        step.path,
+        gap=np.where(step.contact, 0.0, depth),
+        control="normal_force",
+        values=(step.force,),
+        hardness=np.inf,
+        tolerance=max(step.path.tolerance, tolerance),
+    )
+    return next(solve_path(path, lambda _: guess))
+
+
+def stiffness_of(punch: Step) -> float:
+    """Return force over closure, in N/m: infinite in full contact of a periodic body."""
+    return punch.force / punch.closure if punch.closure > 0 else math.inf

@@ -34,8 +34,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.schema import SLIP, STICK
-from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
-from fractalcontact.contact._load_path import ScaledPath, Step, solve_path
+from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path, stiffness_of
 from fractalcontact.contact._tangential_operator import TangentialOperator
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -26,9 +26,8 @@ from fractalcontact.base.grid import Grid, contact_edges
 from fractalcontact.base.progress import track
 from fractalcontact.base.schema import CONTACT, OPEN, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems
-from fractalcontact.contact._contact_stiffness import press_punch, stiffness_of
 from fractalcontact.contact._flat_block import block_stiffness
-from fractalcontact.contact._load_path import Step, scaled_path, solve_path
+from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path, stiffness_of
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._superposition import (
     ACCEPTABLE_ERROR,

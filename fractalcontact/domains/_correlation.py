@@ -14,7 +14,7 @@ from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
-from fractalcontact.domains._gliding_box import BLOCKS
+from fractalcontact.domains._lacunarity import BLOCKS
 from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 

@@ -22,7 +22,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._correlation import pair_correlation_length
-from fractalcontact.domains._gliding_box import BoxMoments, box_sums, half_width
+from fractalcontact.domains._lacunarity import BoxMoments, box_sums, half_width
 from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (

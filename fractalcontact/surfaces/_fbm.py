@@ -12,9 +12,8 @@ from fractalcontact.base.memory import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces import _new_surface
 from fractalcontact.surfaces._circulant import draw, embed, torus_shape
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
-from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
 
 STEIN = (
     "Stein, Fast and exact simulation of fractional Brownian surfaces, "
@@ -24,11 +23,11 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:
-    check_plane(problems)
+    _new_surface.check_plane(problems)
     problems.number("hurst", at_least=0.01, at_most=0.99)
-    check_length(problems, "rms_increment")
-    check_length(problems, "lag", optional=True)
-    check_ensemble(problems)
+    _new_surface.check_length(problems, "rms_increment")
+    _new_surface.check_length(problems, "lag", optional=True)
+    _new_surface.check_ensemble(problems)
 
 
 # the torus of the covariance has 3.9 times as many points an edge as the surface; 2.5 times below H = 0.8
@@ -94,7 +93,7 @@ def fbm(
     1e-06 m
     """
     (ny, nx), (dy, dx) = _plane(shape, spacing)
-    sizes = axis_sizes(shape)
+    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
     torus = torus_shape((ny, nx), (dy, dx), float(hurst))
     # of a long surface it has far more points than `memory` counts; its quadrant is transformed
     require_memory(
@@ -119,12 +118,11 @@ def fbm(
         heights *= scale
         return heights.reshape(sizes), entries
 
-    return draw_ensemble(draw_heights, axis_spacing(spacing, len(sizes)), members=members, rng=rng)
+    return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng)
 
 
 def _plane(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
     """Return (ny, nx) and (dy, dx); a profile has ny = 1 and dy = 1."""
-    sizes = axis_sizes(shape)
-    steps = axis_spacing(spacing, len(sizes))
+    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
     (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]
     return (ny, nx), (dy, dx)

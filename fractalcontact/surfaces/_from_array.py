@@ -13,7 +13,7 @@ from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import GIVEN, Problems
-from fractalcontact.surfaces._grid_input import axis_spacing, check_memory, check_spacing, surface_array
+from fractalcontact.surfaces._new_surface import axis_spacing, check_memory, check_spacing, surface_array
 
 
 def check_heights(problems: Problems, heights: Any = GIVEN) -> int | None:

@@ -17,7 +17,7 @@ from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _fit_plane
-from fractalcontact.surfaces._grid_input import check_length
+from fractalcontact.surfaces._new_surface import check_length
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.from_points"

@@ -19,7 +19,7 @@ from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import FileContent, Request
-from fractalcontact.surfaces._grid_input import surface_array
+from fractalcontact.surfaces._new_surface import surface_array
 
 Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"

@@ -12,8 +12,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
-from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
+from fractalcontact.surfaces import _new_surface
 
 FOURNIER = (
     "Fournier, Fussell and Carpenter, Computer rendering of stochastic models, Communications of the ACM 25 "
@@ -27,10 +26,10 @@ Points = Sequence[tuple[float, float]]
 
 
 def _check(problems: Problems) -> None:
-    check_plane(problems, profile=False)
+    _new_surface.check_plane(problems, profile=False)
     problems.number("hurst", at_least=0.01, at_most=0.99)
-    check_length(problems, "rms_increment")
-    check_ensemble(problems)
+    _new_surface.check_length(problems, "rms_increment")
+    _new_surface.check_ensemble(problems)
 
 
 @public_result(
@@ -98,8 +97,7 @@ def midpoint(
     >>> dict(surface.sizes), float(surface[0, 0])
     ({'y': 65, 'x': 65}, 0.0)
     """
-    ny, nx = axis_sizes(shape)
-    dy, dx = axis_spacing(spacing, 2)
+    (ny, nx), (dy, dx) = _new_surface.sizes_and_steps(shape, spacing)
     levels = (max(ny, nx) - 2).bit_length()
     error = float(np.interp(float(hurst), *MEASURED_ERROR))
     entries = {"achieved_error": f"about {error:.1g} of the mean square increments over 64 points"}
@@ -108,7 +106,7 @@ def midpoint(
         heights = _displaced(levels, (dy / dx, 1.0), float(hurst), stream, additions=bool(additions))
         return float(rms_increment) * heights[:ny, :nx], entries
 
-    return draw_ensemble(draw_heights, (dy, dx), members=members, rng=rng)
+    return _new_surface.draw_ensemble(draw_heights, (dy, dx), members=members, rng=rng)
 
 
 def _displaced(

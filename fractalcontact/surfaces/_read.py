@@ -28,8 +28,8 @@ from fractalcontact.surfaces import _files, _read_points
 from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import check_heights, labelled_heights
-from fractalcontact.surfaces._grid_input import axis_spacing, check_spacing
 from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
+from fractalcontact.surfaces._new_surface import axis_spacing, check_spacing
 from fractalcontact.surfaces._read_points import Points
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -12,8 +12,7 @@ import xarray as xr
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._ensemble import check_ensemble, draw_ensemble
-from fractalcontact.surfaces._grid_input import axis_sizes, axis_spacing, check_length, check_plane
+from fractalcontact.surfaces import _new_surface
 
 AUSLOOS = (
     "Ausloos and Berman, A multivariate Weierstrass-Mandelbrot function, Proceedings of the Royal Society of "
@@ -23,12 +22,12 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:
-    check_plane(problems)
+    _new_surface.check_plane(problems)
     problems.number("hurst", above=0, below=1)
-    check_length(problems, "rms_height")
+    _new_surface.check_length(problems, "rms_height")
     problems.number("ratio", above=1)
     problems.integer("ridges", at_least=1)
-    check_ensemble(problems)
+    _new_surface.check_ensemble(problems)
 
 
 @public_result(
@@ -100,8 +99,7 @@ def weierstrass(
     >>> round(float(surface.std()), 9)
     0.0002
     """
-    sizes = axis_sizes(shape)
-    steps = axis_spacing(spacing, len(sizes))
+    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
     wavelengths = 1 + int(math.log(extent / (2.0 * max(steps))) / math.log(float(ratio)) * (1.0 + 1e-12))
     directions = int(ridges) if len(sizes) == 2 else 1
@@ -113,7 +111,7 @@ def weierstrass(
         heights *= float(rms_height) / math.sqrt(float(np.mean(heights**2)))
         return heights, {"wavelengths": wavelengths, "parameters": {"ridges": directions}}
 
-    return draw_ensemble(draw_heights, steps, members=members, rng=rng)
+    return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng)
 
 
 def _sum_of_waves(

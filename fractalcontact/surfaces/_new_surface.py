@@ -1,14 +1,15 @@
-"""Shape and spacing of a new surface: their checks, their conversion, and the labelled array they make."""
+"""New surfaces: checks of shape, spacing and members, the labelled array, and ensembles of random draws."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import rng as streams
 from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import float_array, is_real, number_of_axes
@@ -69,6 +70,12 @@ def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:
     return tuple(float(step) for step in np.broadcast_to(float_array(spacing), axes))
 
 
+def sizes_and_steps(shape: Any, spacing: Any) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return shape and spacing that passed `check_plane`, for each axis, y first."""
+    sizes = axis_sizes(shape)
+    return sizes, axis_spacing(spacing, len(sizes))
+
+
 def surface_array(
     heights: Any,
     spacing: Sequence[float],
@@ -92,3 +99,54 @@ def surface_array(
     for (name, values), size in zip(leading.items(), heights.shape, strict=False):
         coords[name] = (name, np.arange(size) if values is None else np.asarray(values))
     return xr.DataArray(heights, coords, (*leading, *core), name="height")
+
+
+def check_ensemble(problems: Problems) -> None:
+    """Check the number of members and the random stream."""
+    problems.integer("members", at_least=1, optional=True)
+    with problems.collect():
+        streams.generator(problems.given.rng)
+
+
+def draw_ensemble(
+    draw: Callable[[np.random.Generator], tuple[Array, dict[str, Any]]],
+    spacing: Sequence[float],
+    *,
+    members: int | None,
+    rng: streams.RNGLike,
+    periodic: bool = False,
+) -> xr.DataArray:
+    """Draw one surface, or `members` of them along a dim `member`.
+
+    Parameters
+    ----------
+    draw : callable
+        Takes a stream; returns the heights (ny, nx) or (nx,) and entries of the provenance.
+    spacing : sequence of float
+        In metres, y first.
+    members : int or None
+        Member i has the i-th stream spawned from `rng`, so it is the same in an ensemble of any size.
+    rng : RNGLike
+        Its record before the first draw is kept as the attribute `random`.
+    periodic : bool
+
+    Returns
+    -------
+    DataArray
+        With the entries of the (first) draw as attributes.
+    """
+    stream = streams.generator(rng)
+    record = streams.record(stream)
+    if members is None:
+        heights, entries = draw(stream)
+    else:
+        drawn = map(draw, stream.spawn(members))
+        first, entries = next(drawn)
+        heights = np.empty((members, *first.shape))
+        heights[0] = first
+        for number, (plane, _) in enumerate(drawn, 1):
+            heights[number] = plane
+    leading = None if members is None else {"member": None}
+    surface = surface_array(heights, spacing, (periodic,) * len(spacing), leading)
+    surface.attrs = {"random": record, **entries}
+    return surface
