@@ -1,14 +1,11 @@
 from ._accuracy import error_against_time as error_against_time
 from ._accuracy import estimator_errors as estimator_errors
-from ._alluvial import alluvial as alluvial
-from ._box_dimension import box_dimension as box_dimension
 from ._closure import closure_laws as closure_laws
 from ._contact_curves import area_dimension as area_dimension
 from ._contact_curves import contact_area as contact_area
 from ._contact_curves import path as path
 from ._contact_curves import pressure_distribution as pressure_distribution
 from ._contact_curves import slip_loops as slip_loops
-from ._contact_maps import contact_domains as contact_domains
 from ._curves import curves as curves
 from ._datasheet import datasheet as datasheet
 from ._dilatancy import correlation as correlation
@@ -19,20 +16,23 @@ from ._dimensions import dimensions as dimensions
 from ._dimensions import scaling as scaling
 from ._directional_roughness import directional_roughness as directional_roughness
 from ._draw import draw as draw
-from ._evolution import first_contact as first_contact
-from ._evolution import lineage as lineage
+from ._fields import contact_domains as contact_domains
+from ._fields import field as field
+from ._fields import first_contact as first_contact
+from ._fields import surface as surface
 from ._flow import hydraulic_aperture as hydraulic_aperture
 from ._flow import uplift as uplift
+from ._islands import alluvial as alluvial
 from ._islands import islands as islands
+from ._islands import lineage as lineage
 from ._scans import scans as scans
+from ._size_curves import box_dimension as box_dimension
 from ._size_curves import lacunarity as lacunarity
 from ._size_curves import signature as signature
 from ._strength import friction as friction
 from ._strength import self_weight as self_weight
 from ._strength import shear_curve as shear_curve
 from ._strength import strength_envelope as strength_envelope
-from ._surface import field as field
-from ._surface import surface as surface
 
 __all__ = [
     "alluvial",

@@ -9,11 +9,16 @@ import numpy as np
 
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._closure import mark_points
-from fractalcontact.plotting._directions import by_direction, direction_name, limit_shear, select_direction
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import nearest, quantity, result_of, table, words
 from fractalcontact.plotting._line_panel import Family, LinePanel, distinct
-from fractalcontact.plotting._paths import by_load
+from fractalcontact.plotting._paths import (
+    by_direction,
+    by_load,
+    direction_name,
+    limit_shear,
+    select_direction,
+)
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 

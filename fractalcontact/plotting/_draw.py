@@ -16,27 +16,22 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems, writing
-from fractalcontact.plotting._alluvial import alluvial
-from fractalcontact.plotting._box_dimension import box_dimension
 from fractalcontact.plotting._closure import closure_laws
 from fractalcontact.plotting._contact_curves import area_dimension, contact_area, slip_loops
-from fractalcontact.plotting._contact_maps import contact_domains
 from fractalcontact.plotting._curves import curves
 from fractalcontact.plotting._dilatancy import correlation, delta_dimension, dilatancy
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directional_roughness import directional_roughness
-from fractalcontact.plotting._directions import evenly_sampled_reach
 from fractalcontact.plotting._ensemble import draw_with_band, member_count, reduced_trees
-from fractalcontact.plotting._evolution import first_contact, lineage
+from fractalcontact.plotting._fields import contact_domains, first_contact, surface
 from fractalcontact.plotting._flow import hydraulic_aperture, uplift
 from fractalcontact.plotting._inputs import group, words
-from fractalcontact.plotting._islands import islands
-from fractalcontact.plotting._paths import at_shear, loaded_steps, shear_text
+from fractalcontact.plotting._islands import alluvial, islands, lineage
+from fractalcontact.plotting._paths import at_shear, evenly_sampled_reach, loaded_steps, shear_text
 from fractalcontact.plotting._scans import scans
-from fractalcontact.plotting._size_curves import lacunarity, signature
+from fractalcontact.plotting._size_curves import box_dimension, lacunarity, signature
 from fractalcontact.plotting._strength import friction, self_weight, shear_curve, strength_envelope
 from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of, needs_log_axis
-from fractalcontact.plotting._surface import surface
 from fractalcontact.plotting._units import UNITS_EXPECTED, Units, marked, require_units
 
 Drawing = Callable[..., Any]  # of the data and of what stands beside them; returns Axes, or an array of them

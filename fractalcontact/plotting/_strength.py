@@ -9,11 +9,17 @@ import xarray as xr
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._directions import by_direction, direction_name, limit_shear, select_direction
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel, distinct, ordered
-from fractalcontact.plotting._paths import by_load, by_shear
+from fractalcontact.plotting._paths import (
+    by_direction,
+    by_load,
+    by_shear,
+    direction_name,
+    limit_shear,
+    select_direction,
+)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, number_texts, scale_of
 

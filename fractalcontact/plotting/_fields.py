@@ -1,4 +1,4 @@
-"""Maps of the contact state along a load or shear path."""
+"""Maps: of a surface, of any field, of the contact along a path, and of the load of first contact."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.units import quantity_text
+from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._figure import figure
-from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of
-from fractalcontact.plotting._paths import PATH, load_text, select_path, shear_text
-from fractalcontact.plotting._style import AxesArray, Panels
-from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of, table
+from fractalcontact.plotting._paths import PATH, at_shear, load_of, load_text, select_path, shear_text
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Units, name_of
 
 ZOOM = 1 / 6  # edge of the magnified window over the shorter side
 POINTS = 1.0  # of a screen: a map whose cells are narrower is magnified
@@ -146,3 +147,138 @@ def _magnify(ax: Any, of: Any, plane: xr.DataArray, window: Any, letter: str) ->
     left, right, *_ = extent_of(part)
     size = f",  {quantity_text(right - left, 'm')} wide" if "x" in plane.coords else ""
     ax.set_title(rf"$\bf{{{letter}}}$  magnified{size}", fontsize="medium")
+
+
+POSITIVE = ("pressure", "gap")
+
+
+@figure
+def surface(
+    surface: Any,
+    *,
+    block: xr.DataArray | None = None,
+    shaded: bool = False,
+    title: str = "",
+    units: Units | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a map of heights.
+
+    If a few heights lie far outside the range of all others, the colour bar is cut and ends in a point.
+
+    Parameters
+    ----------
+    surface : DataArray, Dataset or node of a DataTree
+        Heights (m), dims (y, x); leading dims of length one are dropped. NaN is drawn grey.
+    block : DataArray, optional
+        Any array with the x and y (m) of the sliding block, whose outline is drawn.
+    shaded : bool
+        Light the surface from the north-west (upper left), its slopes exaggerated to an rms of 0.5. The
+        colours are then those of the bar on average only.
+    title : str
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> heights = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> ax = fc.plotting.surface(heights)
+    >>> [each.get_ylabel() for each in ax.figure.axes]
+    ['$y$ (mm)', 'height (mm)']
+    """
+    plane = _maps.plane_of(surface, "surface", "height", units, "surface")
+    if block is not None:
+        with Problems("fc.plotting.surface") as problems:
+            problems.grid("block", block)
+    ax = _style.axes_or_new(ax, _style.MAP)
+    _maps.draw_values(ax, plane, colours=_style.HEIGHT_MAP, shaded=shaded)
+    if block is not None:
+        _maps.draw_outline(ax, block, _maps.plane_scale(plane))
+    ax.set_title(title)
+    return ax
+
+
+@figure
+def field(data: Any, *, title: str | None = None, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw a map of one field of a result: contact pressure, gap, displacement, contact state, islands.
+
+    Parameters
+    ----------
+    data : DataArray
+        Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale, and
+        neighbouring islands (`label`) in different colours.
+    title : str, optional
+        Default: the number of islands of labels, else none.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> heights = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> result = fc.contact.press(heights, contact_modulus=1e9, nominal_pressure=1e6, keep=("pressure",))
+    >>> ax = fc.plotting.field(result["pressure"])
+    >>> print(ax.figure.axes[1].get_ylabel())
+    contact pressure (MPa)
+    """
+    plane = _maps.plane_of(data, "field", "", units, "data")
+    ax = _style.axes_or_new(ax, _style.MAP)
+    if plane.name == "label":
+        _maps.draw_labels(ax, plane)
+    elif plane.name in _maps.STATES:
+        _maps.draw_flags(ax, plane)
+        _maps.label_axes(ax, plane)
+        _maps.draw_flag_legend([ax], None, str(plane.name))
+    else:
+        _maps.draw_values(ax, plane, positive=plane.name in POSITIVE)
+    if title is not None:
+        ax.set_title(title)
+    return ax
+
+
+@figure
+def first_contact(
+    result: Any, *, shear: float | None = None, units: Units | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the load at which each cell first comes into contact: the evolution along a load path in one map.
+
+    Cells that never touch are pale. Where sets grow with load, the contact domain at a load is all cells up
+    to its colour.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        Variable `state` with dims (shear, step, y, x), or without shear, and the load of each step: from
+        `fractalcontact.contact.press` or `fractalcontact.joints.closure`.
+    shear : float, optional
+        Shear displacement (m) of the load path; the nearest one is taken. Default: the middle one.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> loads = [1e5, 1e6, 1e7]
+    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=loads, keep=("state",))
+    >>> ax = fc.plotting.first_contact(pressed)
+    >>> print(ax.figure.axes[1].get_ylabel())
+    normal force $F$ of first contact (N)
+    """
+    data = result_of(result, "first_contact", ("state",), PATH, units)
+    require_known_dims(data, "first_contact", {"state": (*PATH, "y", "x")})
+    path = at_shear(data, shear)
+    name = load_of(path)
+    loads = table(path, name, ("step",)) if name else np.arange(path.sizes["step"], dtype=float)
+    touching = path["state"].transpose("step", "y", "x").values > 0
+    values = np.where(touching.any(axis=0), loads[np.argmax(touching, axis=0)], np.nan)
+    coords = {dim: path[dim] for dim in ("y", "x") if dim in path.coords}
+    attributes = path[name].attrs if name else {"units": "1"}
+    plane = xr.DataArray(values, coords, dims=("y", "x"), name=name or "step", attrs=attributes)
+    ax = _style.axes_or_new(ax, _style.MAP)
+    title, log = (
+        f"{name_of(plane) if name else 'step'} of first contact",
+        _style.needs_log_axis(loads[loads > 0]),
+    )
+    pale = _style.STATE_COLOURS[0]
+    _maps.draw_values(ax, plane, missing=pale, name=title, log=log, clipped=0.0, readable=True)
+    ax.set_title(shear_text(path, data))
+    return ax
