@@ -24,13 +24,10 @@ from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
-from fractalcontact.scenes._ensemble import Ensemble
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import write_report
-from fractalcontact.scenes._memory import check_memory
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, pooled
-from fractalcontact.scenes._plan import stages_of
-from fractalcontact.scenes._plausibility import implausible_result, warn
+from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._result_tables import MEMBER, of_member
 from fractalcontact.scenes._results_folder import (
     CSV,
@@ -45,10 +42,10 @@ from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
-from fractalcontact.scenes._study import Study
+from fractalcontact.scenes._study import Ensemble, Study
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._tables import tables
-from fractalcontact.scenes._validation import validate
+from fractalcontact.scenes._validation import implausible_result, validate, warn
 
 PARTIAL = "partial: "  # start of the attribute `completeness`
 OWN_REFERENCES = "see the references of each group"
